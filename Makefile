@@ -1,0 +1,42 @@
+# Every target first sets up what it needs (setup.sh): .venv from the locks, once.
+# Another interpreter than python3: PYTHON=python3.12 make demo
+
+BIN := .venv/bin
+UV ?= uv
+LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
+
+.PHONY: help demo test check gallery bench lock setup
+.DEFAULT_GOAL := help
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+
+demo: setup ## the inverted pendulum under every law: scores, traces, a figure, a film
+	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
+
+test: setup ## all tests
+	$(BIN)/python -m pytest
+
+check: setup ## lint, format and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	@# without this variable pyright asks the package index for a newer version of itself
+	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
+
+gallery: setup ## the clips that README shows
+	$(BIN)/python videos/gallery.py
+
+bench: ## speed, beside bare MuJoCo and other packages
+	@./setup.sh requirements-bench.lock
+	$(BIN)/python benchmarks/speed.py
+
+lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
+	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
+	$(LOCK) pyproject.toml --group test --group check -o requirements.lock
+	@# what requirements.lock has already is left out of the second one
+	$(LOCK) --group bench -c requirements.lock -o requirements-bench.lock \
+		$$(sed -n 's/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p' requirements.lock)
+
+setup:
+	@./setup.sh

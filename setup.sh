@@ -1,0 +1,58 @@
+#!/bin/sh
+# Makes .venv, the project's own environment: the packages of requirements.lock, of one more lock
+# where an argument names it, and the project itself, editable. Run again, it changes nothing.
+# PYTHON names the interpreter (default: python3). What pip says goes to .venv/setup.log.
+set -eu
+cd "$(dirname "$0")"
+python=${PYTHON:-python3}
+extra=${1:-}
+
+fail() {
+    echo "smc-mujoco: $*" >&2
+    exit 1
+}
+
+version() {
+    "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || true
+}
+
+wanted() { # all that the environment depends on: in a moved folder it is broken
+    pwd
+    cat pyproject.toml requirements.lock
+}
+
+create() {
+    found=$(version "$python")
+    [ -n "$found" ] || fail "needs Python 3.11 or newer and cannot run $python: install it, or name another: PYTHON=python3.12"
+    [ "${found%%.*}" -eq 3 ] && [ "${found#*.}" -ge 11 ] ||
+        fail "needs Python 3.11 or newer, but $python is $found: name another, as in PYTHON=python3.12"
+    "$python" -c 'import ensurepip, venv' 2>/dev/null ||
+        fail "$python has no venv module: install it (Debian, Ubuntu: apt-get install python3-venv)"
+    echo "smc-mujoco: setting up .venv, once (a minute or two, 1.3 GB)"
+    said=$("$python" -m venv --clear .venv 2>&1) ||
+        fail "$python could not make .venv: $(echo "$said" | tail -n 1)"
+}
+
+install() {
+    .venv/bin/python -I -m pip install --no-deps "$@" >>.venv/setup.log 2>&1 && return
+    if grep -qE 'ConnectionError|ConnectTimeout|ReadTimeout|NameResolution|ProxyError' .venv/setup.log; then
+        fail "no network: the packages could not be downloaded; pip's output is in .venv/setup.log"
+    fi
+    fail "the packages could not be installed; pip's output is in .venv/setup.log"
+}
+
+have=$(version .venv/bin/python)
+place=$(head -n 1 .venv/installed 2>/dev/null || true) # none after a broken installation
+if [ -z "$have" ] || [ "$place" != "$(pwd)" ] || { [ -n "${PYTHON:-}" ] && [ "$have" != "$(version "$PYTHON")" ]; }; then
+    create
+fi
+if ! wanted | cmp -s - .venv/installed; then
+    rm -f .venv/installed # until all is there
+    install --only-binary :all: --require-hashes -r requirements.lock
+    install --no-build-isolation --no-index -e .
+    wanted >.venv/installed
+fi
+if [ -n "$extra" ] && ! cmp -s "$extra" ".venv/$extra"; then
+    install --only-binary :all: --require-hashes -r "$extra"
+    cp "$extra" .venv/
+fi

@@ -1,0 +1,74 @@
+"""smc_mujoco: a MuJoCo benchmark suite for sliding-mode controllers.
+
+    import smc_mujoco as smc
+
+    scenario = smc.Scenario(plant="duffing", law=smc.law("observer_free", lam=6.0, k1=3.076))
+    trace = smc.run(scenario)
+    print(smc.score(trace))
+
+Names are loaded when first used, so that importing the package costs nothing.
+"""
+
+import importlib
+import sys
+import types
+from typing import TYPE_CHECKING
+
+from smc_mujoco import gl
+
+if TYPE_CHECKING:
+    from smc_mujoco.errors import ScenarioError as ScenarioError
+    from smc_mujoco.estimators import estimator as estimator, estimator_function as estimator_function, estimators as estimators
+    from smc_mujoco.law import Law as Law, law as law, law_function as law_function, laws as laws
+    from smc_mujoco.metrics import score as score
+    from smc_mujoco.plant import Plant as Plant, plant as plant, plants as plants
+    from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning, run as run, stream as stream
+    from smc_mujoco.scenario import Jump as Jump, Noise as Noise, Scenario as Scenario
+    from smc_mujoco.signals import (
+        Constant as Constant,
+        OrnsteinUhlenbeck as OrnsteinUhlenbeck,
+        Pulse as Pulse,
+        Signal as Signal,
+        Sine as Sine,
+        Step as Step,
+    )
+    from smc_mujoco.trace import Trace as Trace, load as load
+
+_HOMES = {
+    "errors": ("ScenarioError",),
+    "estimators": ("estimator", "estimator_function", "estimators"),
+    "law": ("Law", "law", "law_function", "laws"),
+    "metrics": ("score",),
+    "plant": ("Plant", "plant", "plants"),
+    "run": ("PlainLoopWarning", "run", "stream"),
+    "scenario": ("Jump", "Noise", "Scenario"),
+    "signals": ("Constant", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
+    "trace": ("Trace", "load"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+__all__ = [*_HOME]
+
+gl.choose()  # before anything imports mujoco
+
+
+class _Package(types.ModuleType):
+    """Keeps public names from being hidden by submodules of the same name, such as law and run."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _HOME and isinstance(value, types.ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

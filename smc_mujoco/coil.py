@@ -1,0 +1,41 @@
+"""A drawn spring: a helix of wire whose two ends follow two bodies. Looks only: it has no mass and exerts no force."""
+
+import mujoco
+import numpy as np
+
+SIDES = 6  # of the wire's cross-section
+STEPS = 12  # a turn
+
+
+def draw(spec, name, start, end, *, radius, turns, wire, material):
+    """Add the skin `name` to spec.
+
+    Args:
+      start, end: (body, where the body is, where the wire ends), metres in the world with every joint at 0; between
+        them a point at s in [0, 1] follows the bodies by 1 - s and s, so that the coil stretches and twists evenly.
+      radius, wire: radii of the coil and of its wire, m.
+      turns: whole turns of the coil.
+      material: its material's name.
+    """
+    first, last = np.array(start[2], float), np.array(end[2], float)
+    axis = (last - first) / np.linalg.norm(last - first)
+    up = np.array([0.0, 0.0, 1.0])
+    s = np.linspace(0.0, 1.0, turns * STEPS + 1)
+    turn = 2 * np.pi * turns * s[:, None]
+    outward = np.cos(turn) * up + np.sin(turn) * np.cross(axis, up)
+    around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
+    centre = first + s[:, None] * (last - first) + radius * outward
+    vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)
+
+    ring = np.arange(len(s) - 1)[:, None] * SIDES
+    a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
+    faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)
+
+    skin = spec.add_skin(name=name, material=material)
+    skin.vert, skin.face = vertices.ravel(), faces.ravel()
+    skin.bodyname = [start[0], end[0]]
+    skin.bindpos = [*start[1], *end[1]]
+    skin.bindquat = [1.0, 0.0, 0.0, 0.0] * 2
+    follow = np.repeat(s, SIDES)
+    skin.vertid = [list(range(len(follow)))] * 2
+    skin.vertweight = [list(1.0 - follow), list(follow)]

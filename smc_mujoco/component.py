@@ -1,0 +1,111 @@
+"""A component: a pure function with named gains and a memory - what laws and estimators are made of.
+
+A `Template` is the function with its default gains; calling it with gains gives a `Component`, plain data that a
+Scenario holds. The function is called as `function(y, gains, memory)`: y and gains are read by attribute, memory is a
+float array, zero at the start of a run, one per channel, free to change.
+"""
+
+import dataclasses
+import importlib
+import inspect
+import math
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping
+from types import ModuleType
+
+from smc_mujoco.errors import ScenarioError, number, unknown
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Component:
+    """A function bound to its gains. `function` is None when a loaded trace names one that is not at hand."""
+
+    kind: str
+    name: str
+    gains: Mapping[str, float]
+    memory: int
+    function: Callable | None = dataclasses.field(repr=False)
+
+    def __hash__(self):
+        return hash((self.kind, self.name, tuple(self.gains.items()), self.memory, self.function))
+
+    def __str__(self):
+        return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Template:
+    """A function, its default gains and how many floats of memory it keeps per channel."""
+
+    kind: str
+    name: str
+    function: Callable
+    defaults: Mapping[str, float]
+    memory: int
+    positive: frozenset[str]
+
+    @property
+    def doc(self) -> str:
+        """The docstring of the function's module if it has a file of its own, else the function's."""
+        module = inspect.getmodule(self.function)
+        own = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
+        return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
+
+    def __call__(self, **gains: float) -> Component:
+        """The function with some of its gains changed.
+
+        Raises:
+          ScenarioError: unknown gain, not a finite number, or not positive where it must be.
+        """
+        values = dict(self.defaults)
+        for key, value in gains.items():
+            if key not in values:
+                raise unknown(f"gain of {self.name}", key, values)
+            above = 0.0 if key in self.positive else -math.inf
+            values[key] = number(f"{self.name}'s {key}", value, above=above)
+        return Component(
+            kind=self.kind, name=self.name, gains=values, memory=self.memory, function=self.function
+        )
+
+
+def template(
+    kind: str, gains: Mapping[str, float] | None, memory: int, positive: tuple[str, ...]
+) -> Callable[[Callable], Template]:
+    """A decorator that makes a Template of a function.
+
+    Raises:
+      ScenarioError: a gain's name is no identifier, its default no number, or memory no whole number in 1 .. 10000.
+    """
+    defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
+    for key in defaults:
+        if not key.isidentifier() or key.startswith("_"):
+            raise ScenarioError(f"gain {key!r} is no plain name: call it something like 'k1'")
+    if memory != int(memory) or not 1 <= memory <= 10_000:
+        raise ScenarioError(f"memory is {memory}: give a whole number of floats from 1 to 10000")
+
+    def decorate(function: Callable) -> Template:
+        name = getattr(function, "__name__", type(function).__name__)
+        return Template(
+            kind=kind,
+            name=name,
+            function=function,
+            defaults=defaults,
+            memory=int(memory),
+            positive=frozenset(positive),
+        )
+
+    return decorate
+
+
+def modules(package: str) -> Iterator[ModuleType]:
+    """Every module of a package, imported."""
+    for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        yield importlib.import_module(f"{package}.{info.name}")
+
+
+def discover(package: str) -> dict[str, Template]:
+    """Every Template at the top level of a package's modules, by name."""
+    found: dict[str, Template] = {}
+    for module in modules(package):
+        found |= {value.name: value for value in vars(module).values() if isinstance(value, Template)}
+    return dict(sorted(found.items()))

@@ -1,0 +1,47 @@
+"""Velocity estimators, one per file: (y, gains, memory) -> velocity; found by walking this package."""
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from smc_mujoco.component import Component, Template, discover, template
+from smc_mujoco.errors import unknown
+
+Estimator = Component
+
+
+class Reading(NamedTuple):
+    """What an estimator sees of its channel at a sample, SI units."""
+
+    dt: float  # control period
+    x: float  # measured position
+    v: float  # reading of the velocity sensor
+
+
+def estimator_function(
+    *, gains: Mapping[str, float] | None = None, memory: int = 8, positive: tuple[str, ...] = ()
+) -> Callable[[Callable], Template]:
+    """Make an estimator of a function (y, gains, memory) -> velocity. Arguments as for `law_function`."""
+    return template("estimator", gains, memory, positive)
+
+
+@functools.cache
+def catalogue() -> dict[str, Template]:
+    """Every estimator of this package, by name."""
+    return discover(__name__)
+
+
+def estimator(name: str, **gains: float) -> Estimator:
+    """The estimator `name`, with some of its gains changed.
+
+    Raises:
+      ScenarioError: unknown estimator or gain, or a gain out of its range.
+    """
+    if name not in catalogue():
+        raise unknown("velocity estimator", name, catalogue())
+    return catalogue()[name](**gains)
+
+
+def estimators() -> list[str]:
+    """Names that `estimator` knows."""
+    return list(catalogue())

@@ -1,0 +1,154 @@
+"""What every metric shares: the conventions, the refusal of broken traces, and `@metric`.
+
+Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
+sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
+
+- scale: the largest |e(0)| over the channels; if that is zero, the largest peak-to-peak range of r
+  over the channels; if that is zero too, 1 (rad or m). Percentages are percentages of the scale.
+- settling band: |e| <= 2 % of the scale.
+- settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
+  signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
+- last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
+- approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
+  sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
+- channels: errors and efforts that are integrals over time are summed over the channels; every other
+  metric takes the worst channel, so that it does not grow with n.
+- commands are held between samples; states are not, their integrals use the trapezoid rule.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import itertools
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from smc_mujoco.trace import Trace
+
+BAND = 0.02  # of the scale
+LAST = 0.2  # of the run's duration
+ROUNDING = 1e-9  # of the duration: a sample that rounding put this much before the last part is in it
+EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
+
+CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A metric's entry in the catalogue.
+
+    Attributes:
+      name: the function's name.
+      unit: may contain {x} and {u}, see `unit_for`.
+      summary: first line of the docstring.
+      network: True if it compares channels and so needs n > 1.
+      formula: Trace -> float, without the checks.
+    """
+
+    name: str
+    unit: str
+    summary: str
+    network: bool
+    formula: Callable[[Trace], float]
+
+    def unit_for(self, x: str) -> str:
+        """The unit where positions have the unit x, "rad" or "m" (as `plant.unit`)."""
+        return self.unit.format(x=x, u=EFFORT[x])
+
+
+def metric(
+    unit: str, *, network: bool = False
+) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
+    """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
+
+    Args:
+      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
+      network: True if the metric compares channels.
+    """
+
+    def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
+        name, doc = formula.__name__, inspect.getdoc(formula) or ""
+
+        @functools.wraps(formula)
+        def checked(trace: Trace) -> float:
+            refuse(trace)
+            if network and trace.x.shape[1] < 2:
+                raise ScenarioError(f"{name} compares channels and {label(trace)} has one: give n >= 2")
+            return float(formula(trace))
+
+        CATALOGUE[name] = Metric(
+            name=name, unit=unit, summary=doc.partition("\n")[0], network=network, formula=formula
+        )
+        return checked
+
+    return enter
+
+
+def label(trace: Trace) -> str:
+    """Plant and law, for messages."""
+    return f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
+
+
+def refuse(trace: Trace) -> None:
+    """Raise ScenarioError if the run diverged, failed, or holds a NaN or an infinity."""
+    signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r)
+    finite = np.isfinite(trace.t)
+    for signal in signals:
+        finite = finite & np.isfinite(signal).all(axis=1)
+    if trace.failure is not None:
+        why = trace.failure  # names its time
+    elif trace.diverged_at is not None:
+        why = f"it diverged at t = {trace.diverged_at:g} s"
+    elif not finite.all():
+        why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
+    else:
+        return
+    raise ScenarioError(
+        f"{label(trace)} has no score, {why}: change the gains or u_max, or end the run earlier"
+    )
+
+
+def error(trace: Trace) -> np.ndarray:
+    """e = x - r, (K+1, n)."""
+    return trace.x - trace.r
+
+
+def scale(trace: Trace) -> float:
+    """The run's yardstick in x's unit, never zero; see the module's conventions."""
+    start = float(np.abs(trace.x[0] - trace.r[0]).max())
+    return start or float(np.ptp(trace.r, axis=0).max()) or 1.0
+
+
+def last(trace: Trace) -> slice:
+    """The samples of the last part."""
+    t = trace.t
+    begin = t[-1] - LAST * (1 + ROUNDING) * (t[-1] - t[0])
+    return slice(int(np.searchsorted(t, begin)), None)
+
+
+def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
+    """Seconds since t[0] from which size (K+1,) stays <= band; 0 if always, inf if not at the end."""
+    outside = np.flatnonzero(size > band)
+    if outside.size == 0:
+        return 0.0
+    if outside[-1] == t.size - 1:
+        return math.inf
+    return float(t[outside[-1] + 1] - t[0])
+
+
+def approaches(trace: Trace) -> list[list[slice]]:
+    """The samples of each approach in order, channel by channel."""
+    band = BAND * scale(trace)
+    channels = []
+    for r in trace.r.T:
+        jumps = np.flatnonzero(np.abs(np.diff(r)) > band) + 1
+        channels.append([slice(*ends) for ends in itertools.pairwise([0, *jumps.tolist(), r.size])])
+    return channels

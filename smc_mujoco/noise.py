@@ -1,0 +1,56 @@
+"""Counter-based normal numbers: no generator state, the same numbers in any order and on any thread.
+
+Philox4x64-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011), bit for bit
+numpy.random.Philox(key=(seed, channel), counter=(k - 1, stream, 0, 0)).random_raw(4), and the Box-Muller
+transform (Box & Muller 1958, Ann. Math. Stat. 29:610) of its words.
+"""
+
+import math
+
+import numpy as np
+from numba import njit, types
+from numba.extending import intrinsic
+
+MEASUREMENT, PROCESS = 0, 1  # streams: sensor noise, process noise
+
+_M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
+_W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
+_SHIFT, _ONE = np.uint64(11), np.uint64(1)
+
+
+@intrinsic
+def _mulhi(typingctx, a, b):
+    """High 64 bits of the 128-bit product of two uint64."""
+    from llvmlite import ir
+
+    def codegen(context, builder, signature, args):
+        wide = ir.IntType(128)
+        product = builder.mul(builder.zext(args[0], wide), builder.zext(args[1], wide))
+        return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
+
+    return types.uint64(types.uint64, types.uint64), codegen
+
+
+@njit(error_model="numpy")
+def block(seed, channel, stream, k):
+    """Four uint64 words of the block with number k of a stream; all arguments are whole numbers >= 0."""
+    c0, c1, c2, c3 = np.uint64(k), np.uint64(stream), np.uint64(0), np.uint64(0)
+    key0, key1 = np.uint64(seed), np.uint64(channel)
+    for _ in range(10):
+        c0, c1, c2, c3 = (
+            _mulhi(_M1, c2) ^ c1 ^ key0,
+            _M1 * c2,
+            _mulhi(_M0, c0) ^ c3 ^ key1,
+            _M0 * c0,
+        )
+        key0, key1 = key0 + _W0, key1 + _W1
+    return c0, c1, c2, c3
+
+
+@njit(error_model="numpy")
+def normals(seed, channel, stream, k):
+    """Two independent standard normal numbers from block k."""
+    a, b, _, _ = block(seed, channel, stream, k)
+    radius = math.sqrt(-2.0 * math.log(((a >> _SHIFT) + _ONE) * 2.0**-53))  # argument in (0, 1]
+    angle = 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
+    return radius * math.cos(angle), radius * math.sin(angle)

@@ -1,0 +1,170 @@
+"""The plain loop: mj_step with the law called as the Python function it is.
+
+It runs what does not compile, and it is the oracle that the tests hold the compiled callback against: same Scenario, same
+Trace, but written for reading, with numpy's own Philox and nothing of the harness. It takes tens of microseconds a step.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco import noise
+from smc_mujoco.callback import WORLD, installed
+from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
+from smc_mujoco.component import Component
+from smc_mujoco.estimators import Reading
+from smc_mujoco.law import Measurement
+from smc_mujoco import native
+from smc_mujoco.plant import Values, write
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.signals import Signal
+from smc_mujoco.trace import Trace, from_log
+
+
+LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {WORLD:g}, or NaN)"
+
+
+class Failure(Exception):
+    """Why a run ended early."""
+
+
+def run(scenario: Scenario) -> Trace:
+    """One run in the plain loop."""
+    loop = Loop(scenario)
+    total = scenario.samples * scenario.steps
+    with installed(loop.control):
+        for step in range(total + 1):
+            if step == scenario.jump_step:
+                loop.set_parameters(scenario.factors(step))
+            if step < total:
+                mujoco.mj_step(loop.model, loop.data)
+            else:
+                mujoco.mj_forward(loop.model, loop.data)
+            if loop.failure:
+                break
+    return from_log(scenario, loop.log, loop.failed_step, loop.failure)
+
+
+class Loop:
+    """One simulation and its controller; `control` is the control callback."""
+
+    def __init__(self, scenario: Scenario):
+        self.scenario, n = scenario, scenario.plant.n
+        self.model = scenario.plant.load(scenario.factors(0))
+        self.model.opt.timestep = scenario.physics_step
+        self.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
+        self.data = mujoco.MjData(self.model)
+        self.table = channels(self.model)
+        self.data.qpos[self.table[:, QPOS]] = scenario.x0
+        self.data.qvel[self.table[:, QVEL]] = scenario.v0
+        self.stages = 4 if scenario.integrator == "RK4" else 1
+        self.calls = 0
+        self.nominal = Values(**scenario.plant.parameters)
+        self.memory = [np.zeros(scenario.law.memory) for _ in range(n)]
+        self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
+        self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
+        self.commands: list[np.ndarray] = []
+        self.log = np.full((6, scenario.samples + 1, n), np.nan)
+        self.failure: str | None = None
+        self.failed_step = 0  # physics step
+
+    def set_parameters(self, factors: Mapping[str, float]) -> None:
+        plant = self.scenario.plant
+        write(self.model, plant.fields(self.model, plant.values(factors)))
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+
+    def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """The callback: at the first stage of a sample the law, at every stage the disturbance."""
+        if self.failure:
+            return
+        step, stage = divmod(self.calls, self.stages)
+        self.calls += 1
+        k, within = divmod(step, self.scenario.steps)
+        sampling = stage == 0 and within == 0
+        try:
+            if stage == 0:
+                x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
+                if not (np.all(np.abs(x) < WORLD) and np.all(np.abs(v) < WORLD)):
+                    raise Failure(LEFT_THE_WORLD)
+                if sampling:
+                    u, s = self.decide(*self.measure(data, k), k)
+                    self.commands.append(u)
+                past = step - round(self.scenario.input_delay / self.scenario.physics_step)
+                if past >= 0:
+                    data.ctrl[self.table[:, CTRL]] = self.commands[past // self.scenario.steps]
+            fraction = {0: 0.0, 1: 0.5, 2: 0.5, 3: 1.0}[stage]
+            d = self.disturbance((step + fraction) * self.scenario.physics_step)
+            data.xfrc_applied.ravel()[self.table[:, XFRC]] = self.table[:, SIGN] * d
+            if sampling:
+                self.log[:, k] = x, v, u, data.ctrl[self.table[:, CTRL]], s, d
+        except Failure as failure:
+            self.failure, self.failed_step = str(failure), step
+
+    def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Measured positions and estimated velocities, (n,) each."""
+        x, v = data.sensordata[self.table[:, X_SENSOR]], data.sensordata[self.table[:, V_SENSOR]]
+        sigma, estimator = self.scenario.noise, self.scenario.velocity
+        for i in range(len(x)):
+            if sigma.position or sigma.velocity:
+                z = normals(self.scenario.seed, i, noise.MEASUREMENT, k)
+                x[i], v[i] = x[i] + sigma.position * z[0], v[i] + sigma.velocity * z[1]
+            reading = Reading(self.scenario.control_period, x[i], v[i])
+            v[i] = guarded(estimator, i, reading, named(estimator), self.estimator_memory[i])
+        return x, v
+
+    def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Saturated commands and sliding variables, (n,) each."""
+        scenario, law = self.scenario, self.scenario.law
+        t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
+        r, dr, ddr = type(scenario.reference).value(t, scenario.reference)
+        for i in range(len(x)):
+            f, g = scenario.plant.nominal(x, v, i, self.nominal)
+            y = Measurement(t, scenario.control_period, x[i], v[i], x[i] - r, v[i] - dr, r, dr, ddr, f, g)
+            out = guarded(law, i, y, named(law), self.memory[i])
+            try:
+                u[i], s[i] = out
+            except (TypeError, ValueError):
+                raise Failure(f"law {law.name!r} returned {out!r} instead of the two numbers u, s") from None
+            if not (math.isfinite(u[i]) and math.isfinite(s[i])):
+                raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
+        return np.clip(u, -scenario.u_max, scenario.u_max), s
+
+    def disturbance(self, t: float) -> np.ndarray:
+        """The sum of the disturbances, (n,)."""
+        d = np.zeros(self.scenario.plant.n)
+        for signal, memory in zip(self.scenario.disturbance, self.signal_memory, strict=True):
+            d += [value(signal, t, memory[i], self.scenario.seed, i) for i in range(len(d))]
+        return d
+
+
+def value(signal: Signal, t: float, memory: np.ndarray, seed: int, channel: int) -> float:
+    """A disturbance at time t in one channel."""
+    function: Callable[..., Any] = type(signal).value
+    return function(t, signal, memory, seed, channel)[0] if signal.random else function(t, signal)[0]
+
+
+def named(component: Component) -> tuple:
+    """A component's gains as the record its function reads."""
+    return native.named(tuple(component.gains))(*(component.gains.values() or [0.0]))
+
+
+def guarded(component: Component, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:
+    """What a law or an estimator returns; its exception as a Failure that names it."""
+    function: Any = component.function
+    try:
+        return function(y, gains, memory)
+    except Exception as error:
+        what = f"{component.kind} {component.name!r} raised {type(error).__name__} ({error})"
+        raise Failure(f"{what} in channel {channel}") from error
+
+
+def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:
+    """What noise.normals gives, from numpy's own generator."""
+    before = (k - 1 + (stream << 64)) % 2**256
+    words = np.random.Philox(key=seed + (channel << 64), counter=before).random_raw(2)
+    radius = math.sqrt(-2.0 * math.log(((int(words[0]) >> 11) + 1) * 2.0**-53))
+    angle = 2.0 * math.pi * (int(words[1]) >> 11) * 2.0**-53
+    return radius * math.cos(angle), radius * math.sin(angle)

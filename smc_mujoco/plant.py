@@ -1,0 +1,154 @@
+"""A plant: a MuJoCo mechanism, its equation x'' = f(x, v) + g u, and the map between them.
+
+A plant file states the mechanism's parameters once, in three readings that tests hold together:
+the MJCF beside it (what MuJoCo simulates), `fields` (which model fields a parameter sets) and
+`nominal` (the f and g that a model-based law believes). A channel is one actuated degree of
+freedom: its actuator, its two sensors and its body are read off the compiled model.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple, Protocol
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.component import modules
+from smc_mujoco.errors import ScenarioError, number, unknown
+
+Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
+
+
+class Field(NamedTuple):
+    """One write into an MjModel: model.<name>[index] = value ('opt.gravity' for an option)."""
+
+    name: str
+    index: object
+    value: object
+
+
+class Nominal(Protocol):
+    """f and g of channel i from all channels' x and v, (n,) each; p: the nominal parameters."""
+
+    def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: NamedTuple, /) -> tuple[float, float]: ...
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Plant:
+    """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d).
+
+    Attributes:
+      name: as in `smc.plants()`.
+      parameters: name -> value, SI units; the nominal ones, which laws may know.
+      mass: which parameter the name `mass` stands for in a mismatch or a jump.
+      unit: unit of x, "rad" or "m".
+      x0: initial positions of the paper study, (n,), recycled when n is larger.
+      n: number of channels.
+      sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
+      build: n -> MjSpec of the ideal mechanism with the default parameters.
+      fields: (model, parameters) -> the model fields which the parameters set.
+      nominal: the plant's own f and g.
+      lane: offset in metres between machines that stand side by side in a film, (3,).
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    mass: str
+    unit: str
+    x0: tuple[float, ...]
+    n: int = 1
+    sizes: tuple[int, int] = (1, 1)
+    build: Callable[[int], mujoco.MjSpec]
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
+    nominal: Nominal
+    lane: tuple[float, float, float]
+
+    @property
+    def positive(self) -> frozenset[str]:
+        """Parameters without which there is no mechanism."""
+        return frozenset({self.mass, "l"})
+
+    def spec(self) -> mujoco.MjSpec:
+        """The mechanism as an editable MjSpec, with default parameters."""
+        return self.build(self.n)
+
+    def load(self, factors: Mapping[str, float] | None = None, nuserdata: int = 0) -> mujoco.MjModel:
+        """The compiled ideal plant.
+
+        Args:
+          factors: parameter name -> factor on its value (the true plant's mismatch).
+          nuserdata: length of mjData.userdata.
+        """
+        spec = self.spec()
+        spec.nuserdata = nuserdata
+        model = spec.compile()
+        write(model, self.fields(model, self.values(factors or {})))
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model
+
+    def values(self, factors: Mapping[str, float]) -> Values:
+        """The parameters, each times its factor; `mass` stands for the plant's mass."""
+        values = dict(self.parameters)
+        for key, factor in factors.items():
+            name = self.mass if key == "mass" else key
+            if name not in values:
+                raise unknown(f"parameter of {self.name}", key, [*values, "mass"])
+            if factor <= 0.0 and name in self.positive:
+                raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
+            values[name] *= factor
+        return Values(**values)
+
+
+def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
+    """Write fields into a model."""
+    for name, index, value in fields:
+        owner = model.opt if name.startswith("opt.") else model
+        getattr(owner, name.removeprefix("opt."))[index] = value
+
+
+def model_path(name: str) -> Path:
+    """The MJCF file models/<name>, from a checkout or from an installed wheel."""
+    here = Path(__file__).parent
+    for folder in (here.parent / "models", here / "models"):
+        if (folder / name).is_file():
+            return folder / name
+    raise ScenarioError(f"no model file {name!r} in {here.parent / 'models'}: reinstall smc-mujoco")
+
+
+@functools.cache
+def catalogue() -> dict[str, Plant]:
+    """Every plant found in smc_mujoco.plants, by name."""
+    found: list[Plant] = []
+    for module in modules("smc_mujoco.plants"):
+        found += [value for value in vars(module).values() if isinstance(value, Plant)]
+    return {p.name: p for p in sorted(found, key=lambda p: p.name)}
+
+
+def plant(name: str, **parameters: float) -> Plant:
+    """The plant `name`, with some of its parameters (or its size n) changed.
+
+    Raises:
+      ScenarioError: unknown name, or a parameter out of its range.
+    """
+    if name not in catalogue():
+        raise unknown("plant", name, catalogue())
+    base = catalogue()[name]
+    least, most = base.sizes
+    n = parameters.pop("n", base.n)
+    if n != int(n) or not least <= n <= most:
+        raise ScenarioError(f"{name} has n = {n} channels: give a whole number from {least} to {most}")
+    values = dict(base.parameters)
+    for key, value in parameters.items():
+        if key not in values:
+            raise unknown(f"parameter of {name}", key, [*values, "n"])
+        values[key] = number(f"{name}'s {key}", value, above=0.0 if key in base.positive else -np.inf)
+    x0 = tuple(base.x0[i % len(base.x0)] for i in range(int(n)))
+    return dataclasses.replace(base, parameters=values, n=int(n), x0=x0)
+
+
+def plants() -> list[str]:
+    """Names that `plant` knows."""
+    return list(catalogue())

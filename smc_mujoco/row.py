@@ -1,0 +1,110 @@
+"""One simulation's mjData.userdata: everything the callback needs besides the MuJoCo state, slices by name.
+
+    header | gains | nominal | estimator | reference | signals | reading | output | state | measured | memory ... | ring
+
+The header holds scalars: counts, addresses (exact in a float64, they are below 2^53) and offsets of the other slices. What is
+the same for every simulation of a layout - the channel table - and what is only written - the log - lie outside the row,
+by address. All of it is float64, so that a Batch copies it as state.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+
+# Header slots.
+(
+    IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
+    CHANNELS, TABLE, STEPS, STAGES, STEP, PERIOD,  # clock and channel table
+    DELAY, RING, RINGS, LIMIT, SEED, SIGMA_X, SIGMA_V,  # delay in steps, ring, its samples, u_max, noise
+    LAW, GAINS, ESTIMATOR, ESTIMATOR_GAINS, NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
+    SIGNALS, SIGNAL_COUNT, LOG, SAMPLES,
+    INPUT, OUTPUT, STATE, LAW_MEMORY, LAW_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
+    HEADER,
+) = range(37)  # fmt: skip
+
+# Of each disturbance: function, offset of its parameters, whether random, offset and stride of its memory.
+SIGNAL_FIELDS = 5
+
+# What FAILURE says.
+FINE, DIVERGED, RAISED, NOT_FINITE = range(4)
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Part:
+    """A compiled function's address, its parameters, and the floats of memory it keeps per channel."""
+
+    address: int
+    values: Sequence[float]
+    memory: int = 0
+    random: bool = False
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Contents:
+    """What one simulation's row says."""
+
+    law: Part
+    estimator: Part
+    nominal: Part
+    reference: Part
+    disturbances: Sequence[Part]
+    n: int
+    steps: int  # physics steps per control sample
+    stages: int  # callbacks per physics step
+    step: float  # s
+    delay: int  # physics steps
+    limit: float
+    seed: int
+    sigma_x: float
+    sigma_v: float
+
+
+def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """A fresh row.
+
+    Args:
+      c: its contents.
+      mark: what tells it from any other userdata, `callback.mark()`.
+      table: the channel table, (n, 7) int64, which must outlive the run.
+      log: (6, K + 1, n) float64 for x, v, u, applied, s, d, written at samples, which must outlive the run.
+    """
+    row = [0.0] * HEADER
+    n, rings = c.n, c.delay // c.steps + 1
+
+    def put(slot: int, values: Sequence[float]) -> None:
+        row[slot] = len(row)
+        row.extend(values)
+
+    def reserve(slot: int, size: int) -> None:
+        put(slot, [0.0] * size)
+
+    row[IS_ROW] = mark
+    row[CHANNELS], row[TABLE], row[STEPS], row[STAGES] = n, address(table), c.steps, c.stages
+    row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.step * c.steps, c.delay, rings
+    row[LIMIT], row[SEED], row[SIGMA_X], row[SIGMA_V] = c.limit, c.seed, c.sigma_x, c.sigma_v
+    row[LAW], row[ESTIMATOR], row[NOMINAL] = c.law.address, c.estimator.address, c.nominal.address
+    row[REFERENCE], row[SIGNAL_COUNT] = c.reference.address, len(c.disturbances)
+    row[LOG], row[SAMPLES] = address(log), log.shape[1]
+    row[LAW_STRIDE], row[ESTIMATOR_STRIDE] = c.law.memory, c.estimator.memory
+    put(GAINS, c.law.values)
+    put(ESTIMATOR_GAINS, c.estimator.values)
+    put(NOMINAL_VALUES, c.nominal.values)
+    put(REFERENCE_VALUES, c.reference.values)
+    reserve(SIGNALS, SIGNAL_FIELDS * len(c.disturbances))
+    reserve(INPUT, 16)
+    reserve(OUTPUT, 4)
+    reserve(STATE, 2 + 2 * n)  # the nominal model's input: i, n, measured x, estimated v
+    for i, d in enumerate(c.disturbances):
+        at = int(row[SIGNALS]) + SIGNAL_FIELDS * i
+        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.random, len(row) + len(d.values), d.memory]
+        row.extend([*d.values, *[0.0] * (d.memory * n)])
+    reserve(LAW_MEMORY, c.law.memory * n)
+    reserve(ESTIMATOR_MEMORY, c.estimator.memory * n)
+    reserve(RING, rings * n)
+    return np.array(row)
+
+
+def address(array: np.ndarray) -> int:
+    """Where a C-contiguous array's data lie."""
+    return array.ctypes.data

@@ -1,0 +1,253 @@
+"""Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
+
+A group shares the plant (but not its parameters), its size, the integrator, the physics step and the number of steps;
+laws, gains, signals, delays and seeds mix freely within it. What does not compile takes the plain loop. The results do not
+depend on the number of threads, on the grouping, or on what else runs.
+"""
+
+import contextlib
+import os
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from smc_mujoco import callback, native, plain, row
+from smc_mujoco.channels import QPOS, QVEL, channels
+from smc_mujoco.component import Component
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.signals import Signal
+from smc_mujoco.trace import Trace, from_log
+
+CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
+SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
+
+Report = Callable[[int], None]  # told the number of simulated steps just done
+
+
+class PlainLoopWarning(UserWarning):
+    """A law or signal does not compile and runs in the plain loop, some fifty times slower."""
+
+
+def run(
+    scenarios: Scenario | Sequence[Scenario], threads: int | None = None, progress: bool = False
+) -> Trace | list[Trace]:
+    """Run one scenario or many.
+
+    Args:
+      scenarios: a Scenario, or a sequence of them.
+      threads: how many simulations at once; None for one per available core.
+      progress: whether to show a progress bar.
+
+    Returns:
+      The Trace, or a list of them in the order of the scenarios. A run that fails - its law raises or returns NaN, or
+      the plant leaves the finite world - ends in a Trace whose `diverged_at` and `failure` say so; the others go on.
+
+    Raises:
+      ScenarioError: not a Scenario, or threads below 1.
+    """
+    one = isinstance(scenarios, Scenario)
+    many = [scenarios] if one else list(scenarios)
+    found: list[Trace | None] = [None] * len(many)
+    with _bar(many, progress) as report:
+        for index, trace in stream(many, threads, report):
+            found[index] = trace
+    traces = [trace for trace in found if trace is not None]
+    return traces[0] if one else traces
+
+
+def stream(
+    scenarios: Sequence[Scenario], threads: int | None = None, report: Report = lambda steps: None
+) -> Iterator[tuple[int, Trace]]:
+    """Pairs (index, Trace), each as soon as its chunk is done; at no time is more than one chunk held here."""
+    threads = _threads(threads)
+    groups: dict[tuple, list[int]] = {}
+    slow: list[int] = []
+    for index, scenario in enumerate(scenarios):
+        if not isinstance(scenario, Scenario):
+            raise ScenarioError(f"cannot run {scenario!r}: give a smc.Scenario")
+        if scenario.law.function is None:
+            raise ScenarioError(f"law {scenario.law.name!r} came from a file without its code: give the law itself")
+        try:
+            contents(scenario)
+            groups.setdefault(_layout(scenario), []).append(index)
+        except native.NotCompilable as error:
+            warnings.warn(f"{scenario.law.name}: {error}; it takes the plain loop", PlainLoopWarning, stacklevel=3)
+            slow.append(index)
+    for indices in groups.values():
+        size = _chunk_size(scenarios[indices[0]], threads)
+        for start in range(0, len(indices), size):
+            chunk = indices[start : start + size]
+            yield from zip(chunk, Chunk([scenarios[i] for i in chunk], threads).run(report), strict=True)
+    for index in slow:
+        yield index, plain.run(scenarios[index])
+        report(_steps(scenarios[index]))
+
+
+def contents(scenario: Scenario) -> row.Contents:
+    """What the scenario's row says, with everything it names compiled.
+
+    Raises:
+      NotCompilable: the law, the estimator, a signal or the plant's nominal model is not for numba.
+    """
+    nominal = scenario.plant.parameters
+    return row.Contents(
+        law=_component(scenario.law),
+        estimator=_component(scenario.velocity),
+        nominal=row.Part(
+            address=native.nominal(scenario.plant.nominal, tuple(nominal)).address, values=tuple(nominal.values())
+        ),
+        reference=_signal(scenario.reference),
+        disturbances=[_signal(d) for d in scenario.disturbance],
+        n=scenario.plant.n,
+        steps=scenario.steps,
+        stages=4 if scenario.integrator == "RK4" else 1,
+        step=scenario.physics_step,
+        delay=round(scenario.input_delay / scenario.physics_step),
+        limit=scenario.u_max,
+        seed=scenario.seed,
+        sigma_x=scenario.noise.position,
+        sigma_v=scenario.noise.velocity,
+    )
+
+
+class Chunk:
+    """Scenarios of one layout in one Batch."""
+
+    def __init__(self, scenarios: Sequence[Scenario], threads: int):
+        first = self.first = scenarios[0]
+        self.scenarios = scenarios
+        self.logs = [np.empty((6, first.samples + 1, first.plant.n)) for _ in scenarios]
+        self.table = np.empty((first.plant.n, 7), np.int64)
+        rows = [
+            row.pack(contents(scenario), callback.mark(), self.table, log)
+            for scenario, log in zip(scenarios, self.logs, strict=True)
+        ]
+        self.model = first.plant.load(nuserdata=max(map(len, rows)))
+        self.model.opt.timestep = first.physics_step
+        self.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
+        self.table[:] = channels(self.model)
+        self.batch = Batch(self.model, len(scenarios), min(threads, len(scenarios)))
+        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self.rows = self.batch.bind("userdata")
+        qpos, qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
+        for i, (scenario, packed) in enumerate(zip(scenarios, rows, strict=True)):
+            self.rows[i, : len(packed)] = packed
+            qpos[i, self.table[:, QPOS]] = scenario.x0
+            qvel[i, self.table[:, QVEL]] = scenario.v0
+        self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
+        self.errors: dict[int, str] = {}
+        self.set_parameters(0, range(len(scenarios)))
+
+    def run(self, report: Report) -> list[Trace]:
+        """Simulate all of them to the end."""
+        total = self.first.samples * self.first.steps
+        starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step < total})
+        with callback.installed():
+            for start, end in zip(starts, [*starts[1:], total], strict=True):
+                if start:
+                    self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
+                self.advance(end - start, report)
+            self.attempt(self.batch.forward)  # the callback's last sample, at the end
+        return [self.trace(i) for i in range(len(self.scenarios))]
+
+    def set_parameters(self, step: int, indices: Sequence[int]) -> None:
+        """Give simulations the true parameters that hold from a step on."""
+        derived = []
+        for i in indices:
+            plant = self.scenarios[i].plant
+            for name, index, value in plant.fields(self.model, plant.values(self.scenarios[i].factors(step))):
+                shared = self.model.opt.gravity if name == "opt.gravity" else getattr(self.model, name, None)
+                held = self.fields[name][i] if name in self.fields else shared
+                if not np.array_equal(held[index], value):
+                    self.fields[name] = self.batch.expand(name)
+                    self.fields[name][i][index] = value
+                    derived.append(i)
+        if derived:
+            self.batch.set_const(np.unique(derived).astype(np.int32))
+
+    def advance(self, steps: int, report: Report) -> None:
+        """Step the simulations that still run, in slices, so that progress shows and Ctrl-C is heard."""
+        size = len(self.scenarios) * self.first.plant.n
+        while steps:
+            count = min(steps, max(1, SLICE_STEPS // size))
+            self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count))
+            report(count * size)
+            steps -= count
+
+    def attempt(self, action: Callable[[np.ndarray], None]) -> None:
+        """Do something to the simulations that still run; note those in which MuJoCo raises."""
+        alive = np.flatnonzero(self.rows[:, row.FAILURE] == row.FINE).astype(np.int32)
+        try:
+            action(alive)
+        except SimulationError as error:
+            for i in error.ids:
+                self.errors[int(i)] = self.batch.error(int(i))
+                self.rows[i, row.FAILURE] = row.DIVERGED
+                self.rows[i, row.FAILED_STEP] = self.rows[i, row.CALLS] // self.rows[i, row.STAGES]
+
+    def trace(self, i: int) -> Trace:
+        """The Trace of simulation i."""
+        scenario, failure = self.scenarios[i], int(self.rows[i, row.FAILURE])
+        if failure in (row.RAISED, row.NOT_FINITE):
+            again = plain.run(scenario)  # Python knows what was raised, and where
+            if again.failure:
+                return again
+        reason = {
+            row.FINE: None,
+            row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
+            row.RAISED: f"law {scenario.law.name!r} raised an exception",
+            row.NOT_FINITE: f"law {scenario.law.name!r} returned NaN or inf",
+        }[failure]
+        return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
+
+
+def _component(c: Component) -> row.Part:
+    return row.Part(address=native.component(c).address, values=tuple(c.gains.values()), memory=c.memory)
+
+
+def _signal(s: Signal) -> row.Part:
+    values = s.parameters()
+    function = native.signal(type(s), tuple(values))
+    return row.Part(address=function.address, values=tuple(values.values()), memory=s.memory, random=s.random)
+
+
+def _layout(s: Scenario) -> tuple:
+    """What the simulations of a Batch must have in common."""
+    return s.plant.name, s.plant.n, s.integrator, s.physics_step, s.control_period, s.samples
+
+
+def _chunk_size(scenario: Scenario, threads: int) -> int:
+    """How many such runs one Batch holds: as many as CHUNK_BYTES allow, at least one a thread."""
+    samples, rings = scenario.samples + 1, scenario.input_delay / scenario.control_period
+    return max(threads, int(CHUNK_BYTES // (8 * scenario.plant.n * (6 * samples + rings + 100))))
+
+
+def _steps(scenario: Scenario) -> int:
+    return scenario.samples * scenario.steps * scenario.plant.n
+
+
+def _threads(threads: int | None) -> int:
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise ScenarioError(f"threads is {threads!r}: give a whole number of at least 1, or None for every core")
+    return threads
+
+
+@contextlib.contextmanager
+def _bar(scenarios: Sequence[Scenario], progress: bool) -> Iterator[Report]:
+    """A progress bar over simulated steps, or nothing."""
+    if not progress:
+        yield lambda steps: None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    total = sum(_steps(s) for s in scenarios if isinstance(s, Scenario))
+    with Progress(*columns, transient=True) as bar:
+        task = bar.add_task(f"{len(scenarios)} runs", total=total)
+        yield lambda steps: bar.advance(task, steps)

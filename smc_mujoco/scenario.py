@@ -1,0 +1,215 @@
+"""A scenario: everything that defines a run, as plain data, checked when it is made.
+
+What the true mechanism is (`plant`, `mismatch`, `jump`) and what the law may believe (the plant's nominal parameters) are
+kept apart. Two scenarios that are equal give the same trace to the last bit.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+
+from smc_mujoco.component import Component, Template
+from smc_mujoco.errors import ScenarioError, number, unknown
+from smc_mujoco.estimators import Estimator, estimator
+from smc_mujoco.law import Law, law
+from smc_mujoco.plant import Plant, plant
+from smc_mujoco.signals import Constant, Signal
+
+INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
+LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
+MOST_STEPS = 100_000_000  # per run: minutes of computing
+MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+FAR = 1e6  # initial states beyond this have already diverged
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """Zero-mean Gaussian measurement noise: standard deviations of position and velocity, in their SI units."""
+
+    position: float = 0.0
+    velocity: float = 0.0
+
+    def __post_init__(self):
+        number("Noise's position", self.position, least=0.0)
+        number("Noise's velocity", self.velocity, least=0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Jump:
+    """The plant's parameters multiplied by `factors` (parameter name -> factor) from `time` on, s."""
+
+    time: float
+    factors: Mapping[str, float]
+
+    def __post_init__(self):
+        number("Jump's time", self.time, least=0.0)
+        object.__setattr__(self, "factors", _factors("Jump", self.factors))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Everything that defines a run. SI units; angles in radians.
+
+    Attributes:
+      plant: a Plant or the name of one.
+      law: a Law (`smc.law(name, **gains)` or your own), or the name of one.
+      duration: s. The run lasts the whole control periods that fit into it.
+      control_period: s; the law runs this often and its command is held in between.
+      physics_step: s; must divide the control period. Default: the largest such step up to 1 ms.
+      u_max: bound on the command, N or N m; may be infinite.
+      x0, v0: initial state, one number or n of them. Default: the plant's x0, and 0.
+      reference: r(t), the same for every channel.
+      disturbance: d(t), one signal or several to be added, or None.
+      noise: measurement noise, or None.
+      input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
+      velocity: the velocity the law sees: an Estimator or the name of one.
+      mismatch: parameter name -> factor on the true plant's parameter. `mass` is the plant's mass.
+      jump: a change of the true plant's parameters in mid-run, or None.
+      seed: of every random number of the run, 0 .. 2^53 - 1.
+      integrator: RK4, Euler, implicitfast or implicit.
+
+    Raises:
+      ScenarioError: for anything out of its range, in one sentence.
+    """
+
+    plant: Plant
+    law: Law
+    duration: float = 10.0
+    control_period: float = 1e-3
+    physics_step: float = None  # pyright: ignore[reportAssignmentType]  # filled in
+    u_max: float = 6.0
+    x0: tuple[float, ...] = None  # pyright: ignore[reportAssignmentType]  # filled in
+    v0: tuple[float, ...] = None  # pyright: ignore[reportAssignmentType]  # filled in
+    reference: Signal = Constant(0.0)
+    disturbance: tuple[Signal, ...] = ()
+    noise: Noise = Noise()
+    input_delay: float = 0.0
+    velocity: Estimator = "measured"  # pyright: ignore[reportAssignmentType]  # made an Estimator
+    mismatch: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    jump: Jump | None = None
+    seed: int = 0
+    integrator: str = "RK4"
+
+    def __post_init__(self):
+        def put(name: str, value: object) -> None:
+            object.__setattr__(self, name, value)
+
+        put("plant", plant(self.plant) if isinstance(self.plant, str) else self.plant)
+        if not isinstance(self.plant, Plant):
+            raise ScenarioError(f"plant is {self.plant!r}: give smc.plant(...) or one of the names smc.plants() lists")
+        put("law", _component(self.law, "law", law))
+        put("velocity", _component(self.velocity, "estimator", estimator))
+        for name in ("duration", "control_period"):
+            put(name, number(name, getattr(self, name), above=0.0))
+        put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
+        put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
+        put("physics_step", _physics_step(self.physics_step, self.control_period))
+        put("x0", _state("x0", self.plant.x0 if self.x0 is None else self.x0, self.plant.n))
+        put("v0", _state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
+        put("reference", _signals("reference", self.reference)[0])
+        put("disturbance", _signals("disturbance", self.disturbance))
+        put("noise", Noise() if self.noise is None else self.noise)
+        if not isinstance(self.noise, Noise):
+            raise ScenarioError(f"noise is {self.noise!r}: give smc.Noise(position=..., velocity=...) or None")
+        put("mismatch", _factors("mismatch", self.mismatch))
+        if not isinstance(self.jump, Jump | None):
+            raise ScenarioError(f"jump is {self.jump!r}: give smc.Jump(time=..., factors=...) or None")
+        if self.integrator not in INTEGRATORS:
+            raise unknown("integrator", self.integrator, INTEGRATORS)
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**53:
+            raise ScenarioError(f"seed is {self.seed!r}: give a whole number from 0 to 2^53 - 1")
+        self._check()
+
+    def _check(self) -> None:
+        """What several fields must satisfy together."""
+        delay = self.input_delay / self.physics_step
+        if abs(delay - round(delay)) > 1e-6:
+            raise ScenarioError(
+                f"input_delay {self.input_delay:g} s is no whole number of physics steps of {self.physics_step:g} s: "
+                "give a physics_step that divides it"
+            )
+        if self.samples < 1:
+            raise ScenarioError(
+                f"duration {self.duration:g} s is shorter than one control period of {self.control_period:g} s"
+            )
+        if self.samples * self.steps > MOST_STEPS or (self.samples + 1) * self.plant.n > MOST_VALUES:
+            raise ScenarioError(
+                f"duration {self.duration:g} s is {self.samples:.3g} control samples of {self.plant.n} channels and "
+                f"{self.samples * self.steps:.3g} physics steps: give a shorter duration or longer periods "
+                f"(at most {MOST_VALUES:.0e} values and {MOST_STEPS:.0e} steps)"
+            )
+        if self.reference.random:
+            raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
+        if self.jump is not None and self.jump.time >= self.duration:
+            raise ScenarioError(f"jump at {self.jump.time:g} s comes after the end of the run at {self.duration:g} s")
+        for factors in (self.mismatch, self.jump.factors if self.jump else {}):
+            self.plant.values(factors)
+
+    @property
+    def steps(self) -> int:
+        """Physics steps per control period."""
+        return round(self.control_period / self.physics_step)
+
+    @property
+    def samples(self) -> int:
+        """K, the number of control periods; a trace has K + 1 samples."""
+        return math.floor(self.duration / self.control_period + 1e-6)
+
+    @property
+    def jump_step(self) -> int:
+        """The physics step from which the jump holds; -1 without one."""
+        return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)
+
+    def factors(self, step: int) -> dict[str, float]:
+        """The true plant's parameter factors at a physics step: mismatch, and from its time on the jump."""
+        factors = dict(self.mismatch)
+        if self.jump is not None and step >= self.jump_step:
+            for name, factor in self.jump.factors.items():
+                factors[name] = factors.get(name, 1.0) * factor
+        return factors
+
+
+def _component(value: object, kind: str, find) -> Component:
+    if isinstance(value, str):
+        return find(value)
+    if isinstance(value, Template):
+        value = value()
+    if isinstance(value, Component) and value.kind == kind:
+        return value
+    field = {"law": "law", "estimator": "velocity"}[kind]
+    raise ScenarioError(f"{field} is {value!r}: give smc.{kind}(...), one of your own, or a name")
+
+
+def _physics_step(step: object, period: float) -> float:
+    if step is None:
+        return period / math.ceil(period / LARGEST_STEP - 1e-9)
+    h = number("physics_step", step, above=0.0)
+    count = period / h
+    if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
+        raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
+    return period / round(count)
+
+
+def _state(name: str, value: object, n: int) -> tuple[float, ...]:
+    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
+    if len(items) == 1:
+        items *= n
+    if len(items) != n:
+        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
+    return tuple(number(name, item, least=-FAR, most=FAR) for item in items)
+
+
+def _signals(name: str, value: object) -> tuple[Signal, ...]:
+    items = () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
+    for item in items:
+        if not isinstance(item, Signal):
+            raise ScenarioError(f"{name} is {item!r}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
+    if name == "reference" and len(items) != 1:
+        raise ScenarioError(f"reference is {value!r}: give one signal, such as smc.Constant(0.0)")
+    return items
+
+
+def _factors(name: str, value: object) -> Mapping[str, float]:
+    if not isinstance(value, Mapping):
+        raise ScenarioError(f"{name} is {value!r}: give parameter names with their factors, such as {{'M': 1.3}}")
+    return {str(key): number(f"{name} of {key}", factor) for key, factor in value.items()}

@@ -1,0 +1,146 @@
+"""A trace: what one run did at its control samples, with the scenario that made it."""
+
+import dataclasses
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco import record
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.scenario import Scenario
+
+LOGGED = ("x", "v", "u", "applied", "s", "d")  # what the callback writes, in its order
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """One run at control samples t_k = k * control_period, k = 0 .. K. The arrays are read-only; NaN from a failure on.
+
+    Attributes:
+      t: times, (K + 1,), s.
+      x, v: true positions and velocities, (K + 1, n), the plant's unit and per second.
+      u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m.
+      applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
+      s: sliding variable as the law returns it, (K + 1, n).
+      d: disturbance, (K + 1, n), N or N m.
+      r: reference, (K + 1, n).
+      scenario: the Scenario of the run.
+      diverged_at: time in s at which the run failed, or None.
+      failure: what happened then, in a sentence, or None.
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    u: np.ndarray
+    applied: np.ndarray
+    s: np.ndarray
+    d: np.ndarray
+    r: np.ndarray
+    scenario: Scenario
+    diverged_at: float | None = None
+    failure: str | None = None
+
+    def __post_init__(self):
+        for name in ARRAYS:
+            getattr(self, name).flags.writeable = False
+
+    def __repr__(self) -> str:
+        end = "" if self.diverged_at is None else f", {self.failure}"
+        return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write the trace to a .npz file; `smc.load` reads it back. An existing file is replaced whole or not at all."""
+        path = _suffixed(path, ".npz")
+        about = json.dumps(
+            record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure}
+        )
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        _write(path, lambda file: np.savez_compressed(file, about=np.array(about), **arrays))
+        return path
+
+    def export(self, path: str | os.PathLike) -> Path:
+        """Write the columns t, x0, x1, ..., v0, ... to a .csv file, or the arrays to a .mat file (MATLAB 5).
+
+        Raises:
+          ScenarioError: another ending.
+        """
+        path = Path(path)
+        if path.suffix == ".csv":
+            columns = {"t": self.t} | {
+                f"{name}{i}" if self.x.shape[1] > 1 else name: getattr(self, name)[:, i]
+                for name in ARRAYS[1:]
+                for i in range(self.x.shape[1])
+            }
+            table, header = np.column_stack(list(columns.values())), ",".join(columns)
+            _write(path, lambda file: np.savetxt(file, table, "%.17g", ",", header=header, comments=""))
+        elif path.suffix == ".mat":
+            from scipy.io import savemat
+
+            arrays = {name: getattr(self, name) for name in ARRAYS}
+            about = json.dumps(record.describe(self.scenario))
+            _write(path, lambda file: savemat(file, arrays | {"scenario": about}))
+        else:
+            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv or .mat")
+        return path
+
+
+def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
+    """The Trace of a log (6, K + 1, n) of x, v, u, applied, s, d; `failed_step` is the physics step of a failure."""
+    t = np.arange(scenario.samples + 1) * scenario.control_period
+    r = np.repeat(scenario.reference(t)[:, None], scenario.plant.n, axis=1)
+    diverged_at = None
+    if failure is not None:
+        log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
+        diverged_at = failed_step * scenario.physics_step
+        failure = f"{failure}, at t = {diverged_at:.6g} s"
+    arrays = dict(zip(LOGGED, log, strict=True))
+    return Trace(**arrays, t=t, r=r, scenario=scenario, diverged_at=diverged_at, failure=failure)
+
+
+def load(path: str | os.PathLike) -> Trace:
+    """The trace that `Trace.save` wrote.
+
+    Raises:
+      ScenarioError: no such file, or not a trace.
+    """
+    path = Path(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            about = json.loads(str(file["about"]))
+            arrays = {name: file[name] for name in ARRAYS}
+    except FileNotFoundError:
+        raise ScenarioError(f"no trace at {path}: give the path of a .npz file that a run wrote") from None
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise ScenarioError(f"{path} is no trace of smc_mujoco ({error}): give a .npz file that a run wrote") from None
+    end = {key: about.pop(key) for key in ("diverged_at", "failure")}
+    return Trace(**arrays, scenario=record.restore(about), **end)
+
+
+def _suffixed(path: str | os.PathLike, suffix: str) -> Path:
+    path = Path(path)
+    if path.suffix not in ("", suffix):
+        raise ScenarioError(f"cannot save to {path.name!r}: end the name in {suffix}")
+    return path.with_suffix(suffix)
+
+
+def _write(path: Path, write: Callable) -> None:
+    """Write to a neighbour of `path` and move it into place, so that a full disk or a kill leaves no half file."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.stem}.", delete=False) as file:
+            try:
+                write(file)
+            except BaseException:
+                os.unlink(file.name)
+                raise
+        os.chmod(file.name, 0o644)
+        os.replace(file.name, path)
+    except OSError as error:
+        raise ScenarioError(f"cannot write {path}: {error.strerror}; choose another folder or make room") from error

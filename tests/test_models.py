@@ -1,0 +1,212 @@
+"""Each model is its equation, and nothing else: checked against `nominal` at random states, for every plant."""
+
+from collections import namedtuple
+
+import mujoco
+import numba
+import numpy as np
+import pytest
+
+from smc_mujoco.plant import catalogue, model_path, plant, write
+
+NAMES = sorted(catalogue())
+SIZED = [(name, n) for name in NAMES for n in ([1] if catalogue()[name].n == 1 else [2, 3, 5, 40, 100])]
+CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
+PLANTS = pytest.mark.parametrize("name", NAMES)
+
+
+def sized(name, n):
+    return plant(name, n=n) if n > 1 else plant(name)
+
+
+def changed(name, n, rng):
+    """The plant with every parameter moved by up to 40%."""
+    base = sized(name, n)
+    return plant(name, n=n, **{key: value * rng.uniform(0.6, 1.4) for key, value in base.parameters.items()})
+
+
+def expected(p, x, v, u):
+    """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
+    values = p.values({})
+    terms = [p.nominal(x, v, i, values) for i in range(p.n)]
+    acc = np.array([f + g * u[i] for i, (f, g) in enumerate(terms)])
+    size = max(max(abs(f), abs(g * u[i])) for i, (f, g) in enumerate(terms))
+    return acc, size
+
+
+def acceleration(model, data, x, v, u):
+    data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
+    mujoco.mj_forward(model, data)
+    return data.qacc.copy()
+
+
+def worst_error(p, model, rng, trials=20):
+    """The largest |qacc - (f + g u)| over random states, relative to the largest term."""
+    data = mujoco.MjData(model)
+    worst = 0.0
+    for _ in range(trials):
+        x, v, u = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n), rng.uniform(-6, 6, p.n)
+        acc, size = expected(p, x, v, u)
+        worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
+    return worst
+
+
+@PLANTS
+def test_nominal_compiles_to_the_same_numbers(name):
+    p = catalogue()[name]
+    parameters = namedtuple("Parameters", p.parameters)(**p.parameters)
+    compiled = numba.njit(p.nominal)
+    rng = np.random.default_rng(0)
+    x, v = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n)
+    for i in range(p.n):
+        np.testing.assert_allclose(compiled(x, v, i, parameters), p.nominal(x, v, i, parameters), rtol=1e-14)
+
+
+@CASES
+def test_the_model_obeys_its_equation(name, n):
+    rng = np.random.default_rng(1)
+    p = sized(name, n)
+    assert worst_error(p, p.load(), rng) < 1e-9
+
+
+@CASES
+def test_the_model_obeys_its_equation_with_changed_parameters(name, n):
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        p = changed(name, n, rng)
+        assert worst_error(p, p.load(), rng) < 1e-9
+
+
+@CASES
+def test_fields_alone_carry_a_parameter_change(name, n):
+    """A jump writes fields into a running simulation: nothing else may need refreshing."""
+    rng = np.random.default_rng(3)
+    base, p = sized(name, n), changed(name, n, rng)
+    model = base.load()
+    write(model, p.fields(model, p.values({})))
+    assert worst_error(p, model, rng) < 1e-9
+
+
+@CASES
+def test_every_parameter_is_felt_by_the_model(name, n):
+    """Without this, a parameter missing from `fields` and from `nominal` alike would pass."""
+    rng = np.random.default_rng(4)
+    p = sized(name, n)
+    x, v, u = rng.uniform(1.1, 2, n), rng.uniform(1, 3, n), rng.uniform(1, 6, n)
+    before = p.load()
+    for key in p.parameters:
+        after = p.load({key: 1.25})
+        a, b = (acceleration(m, mujoco.MjData(m), x, v, u) for m in (before, after))
+        assert np.all(np.abs(a - b) > 1e-6), key
+
+
+@CASES
+def test_default_fields_change_nothing_of_the_compiled_file(name, n):
+    p = sized(name, n)
+    model = p.spec().compile()
+    for field, index, value in p.fields(model, p.values({})):
+        owner = model.opt if field.startswith("opt.") else model
+        before = np.array(getattr(owner, field.removeprefix("opt."))[index])
+        np.testing.assert_allclose(before, np.broadcast_to(value, before.shape), rtol=1e-15, err_msg=field)
+
+
+@CASES
+def test_nothing_moves_but_the_equation(name, n):
+    p = sized(name, n)
+    model = p.load()
+    assert model.nv == model.nq == model.nu == n
+    assert not model.dof_armature.any()
+    assert not model.dof_frictionloss.any()
+    assert not model.tendon_frictionloss.any()
+    assert not model.tendon_armature.any()
+    assert not model.jnt_limited.any()
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    assert model.opt.timestep == 1e-3
+    assert not model.actuator_ctrllimited.any()
+    assert np.all(model.actuator_gear[:, 0] == 1.0)
+
+
+@CASES
+def test_all_mass_sits_at_the_points_of_the_equation(name, n):
+    p = sized(name, n)
+    model = p.load()
+    moving = model.dof_bodyid
+    assert np.all(model.body_mass[moving] == p.parameters[p.mass])
+    assert model.body_mass.sum() == pytest.approx(n * p.parameters[p.mass], rel=1e-15)
+    inertia = 1.0 / p.nominal(np.zeros(n), np.zeros(n), 0, p.values({}))[1]
+    assert model.body_inertia[moving].max() < 1e-9 * inertia
+
+
+@CASES
+def test_everything_the_contract_names_is_there(name, n):
+    p = sized(name, n)
+    model = p.load()
+    prefixes = [""] if n == 1 else [f"p{i}/" for i in range(n)]
+    for i, prefix in enumerate(prefixes):
+        assert model.actuator(i).name == f"{prefix}u"
+        assert model.sensor(2 * i).name == f"{prefix}x"
+        assert model.sensor(2 * i + 1).name == f"{prefix}v"
+    body, joint = ("pendulum", "hinge") if p.unit == "rad" else ("cart", "slide")
+    for prefix in prefixes:
+        model.body(prefix + body), model.joint(prefix + joint)
+    model.body("machine"), model.camera("look"), model.material("accent"), model.material("floor")
+    kinds = {
+        "geom": model.ngeom,
+        "body": model.nbody,
+        "site": model.nsite,
+        "tendon": model.ntendon,
+        "light": model.nlight,
+    }
+    for kind, count in kinds.items():
+        assert all(getattr(model, kind)(i).name for i in range(count)), kind
+    np.testing.assert_array_equal(model.key("home").qpos, p.x0)
+    assert model.nkey == 1
+
+
+@PLANTS
+def test_machines_attach_side_by_side_with_their_own_accent(name):
+    p = catalogue()[name]
+    scene = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
+    scene.copy_during_attach = True
+    scene.option = p.spec().option
+    for i, law in enumerate(("a", "b", "c")):
+        frame = scene.worldbody.add_frame(pos=np.multiply(i, p.lane))
+        frame.attach_body(p.spec().body("machine"), f"{law}/", "")
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    assert model.nq == 3 * p.n
+    data.qpos[:] = np.tile(p.x0, 3)
+    mujoco.mj_forward(model, data)
+    used = {model.mat(i).name for i in model.geom_matid if i >= 0}
+    assert {"a/accent", "b/accent", "c/accent"} <= used
+    left, right = data.body("a/machine").xpos, data.body("b/machine").xpos
+    np.testing.assert_allclose(right - left, p.lane)
+
+
+def energy_drift(p, h, seconds=2.0):
+    """Largest change of the energy of the undamped, unforced plant, J."""
+    model = p.load()
+    model.opt.timestep = h
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    start, drift = data.energy.sum(), 0.0
+    for _ in range(round(seconds / h)):
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        drift = max(drift, abs(data.energy.sum() - start))
+    return drift
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if "pendulum" in n or n == "duffing"])
+def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
+    damping = {"delta": 0.0} if name == "duffing" else {"b": 0.0}
+    p = plant(name, **damping)
+    coarse, fine = energy_drift(p, 0.02), energy_drift(p, 0.01)
+    assert coarse < 1e-2
+    assert coarse / fine >= 16
