@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 from smc_mujoco import gl
 
 if TYPE_CHECKING:
+    from smc_mujoco import paper as paper
+    from smc_mujoco.cli import play as play
     from smc_mujoco.errors import ScenarioError as ScenarioError
     from smc_mujoco.estimators import estimator as estimator, estimator_function as estimator_function, estimators as estimators
     from smc_mujoco.law import Law as Law, law as law, law_function as law_function, laws as laws
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from smc_mujoco.plant import Plant as Plant, plant as plant, plants as plants
     from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning, run as run, stream as stream
     from smc_mujoco.scenario import Jump as Jump, Noise as Noise, Scenario as Scenario
+    from smc_mujoco.scene import Scene as Scene
     from smc_mujoco.signals import (
         Constant as Constant,
         OrnsteinUhlenbeck as OrnsteinUhlenbeck,
@@ -40,8 +43,11 @@ _HOMES = {
     "law": ("Law", "law", "law_function", "laws"),
     "metrics": ("score",),
     "plant": ("Plant", "plant", "plants"),
+    "cli": ("play",),
+    "paper": ("paper",),
     "run": ("PlainLoopWarning", "run", "stream"),
     "scenario": ("Jump", "Noise", "Scenario"),
+    "scene": ("Scene",),
     "signals": ("Constant", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
     "trace": ("Trace", "load"),
 }
@@ -65,7 +71,8 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    module = importlib.import_module(f"{__name__}.{_HOME[name]}")
+    value = module if name == _HOME[name] == "paper" else getattr(module, name)
     globals()[name] = value
     return value
 

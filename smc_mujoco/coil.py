@@ -1,6 +1,5 @@
-"""A drawn spring: a helix of wire whose two ends follow two bodies. Looks only: it has no mass and exerts no force."""
+"""A drawn spring: a helix of wire whose ends follow two bodies. Looks only: no mass, no force."""
 
-import mujoco
 import numpy as np
 
 SIDES = 6  # of the wire's cross-section
@@ -11,8 +10,8 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     """Add the skin `name` to spec.
 
     Args:
-      start, end: (body, where the body is, where the wire ends), metres in the world with every joint at 0; between
-        them a point at s in [0, 1] follows the bodies by 1 - s and s, so that the coil stretches and twists evenly.
+      start, end: (body, where the body is, where the wire ends), metres in the world with every joint at 0.
+        A point at s in [0, 1] between them follows the bodies by 1 - s and s: the coil stretches evenly.
       radius, wire: radii of the coil and of its wire, m.
       turns: whole turns of the coil.
       material: its material's name.

@@ -1,8 +1,8 @@
-"""A chain of pendulums on one shaft: one pendulum's body attached n times, neighbours joined by torsion springs.
+"""A chain of pendulums on one shaft: one body attached n times, neighbours joined by torsion springs.
 
-Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs are fixed tendons
-of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the shaft that carries the
-pendulums transmits nothing.
+Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs are fixed
+tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the shaft that
+carries the pendulums transmits nothing.
 """
 
 import mujoco
@@ -10,7 +10,7 @@ import mujoco
 from smc_mujoco import coil
 from smc_mujoco.plant import Field, model_path
 
-PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.12 m pass freely
+PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass freely
 HEIGHT = 0.8  # m, the shaft above the floor: as the single pendulum's
 HUB = 0.02  # m, half a hub: where a spring's wire ends
 KC = 0.5  # N m/rad: chosen for the paper study
@@ -45,9 +45,9 @@ def compose(single, n, x0):
 
 
 def strip(unit, pendulum):
-    """Leave only the pendulum in `unit`; geom name -> the material it had. The chain's own theme dresses it again.
+    """Leave only the pendulum in `unit`; geom name -> the material it had, for the chain's own theme to give.
 
-    An attached body brings its file's assets and keyframes along: a thousand copies would carry a thousand floors.
+    An attached body brings its file's assets and keyframes: a thousand copies would carry a thousand floors.
     """
     material = {geom.name: geom.material for geom in pendulum.geoms}
     for geom in pendulum.geoms:
@@ -72,9 +72,7 @@ def stand(spec, n):
         pos=(0.62 * away, shown / 2 - 0.74 * away, 0.62 + 0.26 * away),
         xyaxes=(0.767, 0.642, 0.0, -0.167, 0.199, 0.966),
     )
-    rods = {
-        "shaft": ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT), 0.008, "steel"),
-    }
+    rods = {"shaft": ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT), 0.008, "steel")}
     for end, y in (("front", -PITCH), ("back", length + PITCH)):
         rods |= {
             f"{end}_foot": ((0.0, y, 0.0), (0.0, y, 0.028), 0.15, "graphite"),

@@ -109,13 +109,18 @@ def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
         getattr(owner, name.removeprefix("opt."))[index] = value
 
 
-def model_path(name: str) -> Path:
-    """The MJCF file models/<name>, from a checkout or from an installed wheel."""
+def shipped(folder: str) -> Path:
+    """The folder models/ or scenes/, from a checkout or from an installed wheel."""
     here = Path(__file__).parent
-    for folder in (here.parent / "models", here / "models"):
-        if (folder / name).is_file():
-            return folder / name
-    raise ScenarioError(f"no model file {name!r} in {here.parent / 'models'}: reinstall smc-mujoco")
+    for place in (here / folder, here.parent / folder):
+        if place.is_dir():
+            return place
+    raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
+
+
+def model_path(name: str) -> Path:
+    """The MJCF file models/<name>."""
+    return shipped("models") / name
 
 
 @functools.cache

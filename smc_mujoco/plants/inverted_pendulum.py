@@ -1,7 +1,7 @@
 """Inverted pendulum: m l^2 x'' = m grav l sin x - b x' + u + d, x the angle from upright.
 
-A point mass on a massless rod, driven at the pivot. The textbook system (Khalil, Nonlinear Systems, 2002, 1.2.1),
-upside down. Numbers: chosen for the paper study.
+A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear Systems, 2002,
+section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
 """
 
 from math import sin

@@ -1,0 +1,16 @@
+"""How does the observer-free law stop the Van der Pol oscillator when nothing disturbs it?
+
+The paper's figure 5. The reference for vdp_noise and vdp_disturbance The rivals run beside it under the same condition.
+
+Look for:  the paper reports smooth and fast convergence without chattering.:a u without corners, and how much later x arrives than the clock at which u leaves its bound.
+"""
+
+import smc_mujoco as smc
+
+scene = smc.Scene(
+    title="Van der Pol, nominal",
+    conditions={"nominal": smc.paper.comparison("van_der_pol", "nominal")},
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
