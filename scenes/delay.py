@@ -10,9 +10,7 @@ import smc_mujoco as smc
 
 scene = smc.Scene(
     title="Inverted pendulum with input delay",
-    conditions={
-        f"{ms} ms": smc.paper.comparison("inverted_pendulum", f"delay_{ms}ms") for ms in (5, 10, 20, 50)
-    },
+    conditions={f"{ms} ms": smc.paper.comparison("inverted_pendulum", f"delay_{ms}ms") for ms in (5, 10, 20, 50)},
     film="20 ms",
 )
 

@@ -1,6 +1,7 @@
 """Does the disturbance 0.2 sin(5t) matter to the observer-free law?
 
-The paper's figure 7. The paper reports a trajectory nearly identical to the nominal one and strong rejection. The rivals run beside it under the same condition.
+The paper's figure 7. The paper reports a trajectory nearly identical to the nominal one and strong rejection. The
+rivals run beside it under the same condition.
 
 Look for: the residual oscillation of x beside those of the switching laws, which have the same bound on u.
 """

@@ -1,6 +1,7 @@
 """Does Gaussian noise on both sensors matter to the observer-free law?
 
-The paper's figure 6. Standard deviations 0.01 m and 0.05 m/s. The paper reports that the system remains stable with small fluctuations. The rivals run beside it under the same condition.
+The paper's figure 6. Standard deviations 0.01 m and 0.05 m/s. The paper reports that the system remains stable with
+small fluctuations. The rivals run beside it under the same condition.
 
 Look for: the fluctuation of x is small; that of u is lam times the noise in s, and no small one.
 """

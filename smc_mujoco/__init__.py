@@ -20,22 +20,44 @@ if TYPE_CHECKING:
     from smc_mujoco import paper as paper
     from smc_mujoco.cli import play as play
     from smc_mujoco.errors import ScenarioError as ScenarioError
-    from smc_mujoco.estimators import estimator as estimator, estimator_function as estimator_function, estimators as estimators
-    from smc_mujoco.law import Law as Law, law as law, law_function as law_function, laws as laws
+    from smc_mujoco.estimators import estimator as estimator
+    from smc_mujoco.estimators import estimator_function as estimator_function
+    from smc_mujoco.estimators import estimators as estimators
+    from smc_mujoco.law import Law as Law
+    from smc_mujoco.law import law as law
+    from smc_mujoco.law import law_function as law_function
+    from smc_mujoco.law import laws as laws
     from smc_mujoco.metrics import score as score
-    from smc_mujoco.plant import Plant as Plant, plant as plant, plants as plants
-    from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning, run as run, stream as stream
-    from smc_mujoco.scenario import Jump as Jump, Noise as Noise, Scenario as Scenario
+    from smc_mujoco.plant import Plant as Plant
+    from smc_mujoco.plant import plant as plant
+    from smc_mujoco.plant import plants as plants
+    from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning
+    from smc_mujoco.run import run as run
+    from smc_mujoco.run import stream as stream
+    from smc_mujoco.scenario import Jump as Jump
+    from smc_mujoco.scenario import Noise as Noise
+    from smc_mujoco.scenario import Scenario as Scenario
     from smc_mujoco.scene import Scene as Scene
     from smc_mujoco.signals import (
         Constant as Constant,
+    )
+    from smc_mujoco.signals import (
         OrnsteinUhlenbeck as OrnsteinUhlenbeck,
+    )
+    from smc_mujoco.signals import (
         Pulse as Pulse,
+    )
+    from smc_mujoco.signals import (
         Signal as Signal,
+    )
+    from smc_mujoco.signals import (
         Sine as Sine,
+    )
+    from smc_mujoco.signals import (
         Step as Step,
     )
-    from smc_mujoco.trace import Trace as Trace, load as load
+    from smc_mujoco.trace import Trace as Trace
+    from smc_mujoco.trace import load as load
 
 _HOMES = {
     "errors": ("ScenarioError",),
@@ -52,7 +74,6 @@ _HOMES = {
     "trace": ("Trace", "load"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
-__all__ = [*_HOME]
 
 gl.choose()  # before anything imports mujoco
 

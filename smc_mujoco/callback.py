@@ -4,10 +4,10 @@ At the first stage of a control sample, per channel:
 
     sensors -> noise -> velocity estimator -> law -> saturation -> ring of commands
 
-and at every stage: the command whose delay has passed -> ctrl, disturbance(t) -> xfrc_applied. Time is counted in calls:
-RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again, so the clock alone
-cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is marked in its row and
-gets no more control; the callback never stops the simulations beside it.
+and at every stage: the command whose delay has passed -> ctrl, disturbance(t) -> xfrc_applied. Time counts in calls:
+RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again, so the clock
+alone cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is marked in its
+row and gets no more control; the callback never stops the simulations beside it.
 
     with installed():
         batch.step(nstep=1000)
@@ -15,6 +15,8 @@ gets no more control; the callback never stops the simulations beside it.
 The callback is global to the process: `installed` holds a lock, and puts back what was there before.
 """
 
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
 import contextlib
 import functools
 import hashlib
@@ -26,14 +28,53 @@ from pathlib import Path
 import mujoco
 from numba import carray, cfunc, njit, types
 
-from smc_mujoco import layout, native, noise, row as row_module
+from smc_mujoco import layout, native, noise
+from smc_mujoco import row as row_module
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC
 from smc_mujoco.native import call, integers, pointer
 from smc_mujoco.row import (
-    CALLS, CHANNELS, DELAY, DIVERGED, ESTIMATOR, ESTIMATOR_GAINS, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE, FAILED_STEP,
-    FAILURE, FINE, GAINS, HEADER, INPUT, IS_ROW, LAW, LAW_MEMORY, LAW_STRIDE, LIMIT, LOG, NOMINAL, NOMINAL_VALUES,
-    NOT_FINITE, OUTPUT, PERIOD, RAISED, REFERENCE, REFERENCE_VALUES, RING, RINGS, SAMPLES, SEED, SIGMA_V, SIGMA_X,
-    SIGNAL_COUNT, SIGNAL_FIELDS, SIGNALS, STAGES, STATE, STEP, STEPS, TABLE,
+    CALLS,
+    CHANNELS,
+    DELAY,
+    DIVERGED,
+    ESTIMATOR,
+    ESTIMATOR_GAINS,
+    ESTIMATOR_MEMORY,
+    ESTIMATOR_STRIDE,
+    FAILED_STEP,
+    FAILURE,
+    FINE,
+    GAINS,
+    HEADER,
+    INPUT,
+    IS_ROW,
+    LAW,
+    LAW_MEMORY,
+    LAW_STRIDE,
+    LIMIT,
+    LOG,
+    NOMINAL,
+    NOMINAL_VALUES,
+    NOT_FINITE,
+    OUTPUT,
+    PERIOD,
+    RAISED,
+    REFERENCE,
+    REFERENCE_VALUES,
+    RING,
+    RINGS,
+    SAMPLES,
+    SEED,
+    SIGMA_V,
+    SIGMA_X,
+    SIGNAL_COUNT,
+    SIGNAL_FIELDS,
+    SIGNALS,
+    STAGES,
+    STATE,
+    STEP,
+    STEPS,
+    TABLE,
 )  # fmt: skip
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
@@ -160,7 +201,7 @@ def _control(base, row, qpos, qvel, ctrl, xfrc, sensors):
 
 @functools.cache
 def mark() -> float:
-    """What a row of ours begins with: a number that changes with the code, so that no cached harness reads a newer row."""
+    """What a row of ours begins with: it changes with the code, so that no cached harness reads a newer row."""
     sources = [Path(str(module.__file__)).read_bytes() for module in (native, noise, row_module)]
     return float(int.from_bytes(hashlib.sha256(b"".join([Path(__file__).read_bytes(), *sources])).digest()[:6]))
 
@@ -210,7 +251,7 @@ def _compiled(signature, function: Callable):
 
 @contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
-    """Install the harness, or another control callback, for the length of a with block; not reentrant across threads."""
+    """Install the harness, or another control callback, for the length of a with block; other threads wait."""
     with _lock:
         before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
         mujoco.set_mjcb_control(harness().ctypes if control is None else control)

@@ -47,15 +47,18 @@ def list_() -> None:
     """List plants, laws, velocity estimators, conditions of the paper's study, and scenes."""
     from rich.console import Console
 
-    from smc_mujoco import estimators, law, paper, plant, scene, tables
+    from smc_mujoco import paper, scene, tables
+    from smc_mujoco.estimators import catalogue as estimators
+    from smc_mujoco.law import catalogue as laws
+    from smc_mujoco.plant import catalogue as plants
 
     def first(doc: str | None) -> str:
         return (doc or "").strip().partition("\n")[0]
 
     known = {
-        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plant.catalogue().items()),
-        "Laws": ((name, first(t.doc)) for name, t in law.catalogue().items()),
-        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators.catalogue().items()),
+        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
+        "Laws": ((name, first(t.doc)) for name, t in laws().items()),
+        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
         "Conditions of the study": ((name, "") for name in paper.CONDITIONS),
         "Scenes (smc-mujoco run NAME)": ((name, scene.question(path)) for name, path in scene.scenes().items()),
     }
@@ -81,7 +84,8 @@ def run(
     with clock("loading"):
         from rich.console import Console
 
-        from smc_mujoco import scene as scenes, show, tables
+        from smc_mujoco import scene as scenes
+        from smc_mujoco import show, tables
 
         path = scenes.find(name)
         scene = scenes.read(path)

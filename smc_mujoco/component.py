@@ -63,9 +63,7 @@ class Template:
                 raise unknown(f"gain of {self.name}", key, values)
             above = 0.0 if key in self.positive else -math.inf
             values[key] = number(f"{self.name}'s {key}", value, above=above)
-        return Component(
-            kind=self.kind, name=self.name, gains=values, memory=self.memory, function=self.function
-        )
+        return Component(kind=self.kind, name=self.name, gains=values, memory=self.memory, function=self.function)
 
 
 def template(

@@ -102,9 +102,7 @@ def probe() -> str | None:
     import subprocess
 
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=60, check=False
-        )
+        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"a trial failed: {error}"
     if done.returncode == 0:

@@ -7,7 +7,7 @@ layout differs is refused with a sentence instead of read wrongly.
 
 import ctypes
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 from mujoco.introspect import ast_nodes, structs
@@ -47,7 +47,7 @@ def _ctype(node: object) -> type:
         case ast_nodes.PointerType():
             return ctypes.c_void_p
         case ast_nodes.ArrayType():
-            item = _ctype(node.inner_type)
+            item: Any = _ctype(node.inner_type)
             for extent in reversed(node.extents):
                 item = item * extent
             return item
@@ -57,9 +57,7 @@ def _ctype(node: object) -> type:
             return _struct(node.name)
         case ast_nodes.ValueType() if node.name.startswith("mjt"):  # an enum
             return ctypes.c_int
-    raise LayoutError(
-        f"mujoco {mujoco.__version__} has a field of unknown C type {node}: install mujoco 3.17"
-    )
+    raise LayoutError(f"mujoco {mujoco.__version__} has a field of unknown C type {node}: install mujoco 3.17")
 
 
 def _struct(name: str, last: str | None = None) -> type[ctypes.Structure]:
@@ -102,5 +100,6 @@ def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
 
 def _mismatch(field: str, offset: int) -> LayoutError:
     return LayoutError(
-        f"mujoco {mujoco.__version__}: {field} is not at byte {offset}, where introspection puts it; install mujoco 3.17"
+        f"mujoco {mujoco.__version__}: {field} is not at byte {offset}, where introspection puts it; "
+        "install mujoco 3.17"
     )

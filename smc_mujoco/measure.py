@@ -3,8 +3,8 @@
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
 
-- scale: the largest |e(0)| over the channels; if that is zero, the largest peak-to-peak range of r
-  over the channels; if that is zero too, 1 (rad or m). Percentages are percentages of the scale.
+- scale: the largest |e(0)| over the channels, or the largest peak-to-peak range of r over the channels
+  where that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
 - settling band: |e| <= 2 % of the scale.
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
   signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
@@ -64,9 +64,7 @@ class Metric:
         return self.unit.format(x=x, u=EFFORT[x])
 
 
-def metric(
-    unit: str, *, network: bool = False
-) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
+def metric(unit: str, *, network: bool = False) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
 
     Args:
@@ -84,9 +82,7 @@ def metric(
                 raise ScenarioError(f"{name} compares channels and {label(trace)} has one: give n >= 2")
             return float(formula(trace))
 
-        CATALOGUE[name] = Metric(
-            name=name, unit=unit, summary=doc.partition("\n")[0], network=network, formula=formula
-        )
+        CATALOGUE[name] = Metric(name=name, unit=unit, summary=doc.partition("\n")[0], network=network, formula=formula)
         return checked
 
     return enter
@@ -111,9 +107,7 @@ def refuse(trace: Trace) -> None:
         why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
     else:
         return
-    raise ScenarioError(
-        f"{label(trace)} has no score, {why}: change the gains or u_max, or end the run earlier"
-    )
+    raise ScenarioError(f"{label(trace)} has no score, {why}: change the gains or u_max, or end the run earlier")
 
 
 def error(trace: Trace) -> np.ndarray:
@@ -123,8 +117,8 @@ def error(trace: Trace) -> np.ndarray:
 
 def scale(trace: Trace) -> float:
     """The run's yardstick in x's unit, never zero; see the module's conventions."""
-    start = float(np.abs(trace.x[0] - trace.r[0]).max())
-    return start or float(np.ptp(trace.r, axis=0).max()) or 1.0
+    start, travel = np.abs(trace.x[0] - trace.r[0]).max(), np.ptp(trace.r, axis=0).max()
+    return float(max(start, travel)) or 1.0
 
 
 def last(trace: Trace) -> slice:

@@ -8,6 +8,8 @@ which returns 0, or 1 where the Python function would have raised. Array accesse
 writes beyond its memory fails, it does not corrupt its neighbour.
 """
 
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
 import functools
 from collections import namedtuple
 from collections.abc import Callable
@@ -78,7 +80,7 @@ def named(names: tuple[str, ...]) -> type:
 
 
 @functools.cache
-def loader(kind: type) -> Callable[[int], tuple]:
+def loader(kind: type) -> Callable:
     """A compiled function that reads a NamedTuple of floats from an address."""
     record = types.NamedUniTuple(types.float64, len(kind._fields), kind)
 

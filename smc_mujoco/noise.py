@@ -5,6 +5,8 @@ numpy.random.Philox(key=(seed, channel), counter=(k - 1, stream, 0, 0)).random_r
 transform (Box & Muller 1958, Ann. Math. Stat. 29:610) of its words.
 """
 
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
 import math
 
 import numpy as np

@@ -1,7 +1,8 @@
 """The plain loop: mj_step with the law called as the Python function it is.
 
-It runs what does not compile, and it is the oracle that the tests hold the compiled callback against: same Scenario, same
-Trace, but written for reading, with numpy's own Philox and nothing of the harness. It takes tens of microseconds a step.
+It runs what does not compile, and it is the oracle that the tests hold the compiled callback against: same Scenario,
+same Trace, but written for reading, with numpy's own Philox and nothing of the harness. A step takes tens of
+microseconds.
 """
 
 import math
@@ -11,18 +12,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco import noise
+from smc_mujoco import native, noise
 from smc_mujoco.callback import WORLD, installed
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
 from smc_mujoco.component import Component
 from smc_mujoco.estimators import Reading
 from smc_mujoco.law import Measurement
-from smc_mujoco import native
 from smc_mujoco.plant import Values, write
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
-
 
 LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {WORLD:g}, or NaN)"
 
@@ -67,6 +66,7 @@ class Loop:
         self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
+        self.s = np.zeros(n)
         self.log = np.full((6, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
@@ -82,26 +82,30 @@ class Loop:
             return
         step, stage = divmod(self.calls, self.stages)
         self.calls += 1
-        k, within = divmod(step, self.scenario.steps)
-        sampling = stage == 0 and within == 0
         try:
             if stage == 0:
-                x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
-                if not (np.all(np.abs(x) < WORLD) and np.all(np.abs(v) < WORLD)):
-                    raise Failure(LEFT_THE_WORLD)
-                if sampling:
-                    u, s = self.decide(*self.measure(data, k), k)
-                    self.commands.append(u)
-                past = step - round(self.scenario.input_delay / self.scenario.physics_step)
-                if past >= 0:
-                    data.ctrl[self.table[:, CTRL]] = self.commands[past // self.scenario.steps]
-            fraction = {0: 0.0, 1: 0.5, 2: 0.5, 3: 1.0}[stage]
+                self.begin(data, step)
+            fraction = (0.0, 0.5, 0.5, 1.0)[stage]
             d = self.disturbance((step + fraction) * self.scenario.physics_step)
             data.xfrc_applied.ravel()[self.table[:, XFRC]] = self.table[:, SIGN] * d
-            if sampling:
-                self.log[:, k] = x, v, u, data.ctrl[self.table[:, CTRL]], s, d
+            if stage == 0 and step % self.scenario.steps == 0:
+                x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
+                applied = data.ctrl[self.table[:, CTRL]]
+                self.log[:, step // self.scenario.steps] = x, v, self.commands[-1], applied, self.s, d
         except Failure as failure:
             self.failure, self.failed_step = str(failure), step
+
+    def begin(self, data: mujoco.MjData, step: int) -> None:
+        """The first stage of a physics step: at a sample the law; the command whose delay has passed."""
+        if not (np.all(np.abs(data.qpos) < WORLD) and np.all(np.abs(data.qvel) < WORLD)):
+            raise Failure(LEFT_THE_WORLD)
+        k, within = divmod(step, self.scenario.steps)
+        if within == 0:
+            u, self.s = self.decide(*self.measure(data, k), k)
+            self.commands.append(u)
+        past = step - round(self.scenario.input_delay / self.scenario.physics_step)
+        if past >= 0:
+            data.ctrl[self.table[:, CTRL]] = self.commands[past // self.scenario.steps]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""

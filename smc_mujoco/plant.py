@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -23,17 +23,17 @@ Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 
 
 class Field(NamedTuple):
-    """One write into an MjModel: model.<name>[index] = value ('opt.gravity' for an option)."""
+    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option)."""
 
     name: str
-    index: object
-    value: object
+    at: Any
+    value: Any
 
 
 class Nominal(Protocol):
     """f and g of channel i from all channels' x and v, (n,) each; p: the nominal parameters."""
 
-    def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: NamedTuple, /) -> tuple[float, float]: ...
+    def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -104,9 +104,14 @@ class Plant:
 
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
-    for name, index, value in fields:
-        owner = model.opt if name.startswith("opt.") else model
-        getattr(owner, name.removeprefix("opt."))[index] = value
+    for name, at, value in fields:
+        array(model, name)[at] = value
+
+
+def array(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The array of a model or option field that a Field names."""
+    owner = model.opt if name.startswith("opt.") else model
+    return getattr(owner, name.removeprefix("opt."))
 
 
 def shipped(folder: str) -> Path:

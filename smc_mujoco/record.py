@@ -28,7 +28,7 @@ def describe(scenario: Scenario) -> dict:
 
 
 def restore(data: dict) -> Scenario:
-    """The scenario that `describe` described. A law that is not in the library keeps its name and gains, not its code."""
+    """The scenario that was described. A law that is not in the library keeps its name and gains, not its code."""
     plant = dict(data["plant"])
     fields = {name: data[name] for name in PLAIN}
     return Scenario(

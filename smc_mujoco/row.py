@@ -2,16 +2,15 @@
 
     header | gains | nominal | estimator | reference | signals | reading | output | state | measured | memory ... | ring
 
-The header holds scalars: counts, addresses (exact in a float64, they are below 2^53) and offsets of the other slices. What is
-the same for every simulation of a layout - the channel table - and what is only written - the log - lie outside the row,
-by address. All of it is float64, so that a Batch copies it as state.
+The header holds scalars: counts, addresses (exact in a float64, they are below 2^53) and offsets of the other slices.
+What is the same for every simulation of a layout - the channel table - and what is only written - the log - lie outside
+the row, by address. All of it is float64, so that a Batch copies it as state.
 """
 
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-
 
 # Header slots.
 (
@@ -29,6 +28,7 @@ SIGNAL_FIELDS = 5
 
 # What FAILURE says.
 FINE, DIVERGED, RAISED, NOT_FINITE = range(4)
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Part:

@@ -1,14 +1,15 @@
 """Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
 
-A group shares the plant (but not its parameters), its size, the integrator, the physics step and the number of steps;
-laws, gains, signals, delays and seeds mix freely within it. What does not compile takes the plain loop. The results do not
-depend on the number of threads, on the grouping, or on what else runs.
+A group shares the plant (but not its parameters), its size, the integrator, the physics step and the number of
+steps; laws, gains, signals, delays and seeds mix freely within it. What does not compile takes the plain loop. The
+results do not depend on the number of threads, on the grouping, or on what else runs.
 """
 
 import contextlib
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import overload
 
 import mujoco
 import numpy as np
@@ -18,6 +19,7 @@ from smc_mujoco import callback, native, plain, row
 from smc_mujoco.channels import QPOS, QVEL, channels
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.plant import array
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
@@ -32,13 +34,17 @@ class PlainLoopWarning(UserWarning):
     """A law or signal does not compile and runs in the plain loop, some fifty times slower."""
 
 
+@overload
+def run(scenarios: Scenario, threads: int | None = None, progress: bool = False) -> Trace: ...
+@overload
+def run(scenarios: Iterable[Scenario], threads: int | None = None, progress: bool = False) -> list[Trace]: ...
 def run(
-    scenarios: Scenario | Sequence[Scenario], threads: int | None = None, progress: bool = False
+    scenarios: Scenario | Iterable[Scenario], threads: int | None = None, progress: bool = False
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
     Args:
-      scenarios: a Scenario, or a sequence of them.
+      scenarios: a Scenario, or any number of them.
       threads: how many simulations at once; None for one per available core.
       progress: whether to show a progress bar.
 
@@ -49,14 +55,13 @@ def run(
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
     """
-    one = isinstance(scenarios, Scenario)
-    many = [scenarios] if one else list(scenarios)
+    many = [scenarios] if isinstance(scenarios, Scenario) else list(scenarios)
     found: list[Trace | None] = [None] * len(many)
     with _bar(many, progress) as report:
         for index, trace in stream(many, threads, report):
             found[index] = trace
     traces = [trace for trace in found if trace is not None]
-    return traces[0] if one else traces
+    return traces[0] if isinstance(scenarios, Scenario) else traces
 
 
 def stream(
@@ -159,12 +164,11 @@ class Chunk:
         derived = []
         for i in indices:
             plant = self.scenarios[i].plant
-            for name, index, value in plant.fields(self.model, plant.values(self.scenarios[i].factors(step))):
-                shared = self.model.opt.gravity if name == "opt.gravity" else getattr(self.model, name, None)
-                held = self.fields[name][i] if name in self.fields else shared
-                if not np.array_equal(held[index], value):
+            for name, at, value in plant.fields(self.model, plant.values(self.scenarios[i].factors(step))):
+                held = self.fields[name][i] if name in self.fields else array(self.model, name)
+                if np.any(held[at] != value):
                     self.fields[name] = self.batch.expand(name)
-                    self.fields[name][i][index] = value
+                    self.fields[name][i][at] = value
                     derived.append(i)
         if derived:
             self.batch.set_const(np.unique(derived).astype(np.int32))

@@ -1,12 +1,13 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-What the true mechanism is (`plant`, `mismatch`, `jump`) and what the law may believe (the plant's nominal parameters) are
-kept apart. Two scenarios that are equal give the same trace to the last bit.
+What the true mechanism is (`plant`, `mismatch`, `jump`) and what the law may believe (the plant's nominal parameters)
+are kept apart. Two scenarios that are equal give the same trace to the last bit.
 """
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import ScenarioError, number, unknown
@@ -32,6 +33,10 @@ class Noise:
     def __post_init__(self):
         number("Noise's position", self.position, least=0.0)
         number("Noise's velocity", self.velocity, least=0.0)
+
+
+REST, QUIET = Constant(0.0), Noise()
+MISSING: Any = None  # a field left out, filled in when the scenario is made
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,19 +81,43 @@ class Scenario:
     law: Law
     duration: float = 10.0
     control_period: float = 1e-3
-    physics_step: float = None  # pyright: ignore[reportAssignmentType]  # filled in
+    physics_step: float = MISSING
     u_max: float = 6.0
-    x0: tuple[float, ...] = None  # pyright: ignore[reportAssignmentType]  # filled in
-    v0: tuple[float, ...] = None  # pyright: ignore[reportAssignmentType]  # filled in
-    reference: Signal = Constant(0.0)
+    x0: tuple[float, ...] = MISSING
+    v0: tuple[float, ...] = MISSING
+    reference: Signal = REST
     disturbance: tuple[Signal, ...] = ()
-    noise: Noise = Noise()
+    noise: Noise = QUIET
     input_delay: float = 0.0
-    velocity: Estimator = "measured"  # pyright: ignore[reportAssignmentType]  # made an Estimator
-    mismatch: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    velocity: Estimator = MISSING
+    mismatch: Mapping[str, float] = MISSING
     jump: Jump | None = None
     seed: int = 0
     integrator: str = "RK4"
+
+    if TYPE_CHECKING:  # what the fields are made from; what they are stands above
+
+        def __init__(
+            self,
+            *,
+            plant: Plant | str,
+            law: Law | Template | str,
+            duration: float = 10.0,
+            control_period: float = 1e-3,
+            physics_step: float | None = None,
+            u_max: float = 6.0,
+            x0: float | Sequence[float] | None = None,
+            v0: float | Sequence[float] | None = None,
+            reference: Signal = REST,
+            disturbance: Signal | Sequence[Signal] | None = None,
+            noise: Noise | None = None,
+            input_delay: float = 0.0,
+            velocity: Estimator | Template | str = "measured",
+            mismatch: Mapping[str, float] | None = None,
+            jump: Jump | None = None,
+            seed: int = 0,
+            integrator: str = "RK4",
+        ) -> None: ...
 
     def __post_init__(self):
         def put(name: str, value: object) -> None:
@@ -98,7 +127,7 @@ class Scenario:
         if not isinstance(self.plant, Plant):
             raise ScenarioError(f"plant is {self.plant!r}: give smc.plant(...) or one of the names smc.plants() lists")
         put("law", _component(self.law, "law", law))
-        put("velocity", _component(self.velocity, "estimator", estimator))
+        put("velocity", _component("measured" if self.velocity is None else self.velocity, "estimator", estimator))
         for name in ("duration", "control_period"):
             put(name, number(name, getattr(self, name), above=0.0))
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
@@ -108,10 +137,10 @@ class Scenario:
         put("v0", _state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
         put("reference", _signals("reference", self.reference)[0])
         put("disturbance", _signals("disturbance", self.disturbance))
-        put("noise", Noise() if self.noise is None else self.noise)
+        put("noise", QUIET if self.noise is None else self.noise)
         if not isinstance(self.noise, Noise):
             raise ScenarioError(f"noise is {self.noise!r}: give smc.Noise(position=..., velocity=...) or None")
-        put("mismatch", _factors("mismatch", self.mismatch))
+        put("mismatch", _factors("mismatch", {} if self.mismatch is None else self.mismatch))
         if not isinstance(self.jump, Jump | None):
             raise ScenarioError(f"jump is {self.jump!r}: give smc.Jump(time=..., factors=...) or None")
         if self.integrator not in INTEGRATORS:
@@ -200,7 +229,7 @@ def _state(name: str, value: object, n: int) -> tuple[float, ...]:
 
 
 def _signals(name: str, value: object) -> tuple[Signal, ...]:
-    items = () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
+    items: tuple[Any, ...] = () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
     for item in items:
         if not isinstance(item, Signal):
             raise ScenarioError(f"{name} is {item!r}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")

@@ -7,7 +7,6 @@ from pathlib import Path
 from rich.console import Console
 
 from smc_mujoco import gl
-from smc_mujoco.errors import ScenarioError
 from smc_mujoco.native import NotCompilable
 from smc_mujoco.run import contents, run
 from smc_mujoco.scene import Scene
@@ -59,8 +58,6 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
     """The film of the scene's filmed condition, with a progress bar; none, and a line that says why, without OpenGL."""
-    from rich.progress import track
-
     if gl.missing():
         console.print(str(gl.missing()), style="yellow", soft_wrap=True)
         return []

@@ -8,6 +8,7 @@ Times in seconds, values in the unit of what the signal is added to (reference: 
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -40,10 +41,7 @@ class Signal:
             raise ScenarioError(f"{type(self).__name__} has no value without a run: read Trace.d")
         return np.vectorize(lambda time: type(self).value(float(time), self)[0], otypes=[float])(t)
 
-    @staticmethod
-    def value(t, p):
-        """(value, first derivative, second derivative) at time t."""
-        raise NotImplementedError
+    value: ClassVar[Callable[..., tuple[float, float, float]]]  # a static method: value, first and second derivative
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,9 +132,9 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel):
     while memory[0] <= knot:
         memory[1] = memory[2]
         memory[0] += 1.0
-        memory[2] = a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(
-            seed, channel, noise.PROCESS, memory[0]
-        )[0]
+        memory[2] = (
+            a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, noise.PROCESS, memory[0])[0]
+        )
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 
 

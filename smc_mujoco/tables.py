@@ -29,9 +29,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     first = next(iter(traces.values()))
     units = {m.name: m.unit_for(first.scenario.plant.unit) for m in metrics()}
     networks = {m.name for m in metrics() if m.network}
-    shown = {
-        head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks
-    }
+    shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks}
     table = Table(title=title, title_justify="left")
     table.add_column("law")
     for head, name in shown.items():
@@ -65,8 +63,8 @@ def trace_summary(trace: Trace) -> Table:
     """Every metric of one trace, with its unit and what it means."""
     values = score(trace)
     table = Table(title="scores", title_justify="left", box=None, padding=(0, 2))
-    for head, justify in (("metric", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
-        table.add_column(head, justify=justify)
+    for head in ("metric", "value", "unit", ""):
+        table.add_column(head, justify="right" if head == "value" else "left")
     for m in metrics():
         if m.name in values:
             table.add_row(m.name, number(values[m.name]), m.unit_for(trace.scenario.plant.unit), m.summary)

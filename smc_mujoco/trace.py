@@ -56,11 +56,9 @@ class Trace:
         return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write the trace to a .npz file; `smc.load` reads it back. An existing file is replaced whole or not at all."""
+        """Write a .npz file that `smc.load` reads back. An existing file is replaced whole or not at all."""
         path = _suffixed(path, ".npz")
-        about = json.dumps(
-            record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure}
-        )
+        about = json.dumps(record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
         arrays = {name: getattr(self, name) for name in ARRAYS}
         _write(path, lambda file: np.savez_compressed(file, about=np.array(about), **arrays))
         return path

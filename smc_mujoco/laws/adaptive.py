@@ -1,9 +1,9 @@
 """Adaptive gain: u = -K sgn(s), K' = gamma |s|, K(0) = k0, s = de + c e.
 
-With V = s^2/2 + (K - k*)^2 / (2 gamma) the unknown bound k* on the matched force need not be known; but K only grows,
-so noise and sampling wind it up without end (adaptive_leak mends that). K is integrated by the explicit Euler rule.
-Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8 (adaptation of a switching gain), and
-Plestan, Shtessel, Bregeault, Poznyak, "New methodologies for adaptive sliding mode control", Int. J. Control 83(9), 2010.
+With V = s^2/2 + (K - k*)^2 / (2 gamma) the bound k* on the matched force need not be known; but K only grows, so noise
+and sampling wind it up without end (adaptive_leak mends that). K is integrated by the explicit Euler rule.
+Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; Plestan, Shtessel, Bregeault & Poznyak,
+"New methodologies for adaptive sliding mode control", Int. J. Control 83(9):1907, 2010.
 """
 
 import math

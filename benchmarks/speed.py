@@ -1,0 +1,178 @@
+"""How fast: the callback path beside bare mj_step, threads, networks, and other packages, all in one run.
+
+    make bench            or            python benchmarks/speed.py [--quick]
+
+Only ratios within one run mean anything on a shared machine; each is the median over rounds that alternate between the
+two sides. A peer that is not installed is left out by name.
+"""
+
+import dataclasses
+import importlib.util
+import statistics
+import sys
+import time
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import smc_mujoco as smc
+from smc_mujoco.callback import installed
+from smc_mujoco.run import Chunk
+
+QUICK = "--quick" in sys.argv
+ROUNDS = 3 if QUICK else 9
+STEPS = 2_000 if QUICK else 10_000
+console = Console()
+
+
+def seconds(action: Callable[[], object]) -> float:
+    """How long an action takes."""
+    start = time.perf_counter()
+    action()
+    return time.perf_counter() - start
+
+
+def ratio(one: Callable[[], object], other: Callable[[], object]) -> tuple[float, float, float]:
+    """Seconds of each, and the median over rounds of their ratio."""
+    for action in (one, other):
+        action()
+    rounds = [(seconds(one), seconds(other)) for _ in range(ROUNDS)]
+    ones, others = zip(*rounds, strict=True)
+    return statistics.median(ones), statistics.median(others), statistics.median(a / b for a, b in rounds)
+
+
+def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
+    """A batch of equal runs, ready to step."""
+    return Chunk([dataclasses.replace(scenario, seed=seed) for seed in range(runs)], threads)
+
+
+def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:
+    """Steps of a batch from its first state, with the callback or bare."""
+    start = batch.batch.state.copy()
+
+    def action() -> None:
+        batch.batch.state[:] = start
+        if bare:
+            batch.batch.step(nstep=steps)
+        else:
+            with installed():
+                batch.batch.step(nstep=steps)
+
+    return action
+
+
+def callback_against_mj_step(table: Table) -> None:
+    """The same model, stepped with and without the callback, one thread."""
+    disturbed = {"noise": smc.Noise(position=0.01, velocity=0.05), "disturbance": smc.Sine(0.2, 5.0)}
+    for name, fields, targets in (("alone", {}, (1.08, 1.08)), ("with noise and disturbance", disturbed, (1.20, 1.10))):
+        for integrator, target in zip(("Euler", "RK4"), targets, strict=True):
+            scenario = dataclasses.replace(
+                smc.paper.scenario("inverted_pendulum", "super_twisting"), integrator=integrator, **fields
+            )
+            batch = chunk(scenario, 16)
+            with_law, bare, r = ratio(stepping(batch, STEPS, bare=False), stepping(batch, STEPS, bare=True))
+            per = 1e6 / (16 * STEPS)
+            row(table, f"callback / mj_step, {integrator}, {name}", with_law * per, bare * per, r, f"<= {target}")
+
+
+def threads(table: Table) -> None:
+    """Simulated steps per second on two threads against one."""
+    scenario = smc.paper.scenario("inverted_pendulum", "super_twisting")
+    one, two = (stepping(chunk(scenario, 64, n), STEPS // 4, bare=False) for n in (1, 2))
+    a, b, r = ratio(one, two)
+    per = 1e6 / (64 * (STEPS // 4))
+    row(table, "1 thread / 2 threads", a * per, b * per, r, ">= 1.8")
+
+
+def networks(table: Table) -> None:
+    """Microseconds per step and pendulum of a long chain against a short one."""
+    actions = []
+    for n in (1000, 100):
+        law = smc.law("observer_free", lam=2.922, k1=6.19)
+        scenario = smc.Scenario(plant=smc.plant("pendulum_network", n=n), law=law, duration=1.0)
+        actions.append(stepping(chunk(scenario, 1000 // n), STEPS // 50, bare=False))
+    a, b, r = ratio(*actions)
+    per = 1e6 / (1000 * (STEPS // 50))
+    row(table, "network n = 1000 / n = 100, per pendulum", a * per, b * per, r, "<= 1.3")
+
+
+def peers(table: Table) -> None:
+    """One simulation with a controller, as each package's users write it; microseconds per simulated step."""
+    ours = chunk(smc.paper.scenario("inverted_pendulum", "super_twisting"), 1)
+    mine = stepping(ours, STEPS, bare=False)
+    for name, module, make in (
+        ("dm_control suite pendulum", "dm_control", dm_control_steps),
+        ("gymnasium InvertedPendulum", "gymnasium", gymnasium_steps),
+        ("opensmc 2.0.0 simulator", "opensmc", opensmc_steps),
+    ):
+        if importlib.util.find_spec(module) is None:
+            console.print(f"{module} is not installed: make bench installs it", style="yellow")
+            continue
+        action, steps = make()
+        ratio_steps = steps / STEPS
+        a, b, r = ratio(action, mine)
+        row(table, f"{name} / ours, RK4", a * 1e6 / steps, b * 1e6 / STEPS, r / ratio_steps, "> 1")
+
+
+def dm_control_steps() -> tuple[Callable[[], object], int]:
+    """dm_control's pendulum swing-up with a sliding-mode agent; it takes `n_sub_steps` physics steps a control step."""
+    from dm_control import suite
+
+    environment = suite.load("pendulum", "swingup", task_kwargs={"time_limit": float("inf")})
+    count = STEPS // 20
+
+    def action() -> None:
+        environment.reset()
+        physics = environment.physics
+        for _ in range(count):
+            s = physics.angular_velocity()[0] + 3.0 * np.arctan2(*physics.pole_orientation()[::-1])
+            environment.step(np.array([-np.sign(s)]))
+
+    return action, count * round(environment.control_timestep() / environment.physics.timestep())
+
+
+def gymnasium_steps() -> tuple[Callable[[], object], int]:
+    """gymnasium's InvertedPendulum-v5 with a sliding-mode agent."""
+    import gymnasium
+
+    environment = gymnasium.make("InvertedPendulum-v5").unwrapped
+    count = STEPS // 20
+
+    def action() -> None:
+        state, _ = environment.reset(seed=0)
+        for _ in range(count):
+            s = state[3] + 3.0 * state[1]
+            state, *_ = environment.step(np.array([3.0 * np.sign(s)], np.float32))
+
+    return action, count * environment.frame_skip
+
+
+def opensmc_steps() -> tuple[Callable[[], object], int]:
+    """opensmc's own RK4 simulator: its classical law on its double integrator, the least work it has."""
+    from opensmc.controllers import ClassicalSMC
+    from opensmc.plants import DoubleIntegrator
+    from opensmc.reaching import ConstantRate
+    from opensmc.simulator import Simulator
+    from opensmc.surfaces import LinearSurface
+
+    count = STEPS // 20
+    simulator = Simulator(dt=1e-3, T=count * 1e-3)
+    controller = ClassicalSMC(surface=LinearSurface(c=3.0), reaching=ConstantRate(k=4.0))
+    return (lambda: simulator.run(controller, DoubleIntegrator(), x0=np.array([1.0, 0.0]))), count
+
+
+def row(table: Table, what: str, a: float, b: float, r: float, target: str) -> None:
+    table.add_row(what, f"{a:.3f}", f"{b:.3f}", f"{r:.2f}", target)
+
+
+if __name__ == "__main__":
+    table = Table(title="microseconds per simulated step (per pendulum in networks)", title_justify="left")
+    for head in ("comparison", "first", "second", "ratio", "target"):
+        table.add_column(head, justify="left" if head == "comparison" else "right")
+    for part in (callback_against_mj_step, threads, networks, peers):
+        part(table)
+    console.print(table)
+    console.print(f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run")

@@ -1,0 +1,134 @@
+"""How laws, units and pages look, in figures and films alike.
+
+Colours are those of Okabe and Ito (Color Universal Design, 2008), told apart by colour-blind readers; a law keeps its
+colour everywhere. The fonts ship with matplotlib.
+"""
+
+import zlib
+from collections.abc import Sequence
+
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.measure import EFFORT
+from smc_mujoco.trace import Trace
+
+COLOURS = {
+    "observer_free": "#0072B2",
+    "adaptive": "#D55E00",
+    "classical": "#E69F00",
+    "super_twisting": "#009E73",
+    "boundary_layer": "#CC79A7",
+    "adaptive_leak": "#56B4E9",
+    "none": "#6E7781",
+}
+OTHERS = ("#6A4C93", "#8C5A2B", "#1A936F", "#B5179E", "#3D405B", "#7F9C1E")  # chosen: apart from those above
+NAMES = {
+    "observer_free": "Observer-free",
+    "super_twisting": "Super-twisting",
+    "boundary_layer": "Boundary layer",
+    "adaptive_leak": "Adaptive + leak",
+    "none": "No control",
+}
+INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
+DISTURBANCE = "#3A3F46"
+
+RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.5,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#9BA2A9",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.unicode_minus": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.7,
+    "lines.solid_capstyle": "round",
+    "figure.facecolor": PAPER,
+    "savefig.facecolor": PAPER,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "smc_mujoco",  # the same traces give the same file
+}
+
+
+def law_colour(law: str) -> str:
+    """The colour of a law, "#RRGGBB"; a law of your own always gets the same one."""
+    return COLOURS.get(law, OTHERS[zlib.crc32(law.encode()) % len(OTHERS)])
+
+
+def colours(traces: Sequence[Trace]) -> list[str]:
+    """One colour a trace: its law's, or another where an earlier trace has taken that."""
+    wanted = [law_colour(trace.scenario.law.name) for trace in traces]
+    free = [c for c in (*COLOURS.values(), *OTHERS) if c not in wanted]
+    given: list[str] = []
+    for colour in wanted:
+        given.append(free.pop(0) if colour in given and free else colour)
+    return given
+
+
+def law_name(law: str) -> str:
+    """A law's name as people write it."""
+    return NAMES.get(law, law.replace("_", " ").capitalize())
+
+
+def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
+    """One label a trace: the given ones, else the laws' names, numbered where a law comes again.
+
+    Raises:
+      ScenarioError: not as many labels as traces.
+    """
+    if given is not None:
+        if isinstance(given, str) or len(given) != len(traces):
+            raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
+        return [str(label) for label in given]
+    names = [law_name(trace.scenario.law.name) for trace in traces]
+    return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
+
+
+def same_plant(traces: Sequence[Trace]) -> Sequence[Trace]:
+    """The traces, if they can share axes.
+
+    Raises:
+      ScenarioError: none, or of several plants.
+    """
+    if not traces:
+        raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
+    plants = sorted({trace.scenario.plant.name for trace in traces})
+    if len(plants) > 1:
+        raise ScenarioError(f"traces of {' and '.join(plants)} share no axes: draw one plant at a time")
+    return traces
+
+
+def units(trace: Trace) -> dict[str, str]:
+    """Units of the quantities x, v, u and s."""
+    x = trace.scenario.plant.unit
+    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
+
+
+def quantity(trace: Trace) -> str:
+    """What x is: "angle" or "position"."""
+    return {"rad": "angle", "m": "position"}[trace.scenario.plant.unit]
+
+
+def plant_name(trace: Trace) -> str:
+    """The plant's name as people write it."""
+    words = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
+    name = " ".join(words.get(w, w) for w in trace.scenario.plant.name.split("_"))
+    name += " oscillator" if name in ("Van der Pol", "Duffing") else ""
+    return name[0].upper() + name[1:]
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """#RRGGBB as three numbers, 0 .. 255."""
+    return tuple(bytes.fromhex(colour[1:]))  # pyright: ignore[reportReturnType]
