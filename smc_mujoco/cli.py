@@ -59,12 +59,12 @@ def list_() -> None:
         "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
         "Laws": ((name, first(t.doc)) for name, t in laws().items()),
         "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
-        "Conditions of the study": ((name, "") for name in paper.CONDITIONS),
         "Scenes (smc-mujoco run NAME)": ((name, scene.question(path)) for name, path in scene.scenes().items()),
     }
     console = Console()
     for title, rows in known.items():
         console.print(tables.catalogue(title, rows), "")
+    console.print("[bold]Conditions of the study[/]", ", ".join(paper.CONDITIONS), sep="\n  ", highlight=False)
 
 
 @app.command()
@@ -98,7 +98,7 @@ def run(
     with clock("simulating"):
         traces = show.simulate(scene, threads)
     for condition, runs in traces.items():
-        console.print(tables.scores(f"{scene.title}, {condition}", runs))
+        console.print(tables.scores(f"{scene.title}, {condition}", runs), "")
     written = []
     with clock("traces"):
         written += show.save(traces, out)

@@ -38,9 +38,13 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
     return Envelope((edges[:-1] + edges[1:]) / 2, low, total / count, high)
 
 
-def columns(t: np.ndarray, y: np.ndarray, count: int) -> Envelope:
-    """Range and mean of y in `count` equal windows, or one a sample where there are fewer samples."""
-    count = min(count, len(t) - 1)
-    if count < 1:
+def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
+    """Range and mean of y in at most `most` windows of equally many samples.
+
+    The number is even, so that a control which switches at every sample has the mean that it should.
+    """
+    count = len(t) - 1
+    if count <= most:
         return Envelope(t, y, y, y)
-    return windows(t, y, np.linspace(t[0], t[-1], count + 1))
+    edges = t[:: 2 * -(-count // (2 * most))]
+    return windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))

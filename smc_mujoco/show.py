@@ -48,7 +48,8 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.figure import figure, signals
 
     if scene.figure == "signals":
-        return signals(traces, out / "signals", title=scene.title)
+        flat = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
+        return signals([t for _, t in flat], out / "signals", labels=[c for c, _ in flat], title=scene.title)
     written: list[Path] = []
     for condition, runs in traces.items():
         title = f"{scene.title}, {condition}" if len(traces) > 1 else scene.title
@@ -57,14 +58,20 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
 
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
-    """The film of the scene's filmed condition, with a progress bar; none, and a line that says why, without OpenGL."""
+    """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
+    from rich.progress import Progress
+
     if gl.missing():
         console.print(str(gl.missing()), style="yellow", soft_wrap=True)
         return []
-    from smc_mujoco.video import film as shoot
+    from smc_mujoco import video
 
     runs = traces[scene.film]
-    return [shoot(list(runs.values()), out / f"{slug(scene.film)}.mp4", labels=list(runs), title=scene.title)]
+    shown = list(runs.values())
+    with Progress(transient=True, console=console) as bar:
+        task = bar.add_task("film", total=len(video.clock(shown, video.FPS)))
+        path = out / f"{slug(scene.film)}.mp4"
+        return [video.film(shown, path, list(runs), scene.title, report=lambda n: bar.advance(task, n))]
 
 
 def slug(name: str) -> str:

@@ -16,11 +16,11 @@ from smc_mujoco.envelope import samples
 from smc_mujoco.plant import Plant, model_path
 from smc_mujoco.trace import Trace
 
-SHOWN = 9  # channels of a network that a film shows: more are too small to see
-FOVY = 22.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
+SHOWN = 6  # channels of a network that a film shows: more would hide behind the next machine
+FOVY = 9.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
 REACH = {"hinge": 0.85, "slide": 0.16}  # longest arrow: of the pendulum's length, of the rail's length
 POSES = 24  # poses of each trace that must be in the picture
-QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 24, "numstacks": 12, "numquads": 1}
+QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 32, "numstacks": 16, "numquads": 1}
 
 
 class Room(NamedTuple):
@@ -41,6 +41,7 @@ class Arrow(NamedTuple):
     high: float
     rgba: tuple[float, float, float, float]
     step: float  # places above the channel's own, in arrow widths
+    size: float = 1.0  # of its length and width
     head: bool = True
 
 
@@ -62,7 +63,10 @@ class Stage:
             self.dress(k, trace)
             self.paint(k, colour)
         self.joints = [
-            [self.model.actuator_trnid[self.model.actuator(f"m{k}/{name}").id, 0] for name in actuators(plant, n)]
+            [
+                self.model.actuator_trnid[self.model.actuator(f"m{k}/{name}").id, 0]
+                for name in actuators(plant, n)
+            ]
             for k, (plant, n) in enumerate(zip(plants, self.shown, strict=True))
         ]
         self.limit = travel(plants[0])
@@ -117,30 +121,33 @@ class Stage:
         model, data = self.model, self.data
         body = model.jnt_bodyid[joint]
         tip, axis = self.handle(body), data.xaxis[joint]
-        away = data.cam_xmat[model.camera("film").id].reshape(3, 3)[:, 2]
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
             arm = data.geom_xpos[tip] - data.xanchor[joint]
             along = np.cross(axis, arm)
             reach, up = REACH["hinge"] * np.linalg.norm(arm), arm / np.linalg.norm(arm)
             along = along / np.linalg.norm(along)
             width = 0.16 * model.geom_rbound[tip] + 0.012
-            start = data.geom_xpos[tip] + 1.1 * model.geom_rbound[tip] * away
+            start = data.geom_xpos[tip] + (model.geom_rbound[tip] + 1.6 * width) * up
         else:
             along, reach, up = axis, REACH["slide"] * 2 * self.limit, np.array([0.0, 0.0, 1.0])
             width = 0.035
-            start = data.geom_xpos[tip] + (model.geom_size[tip, 2] + 2.2 * width) * up + 0.1 * away
-        start = start + 2.6 * width * arrow.step * up
+            start = data.geom_xpos[tip] + (model.geom_size[tip, 2] + 2.2 * width) * up
+        start, width, reach = start + 2.6 * width * arrow.step * up, arrow.size * width, arrow.size * reach
         geom = scene.geoms[scene.ngeom]
         kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
-        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(arrow.rgba, np.float32))
+        mujoco.mjv_initGeom(
+            geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(arrow.rgba, np.float32)
+        )
         ends = start + reach * arrow.low * along, start + reach * arrow.high * along
         mujoco.mjv_connector(geom, kind, width if arrow.head else 0.55 * width, *ends)
-        geom.emission = 0.35
+        geom.specular = 0.0
         scene.ngeom += 1
 
     def handle(self, body: int) -> int:
         """The geom of a moving body that carries its arrows: the first in the accent's material."""
-        geoms = range(self.model.body_geomadr[body], self.model.body_geomadr[body] + self.model.body_geomnum[body])
+        geoms = range(
+            self.model.body_geomadr[body], self.model.body_geomadr[body] + self.model.body_geomnum[body]
+        )
         accent = [g for g in geoms if self.model.mat(self.model.geom_matid[g]).name.endswith("accent")]
         return accent[0]
 
@@ -211,6 +218,13 @@ def travel(plant: Plant) -> float:
     return float(abs(plant.spec().geom("left_post").pos[0]))
 
 
+def lane(plant: Plant) -> np.ndarray:
+    """From one machine to the next, m: the plant's lane; turned to lie across the picture where it nearly does."""
+    step, across = np.array(plant.lane), np.array(plant.spec().camera("look").alt.xyaxes[:3])
+    length, across = np.linalg.norm(step), across / np.linalg.norm(across)
+    return length * across if abs(step @ across) > 0.7 * length else step
+
+
 def compose(plants: Sequence[Plant], shown: Sequence[int]) -> mujoco.MjModel:
     """One scene with machine k's names prefixed m<k>/, and a camera named film."""
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
@@ -224,8 +238,9 @@ def compose(plants: Sequence[Plant], shown: Sequence[int]) -> mujoco.MjModel:
             machine.delete(item)
         if k == 0:
             spec.option, spec.compiler = machine.option, machine.compiler
-        place = spec.worldbody.add_frame(pos=np.array(plant.lane) * (k - middle))
+        place = spec.worldbody.add_frame(pos=lane(plant) * (k - middle))
         place.attach_body(machine.body("machine"), f"m{k}/", "")
+    spec.material("floor").emission = 0.13  # nearly the white of the page below
     spec.worldbody.add_camera(name="film", fovy=FOVY)
     width = np.linalg.norm(plants[0].lane) * len(plants)
     spec.stat.center, spec.stat.extent, spec.stat.meansize = (0.0, 0.0, 0.5), 0.6 * width + 1.5, 0.1

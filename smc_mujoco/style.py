@@ -29,7 +29,7 @@ NAMES = {
     "none": "No control",
 }
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
-DISTURBANCE = "#3A3F46"
+DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 
 RC = {
     "font.family": "DejaVu Sans",
@@ -70,7 +70,7 @@ def law_colour(law: str) -> str:
 def colours(traces: Sequence[Trace]) -> list[str]:
     """One colour a trace: its law's, or another where an earlier trace has taken that."""
     wanted = [law_colour(trace.scenario.law.name) for trace in traces]
-    free = [c for c in (*COLOURS.values(), *OTHERS) if c not in wanted]
+    free = [c for c in (*OTHERS, *COLOURS.values()) if c not in wanted]
     given: list[str] = []
     for colour in wanted:
         given.append(free.pop(0) if colour in given and free else colour)

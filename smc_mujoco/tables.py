@@ -1,8 +1,10 @@
 """What the command line prints: score tables, catalogues, one trace."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from rich import box
 from rich.table import Table
 from rich.text import Text
 
@@ -12,15 +14,15 @@ from smc_mujoco.trace import Trace
 
 # What a score table shows, of the metrics there are: heading under which, and metric.
 SHOWN = {
-    "settling": "settling_time",
+    "settles": "settling_time",
     "overshoot": "overshoot",
-    "ultimate bound": "ultimate_bound",
+    "ultimate\nbound": "ultimate_bound",
     "ITAE": "itae",
     "max |u|": "max_u",
     "TV rate": "tv_rate",
-    "energy": "energy",
-    "spread settling": "spread_settling_time",
+    "spread\nsettles": "spread_settling_time",
 }
+LEAN = {"padding": (0, 1, 0, 0), "show_edge": False, "pad_edge": False}
 SPARKS = "▁▂▃▄▅▆▇█"
 
 
@@ -30,14 +32,14 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     units = {m.name: m.unit_for(first.scenario.plant.unit) for m in metrics()}
     networks = {m.name for m in metrics() if m.network}
     shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks}
-    table = Table(title=title, title_justify="left")
-    table.add_column("law")
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, **LEAN)
+    table.add_column("law", no_wrap=True, vertical="bottom")
     for head, name in shown.items():
-        table.add_column(f"{head}\n{units[name]}", justify="right")
+        table.add_column(f"{head}\n[dim]{units[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
     for label, trace in traces.items():
-        name = Text(label, style=style.colour(trace.scenario.law.name))
+        name = Text(label, style=style.law_colour(trace.scenario.law.name))
         if trace.diverged_at is not None:
-            table.add_row(name, Text(f"failed at {trace.diverged_at:.3g} s", style="red"))
+            table.add_row(name, Text(f"failed at {number(trace.diverged_at)} s", style="red"))
             continue
         values = score(trace)
         table.add_row(name, *(number(values[metric]) for metric in shown.values()))
@@ -45,29 +47,36 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
 
 
 def number(value: float) -> str:
-    """Three significant digits; a run that never settles has none."""
-    return "never" if np.isinf(value) else f"{value:.3g}"
+    """Three significant digits, written short; "never" for inf, and no more than "<1e-9" for what rounding may have left."""
+    if math.isinf(value):
+        return "never"
+    if 0.0 < abs(value) < 1e-9:
+        return "<1e-9"
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}" if value else "0"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
     """Names with a line about each."""
-    table = Table(title=title, title_justify="left", show_header=False, box=None, padding=(0, 2))
-    table.add_column(style="bold", no_wrap=True)
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, padding=(0, 2))
+    table.add_column(no_wrap=True)
     table.add_column()
-    for row in rows:
-        table.add_row(*row)
+    for name, about in rows:
+        table.add_row(Text(name, style="cyan"), Text(about))
     return table
 
 
 def trace_summary(trace: Trace) -> Table:
     """Every metric of one trace, with its unit and what it means."""
     values = score(trace)
-    table = Table(title="scores", title_justify="left", box=None, padding=(0, 2))
+    table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("metric", "value", "unit", ""):
         table.add_column(head, justify="right" if head == "value" else "left")
     for m in metrics():
         if m.name in values:
-            table.add_row(m.name, number(values[m.name]), m.unit_for(trace.scenario.plant.unit), m.summary)
+            table.add_row(m.name, number(values[m.name]), m.unit_for(trace.scenario.plant.unit), Text(m.summary))
     return table
 
 

@@ -4,14 +4,14 @@ import dataclasses
 import json
 import math
 import os
-import tempfile
-from collections.abc import Callable
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from smc_mujoco import record
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.files import replacing
 from smc_mujoco.scenario import Scenario
 
 LOGGED = ("x", "v", "u", "applied", "s", "d")  # what the callback writes, in its order
@@ -60,7 +60,8 @@ class Trace:
         path = _suffixed(path, ".npz")
         about = json.dumps(record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        _write(path, lambda file: np.savez_compressed(file, about=np.array(about), **arrays))
+        with replacing(path) as file:
+            np.savez_compressed(file, about=np.array(about), **arrays)
         return path
 
     def export(self, path: str | os.PathLike) -> Path:
@@ -77,13 +78,15 @@ class Trace:
                 for i in range(self.x.shape[1])
             }
             table, header = np.column_stack(list(columns.values())), ",".join(columns)
-            _write(path, lambda file: np.savetxt(file, table, "%.17g", ",", header=header, comments=""))
+            with replacing(path) as file:
+                np.savetxt(file, table, "%.17g", ",", header=header, comments="")
         elif path.suffix == ".mat":
             from scipy.io import savemat
 
             arrays = {name: getattr(self, name) for name in ARRAYS}
             about = json.dumps(record.describe(self.scenario))
-            _write(path, lambda file: savemat(file, arrays | {"scenario": about}))
+            with replacing(path) as file:
+                savemat(file, arrays | {"scenario": about})
         else:
             raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv or .mat")
         return path
@@ -115,8 +118,8 @@ def load(path: str | os.PathLike) -> Trace:
             arrays = {name: file[name] for name in ARRAYS}
     except FileNotFoundError:
         raise ScenarioError(f"no trace at {path}: give the path of a .npz file that a run wrote") from None
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise ScenarioError(f"{path} is no trace of smc_mujoco ({error}): give a .npz file that a run wrote") from None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        raise ScenarioError(f"{path} is no trace of smc_mujoco: give a .npz file that a run wrote") from None
     end = {key: about.pop(key) for key in ("diverged_at", "failure")}
     return Trace(**arrays, scenario=record.restore(about), **end)
 
@@ -126,19 +129,3 @@ def _suffixed(path: str | os.PathLike, suffix: str) -> Path:
     if path.suffix not in ("", suffix):
         raise ScenarioError(f"cannot save to {path.name!r}: end the name in {suffix}")
     return path.with_suffix(suffix)
-
-
-def _write(path: Path, write: Callable) -> None:
-    """Write to a neighbour of `path` and move it into place, so that a full disk or a kill leaves no half file."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.stem}.", delete=False) as file:
-            try:
-                write(file)
-            except BaseException:
-                os.unlink(file.name)
-                raise
-        os.chmod(file.name, 0o644)
-        os.replace(file.name, path)
-    except OSError as error:
-        raise ScenarioError(f"cannot write {path}: {error.strerror}; choose another folder or make room") from error

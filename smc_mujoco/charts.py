@@ -1,0 +1,108 @@
+"""The strip charts under a film: x and u of all traces, drawn once and uncovered as the clock runs.
+
+Two pictures are drawn: the charts with every curve, and the charts with the curves as a faint promise. A frame takes the
+columns up to the clock from the first and the rest from the second, so that it costs a copy, whatever the charts hold.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from smc_mujoco import panels, style
+from smc_mujoco.envelope import columns
+from smc_mujoco.trace import Trace
+
+DPI = 100
+FAINT = 0.16  # opacity of what is still to come
+CURSOR = np.array(style.rgb(style.MUTED))
+
+
+class Charts:
+    """The two charts as pictures of `size` px; `at` gives a frame of them.
+
+    Attributes:
+      scale: pixels per px of a film 1280 wide, by which letters and lines grow.
+    """
+
+    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], scale: float):
+        self.end = max(trace.t[-1] for trace in traces)
+        self.dot = max(2, round(4.5 * scale))
+        with rc_context(style.RC):
+            figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
+            canvas = FigureCanvasAgg(figure)
+            axes = figure.subplots(1, 2)
+            figure.subplots_adjust(left=0.062, right=0.985, bottom=0.2, top=0.855, wspace=0.155)
+            draw_axes(axes, traces, self.end)
+            drawn = [panels.over_time(ax, traces, colours, name) for ax, name in zip(axes, "xu", strict=True)]
+            self.full = picture(canvas)
+            for artist in sum(drawn, []):
+                artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))
+            self.faint = picture(canvas)
+            self.frames = [frame(ax, self.full.shape[0]) for ax in axes]
+            self.paths = [
+                [path(ax, trace, name, self.full.shape[0]) for trace in traces]
+                for ax, name in zip(axes, "xu", strict=True)
+            ]
+        self.colours = [np.array(style.rgb(colour)) for colour in colours]
+
+    def at(self, time: float) -> np.ndarray:
+        """The charts at a time in s, (height, width, 3) uint8."""
+        image = self.faint.copy()
+        for (left, top, right, bottom), paths in zip(self.frames, self.paths, strict=True):
+            now = round(left + (right - left) * min(time / self.end, 1.0))
+            rows, past = slice(top - 3 * self.dot, bottom + 1), slice(left - self.dot, now + 1)
+            image[rows, past] = self.full[rows, past]
+            image[top : bottom + 1, now] = CURSOR
+            for (t, y), colour in zip(paths, self.colours, strict=True):
+                if time <= t[-1] + 1e-9:  # a run that failed has no place on the cursor
+                    self.disc(image, now, np.interp(time, t, y), colour)
+        return image
+
+    def disc(self, image: np.ndarray, x: float, y: float, colour: np.ndarray) -> None:
+        """A dot with a soft edge at x, y px."""
+        r = self.dot + 2
+        i, j = round(y), round(x)
+        rows, cols = np.mgrid[max(i - r, 0) : i + r + 1, max(j - r, 0) : j + r + 1]
+        rows, cols = rows[:, (cols < image.shape[1])[0]], cols[:, (cols < image.shape[1])[0]]
+        keep = (rows < image.shape[0])[:, 0]
+        rows, cols = rows[keep], cols[keep]
+        distance = np.hypot(rows - y, cols - x)
+        for radius, ink in ((self.dot + 1.5, np.array(style.rgb(style.PAPER))), (self.dot, colour)):
+            cover = np.clip(radius + 0.5 - distance, 0.0, 1.0)[..., None]
+            image[rows, cols] = (image[rows, cols] * (1 - cover) + ink * cover).astype(np.uint8)
+
+
+def draw_axes(axes: Sequence[Axes], traces: Sequence[Trace], end: float) -> None:
+    """Frames, names and units."""
+    unit, several = style.units(traces[0]), any(trace.x.shape[1] > 1 for trace in traces)
+    names = f"{style.quantity(traces[0])} x ({unit['x']})", f"control u ({unit['u']})"
+    for ax, name in zip(axes, names, strict=True):
+        ax.set_title(name + (": mean and single pendulums" if several and ax is axes[0] else ""))
+        ax.set_xlim(0.0, end)
+        ax.set_xlabel("time (s)", labelpad=2)
+        ax.tick_params(length=0)
+
+
+def picture(canvas: FigureCanvasAgg) -> np.ndarray:
+    """What the canvas shows, (height, width, 3) uint8."""
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def frame(ax: Axes, height: int) -> tuple[int, int, int, int]:
+    """The axes' frame, px from the top left: left, top, right, bottom."""
+    box = ax.get_window_extent()
+    return round(box.x0), round(height - box.y1), round(box.x1), round(height - box.y0)
+
+
+def path(ax: Axes, trace: Trace, name: str, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where a trace's dot is: times in s and px from the top, kept within the frame."""
+    u = panels.values(trace, name).mean(axis=1, keepdims=True)
+    e = columns(trace.t[: len(u)], u, panels.WINDOWS)
+    y = np.clip(e.mean[:, 0], *ax.get_ylim())
+    t = np.append(e.t[:-1], trace.t[len(u) - 1])
+    return t, height - ax.transData.transform(np.column_stack([t, y]))[:, 1]

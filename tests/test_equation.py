@@ -1,0 +1,204 @@
+"""Each ideal plant is its differential equation, held against scipy's DOP853 on the equations as the study states them.
+
+Nothing of the plants' own `nominal` or `fields` is used: the right-hand sides, the laws and the sample-and-hold with its
+delay are written again here.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import ode
+
+import smc_mujoco as smc
+
+
+def springs(x):
+    """Pull of the neighbours in a chain with free ends: x[i-1] - 2 x[i] + x[i+1]."""
+    gap, pull = np.diff(x), np.zeros_like(x)
+    pull[..., :-1] += gap
+    pull[..., 1:] -= gap
+    return pull
+
+
+def pendulum(side, coupled=False):
+    def acceleration(p, x, v, force):
+        pull = p.kc * springs(x) if coupled else 0.0
+        return (side * p.m * p.grav * p.l * np.sin(x) - p.b * v + pull + force) / (p.m * p.l**2)
+
+    return acceleration
+
+
+# x'' of every plant from its parameters, x and v (..., n), and the force u + d.
+EQUATION = {
+    "inverted_pendulum": pendulum(+1),
+    "inverted_pendulum_network": pendulum(+1, coupled=True),
+    "pendulum_network": pendulum(-1, coupled=True),
+    "van_der_pol": lambda p, x, v, force: (p.mu * (1 - x**2) * v - p.k * x + force) / p.M,
+    "duffing": lambda p, x, v, force: (-p.delta * v - p.alpha * x - p.beta * x**3 + force) / p.M,
+}
+# The smooth laws, u from e and e'.
+SMOOTH = {
+    "observer_free": lambda g, e, de: -g["lam"] * np.tanh(de + g["k1"] * e),
+    "boundary_layer": lambda g, e, de: -g["k"] * np.clip((de + g["c"] * e) / g["phi"], -1, 1),
+}
+PLANTS = pytest.mark.parametrize("plant", sorted(EQUATION))
+SINE = smc.Sine(amplitude=0.2, omega=5.0)
+
+
+def integrated(slope, y, t, h):
+    """y at t + h, where y' = slope(t, y) and y is an array of any shape."""
+    solver = ode(lambda t, flat: slope(t, flat.reshape(y.shape)).ravel())
+    solver.set_integrator("dop853", rtol=1e-12, atol=1e-14, first_step=h)
+    end = solver.set_initial_value(y.ravel(), t).integrate(t + h)
+    assert solver.successful()
+    return end.reshape(y.shape)
+
+
+def sine(signal, t):
+    return signal.amplitude * np.sin(signal.omega * t)
+
+
+def oracle(s, factor=1.0):
+    """x and v (K+1, n) of the closed loop: a smooth law on the oracle's own state, held, delayed and integrated.
+
+    `factor` multiplies the true mass.
+    """
+    equation, law, h = EQUATION[s.plant.name], SMOOTH[s.law.name], s.physics_step
+    delay, jump = round(s.input_delay / h), math.inf if s.jump is None else round(s.jump.time / h)
+    y, commands, states = np.array([s.x0, s.v0]), [], []
+    before = s.plant.values({**s.mismatch, "mass": factor * s.mismatch.get("mass", 1.0)})
+    after = s.plant.values(s.factors(jump)) if s.jump else before
+    for step in range(s.samples * s.steps + 1):
+        if step % s.steps == 0:
+            r = sine(s.reference, step * h)
+            dr = s.reference.amplitude * s.reference.omega * math.cos(s.reference.omega * step * h)
+            commands.append(np.clip(law(s.law.gains, y[0] - r, y[1] - dr), -s.u_max, s.u_max))
+            states.append(y)
+        p = after if step >= jump else before
+        u = commands[(step - delay) // s.steps] if step >= delay else 0.0
+
+        def slope(t, y, p=p, u=u):
+            d = sum(sine(signal, t) for signal in s.disturbance)
+            return np.stack([y[1], equation(p, y[0], y[1], u + d)])
+
+        y = integrated(slope, y, step * h, h)
+    return np.array(states)
+
+
+def error(trace, states):
+    """Largest errors of x and of v."""
+    return np.abs(states[:, 0] - trace.x).max(), np.abs(states[:, 1] - trace.v).max()
+
+
+def everything(plant, law):
+    """A tracking run with delay, sine disturbance, a plant 30 % heavier than believed, and a jump."""
+    return dataclasses.replace(
+        smc.paper.scenario(plant, law, "jump_mild"),
+        reference=smc.Sine(amplitude=0.1, omega=2.0),
+        input_delay=0.007,
+        mismatch={"mass": 1.3},
+    )
+
+
+def test_every_plant_has_its_equation_here():
+    assert set(smc.plants()) == set(EQUATION)
+
+
+@PLANTS
+@pytest.mark.parametrize("law", sorted(SMOOTH))
+def test_ten_seconds_of_the_closed_loop_follow_the_equation(plant, law):
+    scenario = everything(plant, law)
+    assert (scenario.samples, scenario.physics_step, scenario.integrator) == (10_000, 1e-3, "RK4")
+    x, v = error(smc.run(scenario), oracle(scenario))
+    assert x < 1e-10  # the requirement is 1e-7
+    assert v < 1e-9
+
+
+@PLANTS
+def test_a_delay_that_is_no_multiple_of_the_control_period_is_exact(plant):
+    scenario = dataclasses.replace(
+        everything(plant, "observer_free"), control_period=5e-3, physics_step=1e-3, duration=2.0, jump=None
+    )
+    x, v = error(smc.run(scenario), oracle(scenario))
+    assert x < 1e-10
+    assert v < 1e-9
+
+
+@PLANTS
+def test_a_mass_off_by_a_millionth_is_noticed(plant):
+    scenario = dataclasses.replace(everything(plant, "observer_free"), duration=1.0, jump=None)
+    assert error(smc.run(scenario), oracle(scenario, factor=1 + 1e-6))[0] > 1e-8
+
+
+@PLANTS
+@pytest.mark.parametrize(("integrator", "order"), [("RK4", 4), ("Euler", 1), ("implicitfast", 1), ("implicit", 1)])
+def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, order):
+    scenario = dataclasses.replace(
+        smc.paper.scenario(plant, "observer_free", "sine"),
+        reference=smc.Sine(amplitude=0.1, omega=2.0),
+        duration=2.0,
+        control_period=8e-3,
+        physics_step=8e-3,
+        integrator=integrator,
+    )
+    states = oracle(scenario)
+    steps = (8e-3, 4e-3, 2e-3)
+    errors = [error(smc.run(dataclasses.replace(scenario, physics_step=h)), states)[0] for h in steps]
+    slopes = np.diff(np.log(errors)) / np.diff(np.log(steps))
+    assert np.all(np.abs(slopes - order) < (0.3 if order == 4 else 0.1)), slopes
+
+
+HALF = 0.25  # s
+CONDITIONS = {
+    "nominal": {},
+    "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
+    "sines": {"disturbance": (SINE, smc.Sine(amplitude=1.0, omega=30.0))},
+    "step": {"disturbance": smc.Step(0.2, time=HALF)},
+    "pulse": {"disturbance": smc.Pulse(2.0, time=HALF, width=0.1)},
+    "process_noise": {"disturbance": smc.OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
+    "delay": {"input_delay": 0.02},
+    "light": {"mismatch": {"mass": 0.7}},
+    "differenced": {"velocity": "filtered_difference"},
+    "jump": {},
+}
+
+
+def disturbance(trace, since):
+    """d at each t_k + since, (K, n). What is neither a sine nor process noise is constant within a step here."""
+    rise = np.diff(trace.d, axis=0) * since / trace.scenario.physics_step  # knots at the steps, linear between them
+    d = np.zeros_like(rise)
+    for signal in trace.scenario.disturbance:
+        if isinstance(signal, smc.Sine):
+            d += sine(signal, trace.t[:-1, None] + since)
+        elif isinstance(signal, smc.OrnsteinUhlenbeck):
+            d += trace.d[:-1] + rise
+        else:
+            d += trace.d[:-1]
+    return d
+
+
+@PLANTS
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_every_step_of_every_law_obeys_the_equation(plant, condition):
+    """From each logged state, one step with the logged control ends in the next logged state."""
+    fields = CONDITIONS[condition]
+    if condition == "jump":
+        fields = {"jump": smc.Jump(time=HALF, factors=smc.paper.JUMP_MILD[plant]), "disturbance": SINE}
+    scenarios = [
+        dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in smc.laws()
+    ]
+    for trace in smc.run(scenarios):
+        s = trace.scenario
+        states = np.stack([trace.x, trace.v])
+        for first, last in ((0, s.samples // 2), (s.samples // 2, s.samples)):
+            p = s.plant.values(s.factors(first))
+            part = slice(first, last)
+
+            def slope(since, y, p=p, part=part, trace=trace):
+                force = trace.applied[part] + disturbance(trace, since)[part]
+                return np.stack([y[1], EQUATION[plant](p, y[0], y[1], force)])
+
+            end = integrated(slope, states[:, part], 0.0, s.physics_step)
+            np.testing.assert_allclose(end, states[:, first + 1 : last + 1], rtol=0, atol=1e-10, err_msg=str(s.law))

@@ -1,0 +1,519 @@
+"""A Scenario takes what makes sense and refuses the rest with one sentence that names the field and the value."""
+
+import copy
+import dataclasses
+import math
+import pickle
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+
+NAN, INF = math.nan, math.inf
+TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overflows
+
+
+def scenario(**fields):
+    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 1.0} | fields)
+
+
+def refused(make, *words: str) -> str:
+    """The sentence with which `make` is refused; it holds every word."""
+    with pytest.raises(smc.ScenarioError) as caught:
+        make()
+    message = str(caught.value)
+    assert message
+    assert "\n" not in message
+    assert len(message) < 1000
+    for word in words:
+        assert word in message
+    return message
+
+
+NO_NUMBERS = [
+    True,
+    None,
+    "1",
+    "fast",
+    b"1",
+    [],
+    [1.0],
+    {},
+    (1.0, 2.0),
+    1 + 2j,
+    np.bool_(True),
+    np.array([1.0]),
+    object(),
+]
+
+
+@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay"])
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+def test_a_field_that_is_no_number_is_refused(field, value):
+    refused(lambda: scenario(**{field: value}), field, repr(value))
+
+
+@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None], ids=repr)
+def test_a_physics_step_that_is_no_number_is_refused(value):
+    refused(lambda: scenario(physics_step=value), "physics_step", repr(value))
+
+
+@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "physics_step"])
+@pytest.mark.parametrize("value", [NAN, -INF, -1.0])
+def test_a_field_out_of_its_range_is_refused(field, value):
+    refused(lambda: scenario(**{field: value}), field, f"{value:g}")
+
+
+@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "physics_step"])
+@pytest.mark.parametrize("value", [0, 0.0, -0.0])
+def test_a_field_that_must_be_positive_refuses_zero(field, value):
+    refused(lambda: scenario(**{field: value}), field, "greater than 0")
+
+
+@pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step"])
+def test_infinite_times_are_refused(field):
+    refused(lambda: scenario(**{field: INF}), field, "inf")
+
+
+@pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step", "x0", "v0"])
+def test_a_number_too_large_for_a_float_is_refused(field):
+    refused(lambda: scenario(**{field: 10**400}), field)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"duration": HUGE},
+        {"duration": 1e300, "physics_step": 1e-12},
+        {"control_period": TINY},
+        {"control_period": 1e306, "duration": HUGE},
+        {"physics_step": TINY},
+        {"duration": HUGE, "input_delay": HUGE},
+        {"duration": 1e6, "control_period": 1e-6},
+        {"duration": 1.0, "physics_step": 1e-9},
+        {"plant": smc.plant("pendulum_network", n=1000), "duration": 1e4},
+    ],
+    ids=str,
+)
+def test_absurd_clocks_are_refused_and_not_run(fields):
+    message = refused(lambda: scenario(**fields))
+    assert re.search("duration|control_period|control period|physics_step|input_delay", message)
+
+
+def test_an_infinite_bound_on_the_command_is_fine():
+    assert scenario(u_max=INF).u_max == INF
+
+
+@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=repr)
+@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "x0", "v0"])
+def test_anything_that_is_a_number_is_taken_as_a_float(field, number):
+    value = getattr(scenario(**{field: number}), field)
+    assert value in (0.5, (0.5,))
+    assert type(value[0] if isinstance(value, tuple) else value) is float
+
+
+@pytest.mark.parametrize(
+    ("period", "step", "steps"),
+    [(1e-3, 1e-3, 1), (1e-2, 1e-3, 10), (5e-4, 5e-4, 1), (1.5e-3, 7.5e-4, 2), (1 / 300, 1 / 1200, 4), (0.1, 1e-3, 100)],
+)
+def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond(period, step, steps):
+    made = scenario(control_period=period)
+    assert made.physics_step == pytest.approx(step, rel=1e-12)
+    assert made.steps == steps
+
+
+@pytest.mark.parametrize(
+    ("duration", "period", "samples"),
+    [(1.0, 1e-3, 1000), (0.3, 0.1, 3), (0.35, 0.1, 3), (10.0, 3.0, 3), (1e-3, 1e-3, 1), (0.7, 0.07, 10)],
+)
+def test_a_run_lasts_the_whole_periods_that_fit(duration, period, samples):
+    assert scenario(duration=duration, control_period=period).samples == samples
+
+
+@pytest.mark.parametrize("step", [2e-3, 3e-4, 0.9e-3, 1.0, 1e-3 / 1.5])
+def test_a_physics_step_that_does_not_divide_the_period_is_refused(step):
+    refused(lambda: scenario(physics_step=step), "physics_step", f"{step:g}", "0.001")
+
+
+@pytest.mark.parametrize("count", [1, 3, 7, 1000])
+def test_a_physics_step_that_divides_up_to_rounding_divides_exactly(count):
+    made = scenario(control_period=1e-2, physics_step=1e-2 / count * (1 + 1e-12))
+    assert made.steps == count
+    assert made.physics_step == 1e-2 / count
+
+
+@pytest.mark.parametrize("delay", [1e-4, 1.5e-3, 0.0107])
+def test_a_delay_that_is_no_whole_number_of_steps_is_refused(delay):
+    refused(lambda: scenario(input_delay=delay), "input_delay", f"{delay:g}", "0.001")
+
+
+def test_a_delay_beyond_the_run_is_refused():
+    refused(lambda: scenario(duration=1.0, input_delay=2.0), "input_delay", "2")
+
+
+def test_a_run_shorter_than_a_period_is_refused():
+    refused(lambda: scenario(duration=0.05, control_period=0.1), "duration", "0.05", "0.1")
+
+
+def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused():
+    refused(lambda: scenario(disturbance=smc.OrnsteinUhlenbeck(sigma=0.1, tau=0.1, dt=1e-300)), "dt", "1e-300")
+
+
+@pytest.mark.parametrize("field", ["x0", "v0"])
+@pytest.mark.parametrize(
+    "value",
+    [NAN, INF, -2e6, True, "1", [NAN], [[1.0]], ["a"], [None], object(), b"1", {"a": 1.0}, np.zeros((1, 1))],
+    ids=repr,
+)
+def test_a_state_that_is_no_finite_number_is_refused(field, value):
+    refused(lambda: scenario(**{field: value}), field)
+
+
+@pytest.mark.parametrize("field", ["x0", "v0"])
+@pytest.mark.parametrize("value", [[], (), [1.0, 2.0], np.zeros(4), np.zeros((10, 10))], ids=lambda v: f"{np.shape(v)}")
+def test_a_state_of_the_wrong_length_is_refused(field, value):
+    refused(
+        lambda: scenario(plant=smc.plant("pendulum_network", n=3), **{field: value}),
+        field,
+        f"{len(value)} values",
+        "3 channels",
+    )
+
+
+@pytest.mark.parametrize(
+    "value", [0.5, [0.5], np.array([0.5, 0.5, 0.5]), (0.5,) * 3, [np.float32(0.5)] * 3, np.array(0.5)]
+)
+def test_a_state_is_one_number_or_one_a_channel(value):
+    made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
+    assert made.x0 == made.v0 == (0.5, 0.5, 0.5)
+
+
+def test_by_default_the_plant_starts_at_rest_where_the_paper_puts_it():
+    made = scenario(plant="inverted_pendulum")
+    assert made.x0 == smc.plant("inverted_pendulum").x0
+    assert made.v0 == (0.0,)
+
+
+@pytest.mark.parametrize("n", [2, 5, 12])
+def test_a_network_recycles_the_paper_s_initial_positions(n):
+    first = smc.plant("pendulum_network").x0
+    assert len(first) == 5
+    made = scenario(plant=smc.plant("pendulum_network", n=n))
+    assert made.x0 == tuple(first[i % 5] for i in range(n))
+
+
+@pytest.mark.parametrize(
+    ("make", "wrong", "near"),
+    [
+        (lambda: scenario(plant="dufing"), "dufing", "duffing"),
+        (lambda: scenario(plant="pendulum_netwrok"), "pendulum_netwrok", "pendulum_network"),
+        (lambda: scenario(law="super_twistin"), "super_twistin", "super_twisting"),
+        (lambda: scenario(velocity="measure"), "measure", "measured"),
+        (lambda: scenario(integrator="implicitfst"), "implicitfst", "implicitfast"),
+        (lambda: scenario(mismatch={"alpah": 2.0}), "alpah", "alpha"),
+        (lambda: scenario(jump=smc.Jump(0.5, {"detla": 2.0})), "detla", "delta"),
+        (lambda: smc.law("observer_free", lamb=2.0), "lamb", "lam"),
+        (lambda: smc.plant("duffing", betta=2.0), "betta", "beta"),
+        (lambda: smc.estimator("filtered_difference", taw=2.0), "taw", "tau"),
+    ],
+)
+def test_an_unknown_name_suggests_the_nearest(make, wrong, near):
+    message = refused(make, repr(wrong))
+    assert f"did you mean '{near}'" in message
+
+
+def test_a_name_near_to_none_lists_them_all():
+    message = refused(lambda: scenario(law="zzz"), "'zzz'")
+    assert all(name in message for name in smc.laws())
+
+
+ODD = [None, 5, 1.5, True, [], {}, object(), np.eye(30), np.array(["duffing", "x"]), len]
+
+
+@pytest.mark.parametrize("field", ["plant", "law", "velocity", "integrator"])
+@pytest.mark.parametrize("value", ODD, ids=lambda v: type(v).__name__)
+def test_what_is_no_name_at_all_is_refused(field, value):
+    if field == "velocity" and value is None:
+        pytest.skip("None means measured")
+    refused(lambda: scenario(**{field: value}), field)
+
+
+@pytest.mark.parametrize("find", [smc.plant, smc.law, smc.estimator], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("value", ODD, ids=lambda v: type(v).__name__)
+def test_what_is_no_name_at_all_finds_nothing(find, value):
+    refused(lambda: find(value))
+
+
+def test_a_law_is_no_estimator_and_an_estimator_no_law():
+    refused(lambda: scenario(velocity=smc.law("classical")), "velocity", "classical")
+    refused(lambda: scenario(law=smc.estimator("measured")), "law", "measured")
+
+
+@pytest.mark.parametrize(
+    "value", [5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, object(), np.zeros(3)], ids=str
+)
+def test_a_disturbance_that_is_no_signal_is_refused(value):
+    refused(lambda: scenario(disturbance=value), "disturbance")
+
+
+def test_a_disturbance_is_none_one_or_several():
+    sine = smc.Sine(1.0, 2.0)
+    assert scenario(disturbance=None).disturbance == scenario(disturbance=[]).disturbance == ()
+    assert scenario(disturbance=sine).disturbance == (sine,)
+    assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
+
+
+@pytest.mark.parametrize("value", [None, 0.0, "0", [], [smc.Constant(0.0)] * 2, object()], ids=str)
+def test_a_reference_that_is_not_one_signal_is_refused(value):
+    refused(lambda: scenario(reference=value), "reference")
+
+
+def test_what_is_left_out_or_none_is_quiet():
+    made = scenario(disturbance=None, noise=None, velocity=None, mismatch=None, jump=None, x0=None, v0=None)
+    assert made == scenario()
+    assert made.velocity == smc.estimator("measured")
+
+
+def test_a_reference_that_is_noise_is_refused():
+    refused(lambda: scenario(reference=smc.OrnsteinUhlenbeck(1.0, 1.0)), "reference", "OrnsteinUhlenbeck")
+
+
+SIGNALS = [
+    smc.Constant(1.0),
+    smc.Sine(1.0, 2.0, 3.0),
+    smc.Step(1.0, 2.0),
+    smc.Pulse(1.0, 2.0, 3.0),
+    smc.OrnsteinUhlenbeck(1.0, 2.0, 3.0),
+]
+
+
+@pytest.mark.parametrize("signal", SIGNALS, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400], ids=repr)
+def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, value):
+    for name in signal.parameters():
+        refused(lambda name=name: dataclasses.replace(signal, **{name: value}), type(signal).__name__, name)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda value: smc.Pulse(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.OrnsteinUhlenbeck(1.0, tau=value), "tau"),
+        (lambda value: smc.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
+    ],
+)
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_widths_and_time_constants_are_positive(make, name, value):
+    refused(lambda: make(value), name, f"{value:g}")
+
+
+def test_the_spread_of_process_noise_is_not_negative():
+    refused(lambda: smc.OrnsteinUhlenbeck(-0.1, 1.0), "sigma", "-0.1")
+
+
+@pytest.mark.parametrize("field", ["position", "velocity"])
+@pytest.mark.parametrize("value", [NAN, INF, -0.1, None, "1", True, np.zeros(2)], ids=repr)
+def test_measurement_noise_is_a_finite_number_not_negative(field, value):
+    refused(lambda: smc.Noise(**{field: value}), "Noise", field)
+
+
+@pytest.mark.parametrize("value", [0.1, "loud", smc.Constant(0.1), np.eye(30)], ids=lambda v: type(v).__name__)
+def test_a_noise_that_is_no_noise_is_refused(value):
+    refused(lambda: scenario(noise=value), "noise")
+
+
+@pytest.mark.parametrize("value", [1.3, "M", ["M"], [("M", 1.3)], np.eye(30)], ids=lambda v: type(v).__name__)
+def test_a_mismatch_that_is_no_mapping_is_refused(value):
+    refused(lambda: scenario(mismatch=value), "mismatch")
+    refused(lambda: smc.Jump(0.5, value), "Jump")
+
+
+@pytest.mark.parametrize("value", [NAN, INF, None, "2", True, [2.0]], ids=repr)
+def test_a_factor_must_be_a_finite_number(value):
+    refused(lambda: scenario(mismatch={"alpha": value}), "mismatch", "alpha")
+    refused(lambda: smc.Jump(0.5, {"alpha": value}), "Jump", "alpha")
+
+
+@pytest.mark.parametrize("name", ["mass", "M"])
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_plant_keeps_a_positive_mass(name, value):
+    refused(lambda: scenario(mismatch={name: value}), name, f"{value:g}")
+    refused(lambda: scenario(jump=smc.Jump(0.5, {name: value})), name, f"{value:g}")
+
+
+def test_mass_means_the_plant_s_mass():
+    assert vars(smc.plant("duffing").values({"mass": 2.0}))["M"] == 2.0
+    assert vars(smc.plant("pendulum_network").values({"mass": 2.0}))["m"] == 1.0
+
+
+@pytest.mark.parametrize("time", [1.0, 1.5, 1e300])
+def test_a_jump_after_the_end_is_refused(time):
+    refused(lambda: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
+
+
+@pytest.mark.parametrize("time", [NAN, INF, -0.1, None, "1", True], ids=repr)
+def test_a_jump_s_time_is_a_finite_number_not_negative(time):
+    refused(lambda: smc.Jump(time, {"M": 2.0}), "Jump", "time")
+
+
+@pytest.mark.parametrize("value", [0.5, {"M": 2.0}, (0.5, {"M": 2.0}), "now"], ids=str)
+def test_a_jump_that_is_no_jump_is_refused(value):
+    refused(lambda: scenario(jump=value), "jump")
+
+
+@pytest.mark.parametrize("seed", [-1, 2**53, 1.0, True, None, "1", NAN, [1]], ids=repr)
+def test_a_seed_is_a_whole_number_that_a_float_holds(seed):
+    refused(lambda: scenario(seed=seed), "seed", repr(seed))
+
+
+@pytest.mark.parametrize("seed", [0, 2**53 - 1])
+def test_the_extreme_seeds_are_fine(seed):
+    assert scenario(seed=seed).seed == seed
+
+
+def test_a_seed_may_come_from_numpy():
+    assert [scenario(seed=seed).seed for seed in np.arange(3)] == [0, 1, 2]
+    assert type(scenario(seed=np.int64(3)).seed) is int
+
+
+@pytest.mark.parametrize("n", [1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])], ids=repr)
+def test_a_network_s_size_is_a_whole_number_in_its_range(n):
+    refused(lambda: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
+
+
+@pytest.mark.parametrize("n", [2, 1000, 3.0, np.int64(7)], ids=repr)
+def test_a_network_takes_every_size_in_its_range(n):
+    made = smc.plant("pendulum_network", n=n)
+    assert made.n == n
+    assert type(made.n) is int
+    assert len(made.x0) == n
+
+
+def test_a_single_plant_takes_no_size():
+    refused(lambda: smc.plant("duffing", n=2), "duffing", "2")
+
+
+@pytest.mark.parametrize("plant", smc.plants())
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0]], ids=repr)
+def test_every_parameter_of_every_plant_must_be_a_finite_number(plant, value):
+    for name in smc.plant(plant).parameters:
+        refused(lambda name=name: smc.plant(plant, **{name: value}), plant, name)
+
+
+@pytest.mark.parametrize("law", smc.laws())
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], 10**400], ids=repr)
+def test_every_gain_of_every_law_must_be_a_finite_number(law, value):
+    for name in smc.law(law).gains:
+        refused(lambda name=name: smc.law(law, **{name: value}), law, name)
+
+
+def test_gains_that_must_be_positive_are():
+    refused(lambda: smc.law("boundary_layer", phi=0.0), "phi", "0")
+    refused(lambda: smc.law("observer_free", lam=-1.0), "lam", "-1")
+
+
+@pytest.mark.parametrize("memory", [0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]], ids=repr)
+def test_a_law_s_memory_is_a_whole_number_of_floats(memory):
+    refused(lambda: smc.law_function(memory=memory), "memory")
+
+
+@pytest.mark.parametrize("name", ["1k", "k 1", "_k", "", "lambda", "class", 5], ids=repr)
+def test_a_gain_s_name_can_be_written_after_a_dot(name):
+    refused(lambda: smc.law_function(gains={name: 1.0}), "gain", repr(name))
+
+
+@pytest.mark.parametrize("gains", [["k"], "k", 5, {"k": "1"}, {"k": NAN}], ids=repr)
+def test_gains_are_names_with_finite_defaults(gains):
+    refused(lambda: smc.law_function(gains=gains), "gain")
+
+
+def test_a_positive_gain_is_one_of_the_gains():
+    refused(lambda: smc.law_function(gains={"lam": 1.0}, positive=("lamb",)), "lamb", "lam")
+
+
+def test_a_law_is_checked_even_when_it_was_put_together_by_hand():
+    gains = {"k": NAN, "c": 1.0}
+    refused(lambda: scenario(law=dataclasses.replace(smc.law("classical"), gains=gains)), "k", "nan")
+
+
+def full():
+    return scenario(
+        plant=smc.plant("pendulum_network", n=3, m=0.4),
+        law=smc.law("super_twisting", k1=1.0),
+        velocity=smc.estimator("filtered_difference", tau=1e-2),
+        control_period=2e-3,
+        reference=smc.Sine(0.1, 2.0),
+        disturbance=[smc.OrnsteinUhlenbeck(0.1, 0.1), smc.Pulse(1.0, 0.1, 0.2), smc.Step(1.0, 0.5)],
+        noise=smc.Noise(0.01, 0.05),
+        input_delay=3e-3,
+        mismatch={"mass": 1.3},
+        jump=smc.Jump(0.5, {"kc": 2.0}),
+        seed=7,
+        integrator="Euler",
+        u_max=INF,
+    )
+
+
+def test_scenarios_made_alike_are_equal():
+    assert full() == full()
+    assert scenario() == scenario(plant=smc.plant("duffing"), law=smc.law("classical"), velocity="measured")
+    assert scenario(x0=1.5, v0=[0.0]) == scenario()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 8},
+        {"law": smc.law("super_twisting", k1=1.1)},
+        {"plant": smc.plant("pendulum_network", n=3)},
+        {"jump": smc.Jump(0.5, {"kc": 2.1})},
+        {"mismatch": {}},
+        {"disturbance": ()},
+        {"noise": None},
+        {"reference": smc.Sine(0.1, 2.1)},
+        {"velocity": "measured"},
+    ],
+    ids=str,
+)
+def test_scenarios_that_differ_in_one_field_are_not_equal(change):
+    assert dataclasses.replace(full(), **change) != full()
+
+
+def test_a_scenario_does_not_change():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scenario().seed = 1  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_the_dictionary_it_was_made_from_may_change():
+    factors = {"M": 2.0}
+    made = scenario(mismatch=factors)
+    factors["M"] = NAN
+    assert made.mismatch == {"M": 2.0}
+
+
+THINGS = [full(), *SIGNALS, smc.Noise(0.1), smc.Jump(0.5, {"M": 2.0}), smc.estimator("measured")]
+THINGS += [smc.plant(name) for name in smc.plants()] + [smc.law(name) for name in smc.laws()]
+
+
+@pytest.mark.parametrize("thing", THINGS, ids=lambda thing: f"{type(thing).__name__}-{getattr(thing, 'name', '')}")
+def test_plain_data_survives_a_pickle_and_a_copy(thing):
+    assert pickle.loads(pickle.dumps(thing)) == thing
+    assert copy.deepcopy(thing) == thing
+
+
+def test_a_variant_differs_in_what_was_replaced_and_nothing_else():
+    variant = dataclasses.replace(full(), seed=8)
+    assert variant.seed == 8
+    assert dataclasses.replace(variant, seed=7) == full()
+
+
+def test_a_variant_is_checked_like_any_other():
+    refused(lambda: dataclasses.replace(scenario(), duration=-1.0), "duration")
+
+
+def test_a_scenario_shows_its_fields():
+    assert "duffing" in repr(scenario())
+    assert "classical" in repr(scenario())
