@@ -11,7 +11,7 @@ import smc_mujoco as smc
 
 scene = smc.Scene(
     title="Duffing oscillator",
-    conditions={"nominal": smc.paper.comparison("duffing")},
+    conditions={"nominal": smc.paper.comparison("duffing", duration=6.0)},
 )
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import smc_mujoco as smc
 
 scene = smc.Scene(
     title="Inverted pendulum",
-    conditions={"nominal": smc.paper.comparison("inverted_pendulum")},
+    conditions={"nominal": smc.paper.comparison("inverted_pendulum", duration=3.0)},
 )
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ import smc_mujoco as smc
 scene = smc.Scene(
     title="Five coupled pendulums",
     conditions={
-        "hanging": smc.paper.comparison("pendulum_network"),
-        "inverted": smc.paper.comparison("inverted_pendulum_network"),
+        "hanging": smc.paper.comparison("pendulum_network", duration=4.0),
+        "inverted": smc.paper.comparison("inverted_pendulum_network", duration=4.0),
     },
 )
 

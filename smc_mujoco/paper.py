@@ -9,7 +9,7 @@ bound, and the plants' parameters stand in their files.
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from smc_mujoco.errors import unknown
 from smc_mujoco.estimators import estimator
@@ -110,7 +110,9 @@ CONDITIONS: dict[str, dict | Callable[[str], dict]] = {
 }
 
 
-def scenario(plant: str, law_name: str, condition: str = "nominal", seed: int = 0) -> Scenario:
+def scenario(
+    plant: str, law_name: str, condition: str = "nominal", seed: int = 0, duration: float = DURATION
+) -> Scenario:
     """The scenario of one plant under one law in one condition.
 
     Raises:
@@ -122,7 +124,7 @@ def scenario(plant: str, law_name: str, condition: str = "nominal", seed: int = 
     if law_name not in (gains := GAINS[plant] | {"none": {}}):
         raise unknown("law of the paper's study", law_name, gains)
     fields = CONDITIONS[condition]
-    common = {"duration": DURATION, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
+    common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
     return Scenario(
         plant=plant,
         law=law(law_name, **gains[law_name]),
@@ -131,7 +133,7 @@ def scenario(plant: str, law_name: str, condition: str = "nominal", seed: int = 
 
 
 def comparison(
-    plant: str, condition: str = "nominal", laws: tuple[str, ...] = LAWS, seed: int = 0
+    plant: str, condition: str = "nominal", laws: Sequence[str] = LAWS, seed: int = 0, duration: float = DURATION
 ) -> dict[str, Scenario]:
     """Law name -> scenario: one plant in one condition under several laws."""
-    return {name: scenario(plant, name, condition, seed) for name in laws}
+    return {name: scenario(plant, name, condition, seed, duration) for name in laws}

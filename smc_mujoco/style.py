@@ -132,3 +132,9 @@ def plant_name(trace: Trace) -> str:
 def rgb(colour: str) -> tuple[int, int, int]:
     """#RRGGBB as three numbers, 0 .. 255."""
     return tuple(bytes.fromhex(colour[1:]))  # pyright: ignore[reportReturnType]
+
+
+def letters_on(colour: str) -> str:
+    """White or ink, whichever reads better on a colour (luma of ITU-R BT.601)."""
+    red, green, blue = rgb(colour)
+    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 140 else PAPER

@@ -1,30 +1,30 @@
 """Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
 
-Control and disturbance are arrows at the machine: the mean over the frame, and behind the control's a bar for its range,
-so that a control which switches faster than the film shows how far it swings.
+stage.py has the scene, arrows.py what acts on it, caption.py the words, charts.py the charts. Pictures are made and
+written one by one: a film's length costs time but no memory.
 """
 
 import contextlib
-import functools
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 
-from smc_mujoco import caption, gl, panels, style
+from smc_mujoco import arrows, gl, style
+from smc_mujoco.caption import Caption
 from smc_mujoco.charts import Charts
-from smc_mujoco.envelope import Envelope, samples, windows
+from smc_mujoco.envelope import samples
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
-from smc_mujoco.stage import SHOWN, Arrow, Room, Stage
+from smc_mujoco.stage import Stage
 from smc_mujoco.trace import Trace
 
-FPS = 30.0
 MOST = 8  # machines: more are too small to tell apart
-WIDE = 1280  # px, the width that sizes of letters are stated for
-SHARE = 0.36  # of the height, for the charts
+LEAST, LARGEST = (320, 180), (1920, 1080)  # px
+FULL = 1280  # px, the width for which sizes of letters are stated
+CHARTS = 0.36  # of the height
 CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
 Report = Callable[[int], None]
 
@@ -145,131 +145,34 @@ def frames(
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
     if len(traces) > MOST:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MOST}")
-    if any(
-        side % 2 or not low <= side <= high
-        for side, low, high in zip(size, (320, 180), (1920, 1080), strict=True)
-    ):
-        raise ScenarioError(f"size is {size}: give even numbers from (320, 180) to (1920, 1080)")
+    if any(side % 2 or not low <= side <= high for side, low, high in zip(size, LEAST, LARGEST, strict=True)):
+        raise ScenarioError(f"a film of {size} px: give two even numbers from {LEAST} to {LARGEST}")
     if why := gl.missing():
         raise ScenarioError(why)
-    scale = (size[0] / WIDE) ** 0.6  # letters shrink less than pictures
-    below = 2 * round(SHARE * size[1] / 2)
-    stage_size = size[0], size[1] - below
-    gap = 1.0 / 30 if len(times) < 2 else times[1] - times[0]
-    acts = [acting(trace, times, gap) for trace in traces]
-    longest = strongest(traces, "applied"), strongest(traces, "d")
-    words = Words(traces, names, colours, title, stage_size, scale, longest)
+    scale = (size[0] / FULL) ** 0.6  # letters shrink less than pictures
+    below = 2 * round(CHARTS * size[1] / 2)
+    above = size[0], size[1] - below
+    gap = times[1] - times[0] if len(times) > 1 else 1 / 30
+    longest = arrows.longest(traces)
+    acts = [arrows.acts(trace, times, gap) for trace in traces]
+    caption = Caption(traces, names, colours, title, above, scale, longest)
     charts = Charts(traces, colours, (size[0], below), scale)
-    with Stage(traces, colours, stage_size, words.room) as stage:
-        words.put(stage.boxes)
+    with Stage(traces, colours, above, caption.room) as stage:
+        caption.put(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        for f, time in enumerate(times):
-            failed = tuple(t.diverged_at is not None and time >= t.diverged_at for t in traces)
-            arrows = []
-            for k, (control, disturbance) in enumerate(acts):
-                stage.pose(k, places[k][f])
-                stage.paint(k, style.FAILED if failed[k] else colours[k])
-                if not failed[k]:
-                    arrows += pushes(k, stage.shown[k], f, control, disturbance, longest, colours[k])
-            top = words.over(stage.render(arrows), float(time), failed)
-            yield np.concatenate([top, charts.at(float(time))])
-
-
-def strongest(traces: Sequence[Trace], name: str) -> float:
-    """The largest control or disturbance of the runs that lasted; where none did, of all but their ends."""
-    return max(map(abs, panels.span(traces, name)))
+        for frame, time in enumerate(times.tolist()):
+            failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
+            drawn = []
+            for k, colour in enumerate(colours):
+                stage.pose(k, places[k][frame])
+                stage.paint(k, style.FAILED if failed[k] else colour)
+                for i in range(0 if failed[k] else stage.shown[k]):
+                    drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
+            picture = caption.over(stage.render(drawn), time, failed)
+            yield np.concatenate([picture, charts.at(time)])
 
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
     """x at the times, (times, n), between samples on a straight line; after a failure the last finite one."""
     n = samples(trace)
     return np.stack([np.interp(times, trace.t[:n], x) for x in trace.x[:n].T], axis=1)
-
-
-def acting(trace: Trace, times: np.ndarray, gap: float) -> tuple[Envelope, Envelope]:
-    """Control as the actuator gets it, and disturbance, over the `gap` seconds before each time."""
-    n, edges = samples(trace), np.concatenate([[times[0] - gap], times])
-    return windows(trace.t[:n], trace.applied[:n], edges), windows(trace.t[:n], trace.d[:n], edges)
-
-
-def pushes(
-    k: int,
-    shown: int,
-    f: int,
-    control: Envelope,
-    disturbance: Envelope,
-    longest: tuple[float, float],
-    colour: str,
-) -> list[Arrow]:
-    """The arrows of machine k in frame f."""
-    law = tuple(c / 255 for c in style.rgb(colour))
-    grey = tuple(c / 255 for c in style.rgb(style.DISTURBANCE))
-    arrows = []
-    for i in range(shown):
-        low, mean, high = (
-            float(part[f, i]) / (longest[0] or 1.0) for part in (control.low, control.mean, control.high)
-        )
-        arrows.append(Arrow(k, i, 0.0, mean, (*law, 1.0), 0))
-        if high - low > 0.1:
-            arrows.append(Arrow(k, i, low, high, (*law, 0.4), 0, head=False))
-        if longest[1] > 0.0:
-            arrows.append(Arrow(k, i, 0.0, float(disturbance.mean[f, i]) / longest[1], (*grey, 1.0), 1, 0.65))
-    return arrows
-
-
-class Words:
-    """All that is written over the stage; `room` is what it leaves to the machines."""
-
-    def __init__(self, traces, names, colours, title, size, scale, longest):
-        self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
-        self.title = title or style.plant_name(traces[0])
-        unit = style.units(traces[0])["u"]
-        self.key = f"coloured arrow: control, longest {longest[0]:.2g} {unit}"
-        if longest[1] > 0.0:
-            self.key += f"     dark arrow: disturbance, longest {longest[1]:.2g} {unit}"
-        hidden = [t.scenario.plant.n for t in traces if t.scenario.plant.n > SHOWN]
-        if hidden:
-            self.key += f"     the first {SHOWN} of {max(hidden)} pendulums"
-        x, y, _ = traces[0].scenario.plant.lane
-        side, below = 40 * scale, 52 * scale
-        if abs(y) > abs(x):  # behind each other: the labels stand at the left
-            side, below = (
-                max(caption.pill_size(text, 15 * scale)[0] for text in self.texts()) + 30 * scale,
-                20 * scale,
-            )
-        self.room = Room(side, 84 * scale, size[0] - 40 * scale, size[1] - below)
-
-    def texts(self, failed: Sequence[bool] = ()) -> list[str]:
-        """The labels; of machines that failed, or of all that will when `failed` is not given, with the time."""
-        failed = failed or [True] * len(self.traces)
-        return [
-            f"{name}: diverged at {t.diverged_at:.2f} s" if gone and t.diverged_at is not None else name
-            for name, t, gone in zip(self.names, self.traces, failed, strict=True)
-        ]
-
-    def put(self, boxes: np.ndarray) -> None:
-        """Find the labels' places, with the longest texts that they will have."""
-        self.centres = caption.place(boxes, self.texts(), 15 * self.scale, self.size)
-
-    @functools.lru_cache(maxsize=2)  # noqa: B019  # one film long
-    def sheet(self, failed: tuple[bool, ...]) -> Image.Image:
-        """Everything but the clock."""
-        sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
-        draw, s = ImageDraw.Draw(sheet), self.scale
-        draw.text((24 * s, 16 * s), self.title, fill=style.INK, font=caption.font(24 * s, bold=True))
-        draw.text((25 * s, 48 * s), self.key, fill=style.MUTED, font=caption.font(13 * s))
-        for text, colour, centre, gone in zip(
-            self.texts(failed), self.colours, self.centres, failed, strict=True
-        ):
-            caption.draw_pill(draw, caption.Pill(text, style.FAILED if gone else colour, centre), 15 * s)
-        return sheet
-
-    def over(self, picture: np.ndarray, time: float, failed: tuple[bool, ...]) -> np.ndarray:
-        """The picture with the words on it."""
-        image, sheet, s = Image.fromarray(picture), self.sheet(failed), self.scale
-        image.paste(sheet, mask=sheet)
-        where = self.size[0] - 24 * s, 16 * s
-        ImageDraw.Draw(image).text(
-            where, f"{time:.2f} s", style.INK, caption.font(24 * s, bold=True), anchor="ra"
-        )
-        return np.asarray(image)

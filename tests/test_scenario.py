@@ -20,6 +20,11 @@ def scenario(**fields):
     return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 1.0} | fields)
 
 
+def brief(value) -> str:
+    """A test's name for a value."""
+    return repr(value)[:20]
+
+
 def refused(make, *words: str) -> str:
     """The sentence with which `make` is refused; it holds every word."""
     with pytest.raises(smc.ScenarioError) as caught:
@@ -46,17 +51,17 @@ NO_NUMBERS = [
     1 + 2j,
     np.bool_(True),
     np.array([1.0]),
-    object(),
+    ...,
 ]
 
 
 @pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay"])
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=brief)
 def test_a_field_that_is_no_number_is_refused(field, value):
     refused(lambda: scenario(**{field: value}), field, repr(value))
 
 
-@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None], ids=repr)
+@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None], ids=brief)
 def test_a_physics_step_that_is_no_number_is_refused(value):
     refused(lambda: scenario(physics_step=value), "physics_step", repr(value))
 
@@ -107,7 +112,7 @@ def test_an_infinite_bound_on_the_command_is_fine():
     assert scenario(u_max=INF).u_max == INF
 
 
-@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=repr)
+@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=brief)
 @pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "x0", "v0"])
 def test_anything_that_is_a_number_is_taken_as_a_float(field, number):
     value = getattr(scenario(**{field: number}), field)
@@ -165,8 +170,8 @@ def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused():
 @pytest.mark.parametrize("field", ["x0", "v0"])
 @pytest.mark.parametrize(
     "value",
-    [NAN, INF, -2e6, True, "1", [NAN], [[1.0]], ["a"], [None], object(), b"1", {"a": 1.0}, np.zeros((1, 1))],
-    ids=repr,
+    [NAN, INF, -2e6, True, "1", [NAN], [[1.0]], ["a"], [None], ..., b"1", {"a": 1.0}, np.zeros((1, 1))],
+    ids=brief,
 )
 def test_a_state_that_is_no_finite_number_is_refused(field, value):
     refused(lambda: scenario(**{field: value}), field)
@@ -230,7 +235,7 @@ def test_a_name_near_to_none_lists_them_all():
     assert all(name in message for name in smc.laws())
 
 
-ODD = [None, 5, 1.5, True, [], {}, object(), np.eye(30), np.array(["duffing", "x"]), len]
+ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), len]
 
 
 @pytest.mark.parametrize("field", ["plant", "law", "velocity", "integrator"])
@@ -252,9 +257,7 @@ def test_a_law_is_no_estimator_and_an_estimator_no_law():
     refused(lambda: scenario(law=smc.estimator("measured")), "law", "measured")
 
 
-@pytest.mark.parametrize(
-    "value", [5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, object(), np.zeros(3)], ids=str
-)
+@pytest.mark.parametrize("value", [5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, ..., np.zeros(3)], ids=str)
 def test_a_disturbance_that_is_no_signal_is_refused(value):
     refused(lambda: scenario(disturbance=value), "disturbance")
 
@@ -266,7 +269,7 @@ def test_a_disturbance_is_none_one_or_several():
     assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
 
 
-@pytest.mark.parametrize("value", [None, 0.0, "0", [], [smc.Constant(0.0)] * 2, object()], ids=str)
+@pytest.mark.parametrize("value", [None, 0.0, "0", [], [smc.Constant(0.0)] * 2, ...], ids=str)
 def test_a_reference_that_is_not_one_signal_is_refused(value):
     refused(lambda: scenario(reference=value), "reference")
 
@@ -291,7 +294,7 @@ SIGNALS = [
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda s: type(s).__name__)
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400], ids=repr)
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400], ids=brief)
 def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, value):
     for name in signal.parameters():
         refused(lambda name=name: dataclasses.replace(signal, **{name: value}), type(signal).__name__, name)
@@ -315,7 +318,7 @@ def test_the_spread_of_process_noise_is_not_negative():
 
 
 @pytest.mark.parametrize("field", ["position", "velocity"])
-@pytest.mark.parametrize("value", [NAN, INF, -0.1, None, "1", True, np.zeros(2)], ids=repr)
+@pytest.mark.parametrize("value", [NAN, INF, -0.1, None, "1", True, np.zeros(2)], ids=brief)
 def test_measurement_noise_is_a_finite_number_not_negative(field, value):
     refused(lambda: smc.Noise(**{field: value}), "Noise", field)
 
@@ -331,7 +334,7 @@ def test_a_mismatch_that_is_no_mapping_is_refused(value):
     refused(lambda: smc.Jump(0.5, value), "Jump")
 
 
-@pytest.mark.parametrize("value", [NAN, INF, None, "2", True, [2.0]], ids=repr)
+@pytest.mark.parametrize("value", [NAN, INF, None, "2", True, [2.0]], ids=brief)
 def test_a_factor_must_be_a_finite_number(value):
     refused(lambda: scenario(mismatch={"alpha": value}), "mismatch", "alpha")
     refused(lambda: smc.Jump(0.5, {"alpha": value}), "Jump", "alpha")
@@ -354,7 +357,7 @@ def test_a_jump_after_the_end_is_refused(time):
     refused(lambda: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
 
 
-@pytest.mark.parametrize("time", [NAN, INF, -0.1, None, "1", True], ids=repr)
+@pytest.mark.parametrize("time", [NAN, INF, -0.1, None, "1", True], ids=brief)
 def test_a_jump_s_time_is_a_finite_number_not_negative(time):
     refused(lambda: smc.Jump(time, {"M": 2.0}), "Jump", "time")
 
@@ -364,7 +367,7 @@ def test_a_jump_that_is_no_jump_is_refused(value):
     refused(lambda: scenario(jump=value), "jump")
 
 
-@pytest.mark.parametrize("seed", [-1, 2**53, 1.0, True, None, "1", NAN, [1]], ids=repr)
+@pytest.mark.parametrize("seed", [-1, 2**53, 1.0, True, None, "1", NAN, [1]], ids=brief)
 def test_a_seed_is_a_whole_number_that_a_float_holds(seed):
     refused(lambda: scenario(seed=seed), "seed", repr(seed))
 
@@ -379,12 +382,12 @@ def test_a_seed_may_come_from_numpy():
     assert type(scenario(seed=np.int64(3)).seed) is int
 
 
-@pytest.mark.parametrize("n", [1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])], ids=repr)
+@pytest.mark.parametrize("n", [1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])], ids=brief)
 def test_a_network_s_size_is_a_whole_number_in_its_range(n):
     refused(lambda: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
 
 
-@pytest.mark.parametrize("n", [2, 1000, 3.0, np.int64(7)], ids=repr)
+@pytest.mark.parametrize("n", [2, 1000, 3.0, np.int64(7)], ids=brief)
 def test_a_network_takes_every_size_in_its_range(n):
     made = smc.plant("pendulum_network", n=n)
     assert made.n == n
@@ -397,14 +400,14 @@ def test_a_single_plant_takes_no_size():
 
 
 @pytest.mark.parametrize("plant", smc.plants())
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0]], ids=repr)
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0]], ids=brief)
 def test_every_parameter_of_every_plant_must_be_a_finite_number(plant, value):
     for name in smc.plant(plant).parameters:
         refused(lambda name=name: smc.plant(plant, **{name: value}), plant, name)
 
 
 @pytest.mark.parametrize("law", smc.laws())
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], 10**400], ids=repr)
+@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], 10**400], ids=brief)
 def test_every_gain_of_every_law_must_be_a_finite_number(law, value):
     for name in smc.law(law).gains:
         refused(lambda name=name: smc.law(law, **{name: value}), law, name)
@@ -415,17 +418,17 @@ def test_gains_that_must_be_positive_are():
     refused(lambda: smc.law("observer_free", lam=-1.0), "lam", "-1")
 
 
-@pytest.mark.parametrize("memory", [0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]], ids=repr)
+@pytest.mark.parametrize("memory", [0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]], ids=brief)
 def test_a_law_s_memory_is_a_whole_number_of_floats(memory):
     refused(lambda: smc.law_function(memory=memory), "memory")
 
 
-@pytest.mark.parametrize("name", ["1k", "k 1", "_k", "", "lambda", "class", 5], ids=repr)
+@pytest.mark.parametrize("name", ["1k", "k 1", "_k", "", "lambda", "class", 5], ids=brief)
 def test_a_gain_s_name_can_be_written_after_a_dot(name):
     refused(lambda: smc.law_function(gains={name: 1.0}), "gain", repr(name))
 
 
-@pytest.mark.parametrize("gains", [["k"], "k", 5, {"k": "1"}, {"k": NAN}], ids=repr)
+@pytest.mark.parametrize("gains", [["k"], "k", 5, {"k": "1"}, {"k": NAN}], ids=brief)
 def test_gains_are_names_with_finite_defaults(gains):
     refused(lambda: smc.law_function(gains=gains), "gain")
 

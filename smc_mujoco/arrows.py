@@ -1,0 +1,107 @@
+"""Arrows in the scene: what the control and the disturbance do to each moving body.
+
+The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which switches
+faster than the film still shows how far it swings. Along a pendulum's arc beyond the bob, along the rail above a cart.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco import panels, style
+from smc_mujoco.envelope import Envelope, samples, windows
+from smc_mujoco.trace import Trace
+
+HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the rail's
+LEAST = 0.02  # of the longest: shorter ones are not drawn
+SLENDER = 0.16  # thickest shaft, of the arrow's length
+BAR = 0.1  # of the longest: the least range that gets a bar
+
+
+class Arrow(NamedTuple):
+    """An arrow at a joint, from `low` to `high` of the longest (-1 .. 1)."""
+
+    low: float
+    high: float
+    rgba: tuple[float, float, float, float]
+    layer: int = 0  # further from the body
+    size: float = 1.0
+    head: bool = True
+
+
+class Acts(NamedTuple):
+    """What acts on one machine, frame by frame: as the actuator gives it, and as the world does."""
+
+    control: Envelope
+    disturbance: Envelope
+
+
+def acts(trace: Trace, times: np.ndarray, gap: float) -> Acts:
+    """Ranges and means over the `gap` seconds before each time."""
+    n, edges = samples(trace), np.concatenate([[times[0] - gap], times])
+    return Acts(*(windows(trace.t[:n], y[:n], edges) for y in (trace.applied, trace.d)))
+
+
+class Longest(NamedTuple):
+    """What the longest arrows stand for, N or N m: the largest control and disturbance of the runs that lasted."""
+
+    control: float
+    disturbance: float
+
+
+def longest(traces: Sequence[Trace]) -> Longest:
+    """The scale of the arrows of these traces."""
+    return Longest(*(max(map(abs, panels.span(traces, name))) for name in ("applied", "d")))
+
+
+def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) -> list[Arrow]:
+    """The arrows of one channel in one frame."""
+    law, grey = (tuple(c / 255 for c in style.rgb(name)) for name in (colour, style.DISTURBANCE))
+    drawn = []
+    if scale.control:
+        low, mean, high = (float(part[frame, channel]) / scale.control for part in acts.control[1:])
+        drawn.append(Arrow(0.0, mean, (*law, 1.0)))
+        if high - low > BAR:
+            drawn.append(Arrow(low, high, (*law, 0.4), head=False))
+    if scale.disturbance:
+        mean = float(acts.disturbance.mean[frame, channel]) / scale.disturbance
+        drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=1, size=0.65))
+    return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > LEAST]
+
+
+def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joint: int, rail: float, arrow: Arrow):
+    """Add an arrow to a scene that holds the machines already.
+
+    Args:
+      rail: length of the rail, m, if the joint is a slide.
+    """
+    if scene.ngeom >= scene.maxgeom:
+        return
+    body = handle(model, model.jnt_bodyid[joint])
+    place, radius = data.geom_xpos[body], model.geom_rbound[body]
+    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+        arm = place - data.xanchor[joint]
+        reach, width, out = HINGE * np.linalg.norm(arm), 0.16 * radius + 0.012, arm / np.linalg.norm(arm)
+        along, start = np.cross(data.xaxis[joint], out), radius + 1.6 * width
+    else:
+        reach, width, out = SLIDE * rail, 0.035, np.array([0.0, 0.0, 1.0])
+        along, start = data.xaxis[joint], model.geom_size[body, 2] + 2.2 * width
+    foot = place + (start + 2.6 * width * arrow.layer) * out
+    low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
+    width = min(arrow.size * width, SLENDER * (abs(high - low) + 0.05))
+
+    kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
+    geom, zero = scene.geoms[scene.ngeom], np.zeros(3)
+    mujoco.mjv_initGeom(geom, kind, zero, zero, np.zeros(9), np.array(arrow.rgba, np.float32))
+    mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + high * along)
+    geom.specular = 0.0
+    scene.ngeom += 1
+
+
+def handle(model: mujoco.MjModel, body: int) -> int:
+    """The geom of a moving body that carries its arrows: the first in the accent's material, else the first."""
+    geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    named = (g for g in geoms if model.geom_matid[g] >= 0)
+    return next((g for g in named if model.mat(model.geom_matid[g]).name.endswith("accent")), geoms[0])

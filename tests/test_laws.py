@@ -1,0 +1,312 @@
+"""Each law is held to what is proved of it, mostly on plant A: s' = u + d, u held between samples.
+
+Plant A is integrated without error, for the integral of d is given in closed form. Properties that every law must have
+walk the catalogue.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import smc_mujoco as smc
+from smc_mujoco import plain
+from smc_mujoco.law import Measurement, catalogue
+
+LAWS = pytest.mark.parametrize("name", smc.laws())
+ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])
+
+
+def measured(e=0.0, de=0.0, dt=1e-3, f=0.0, g=1.0):
+    """What a law sees with the reference at 0."""
+    return Measurement(t=0.0, dt=dt, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=f, g=g)
+
+
+@dataclasses.dataclass(frozen=True)
+class Sampled:
+    """A run of plant A: t, s, u and the first memory cell before each sample, (K,) each."""
+
+    t: np.ndarray
+    s: np.ndarray
+    u: np.ndarray
+    memory: np.ndarray
+
+    def residual(self):
+        """Largest |s| in the last 20 % of the run."""
+        return np.abs(self.s[-len(self.s) // 5 :]).max()
+
+
+def plant_a(law, integral=lambda t: 0.0, s=1.0, h=1e-3, duration=10.0, sign=1.0, noise=None):
+    """s' = sign u + d with d given by its integral; noise (K,) is added to the s that the law sees."""
+    count = round(duration / h)
+    memory, gains = np.zeros(law.memory), plain.named(law)
+    log = np.empty((3, count))
+    for k in range(count):
+        seen = s + (0.0 if noise is None else noise[k])
+        remembered = memory[0]
+        u, _ = law.function(measured(de=seen, dt=h), gains, memory)
+        log[:, k] = s, u, remembered
+        s += sign * h * u + integral((k + 1) * h) - integral(k * h)
+    return Sampled(np.arange(count) * h, *log)
+
+
+def wave(t):
+    """The integral of d = sin t + 0.5, |d| <= 1.5, |d'| <= 1."""
+    return -math.cos(t) + 0.5 * t
+
+
+@pytest.mark.parametrize("against", [0.0, 0.5, 1.5])
+def test_classical_reaches_in_the_time_that_the_gain_leaves(against):
+    """|s|' = -(k - D) where a constant disturbance D pushes away: reached at |s0| / (k - D)."""
+    run = plant_a(smc.law("classical", k=2.0), lambda t: against * t, s=1.0)
+    reached = run.t[np.argmax(np.abs(run.s) <= 1e-3 * (2.0 + against))]
+    assert reached == pytest.approx(1.0 / (2.0 - against), abs=0.01)
+
+
+def test_classical_fails_below_the_disturbance_and_holds_above_it():
+    held = plant_a(smc.law("classical", k=1.6), wave)
+    lost = plant_a(smc.law("classical", k=0.4), wave)
+    assert held.residual() <= 1e-3 * (1.6 + 1.5)
+    assert lost.residual() > 0.5
+
+
+def test_classical_chatters_within_one_sample_of_its_force():
+    for h in (1e-2, 1e-3):
+        assert plant_a(smc.law("classical", k=2.0), wave, h=h).residual() <= h * (2.0 + 1.5)
+
+
+def orders(law):
+    """Order of the residual under d = sin t + 0.5 in the control period, over two decades, and the residuals."""
+    steps = np.array([1e-2, 1e-3, 1e-4])
+    residuals = np.array([plant_a(law, wave, h=h, duration=20).residual() for h in steps])
+    return np.diff(np.log10(residuals)) / np.diff(np.log10(steps)), residuals
+
+
+def test_classical_residual_is_first_order_in_the_control_period():
+    slopes, residuals = orders(smc.law("classical", k=2.0))
+    assert np.all(np.abs(slopes - 1.0) < 0.1), slopes
+    np.testing.assert_allclose(residuals[:2], [3.2e-2, 3.4e-3], rtol=0.1)
+
+
+def test_super_twisting_residual_is_second_order_in_the_control_period():
+    slopes, residuals = orders(smc.law("super_twisting", k1=1.5, k2=1.1))
+    assert np.all(np.abs(slopes - 2.0) < 0.2), slopes
+    np.testing.assert_allclose(residuals[:2], [3.8e-4, 5.1e-6], rtol=0.1)
+
+
+def test_super_twisting_follows_a_ramp_of_disturbance_that_outgrows_every_constant_gain():
+    """d = 0.8 t has |d'| = 0.8 < k2: s stays at O(h^2) and u tends to -d, while a gain of 4 is lost at t = 5."""
+    ramp = plant_a(smc.law("super_twisting", k1=1.5, k2=1.1), lambda t: 0.4 * t * t)
+    assert ramp.residual() < 20 * 1e-3**2
+    late = ramp.t > 8
+    assert np.abs(ramp.u + 0.8 * ramp.t)[late].max() < 20 * 1e-3
+    assert plant_a(smc.law("classical", k=4.0), lambda t: 0.4 * t * t).residual() > 1
+
+
+def test_super_twisting_is_lost_when_the_disturbance_is_faster_than_its_integrator():
+    """k2 = 0.5 cannot follow |d'| = 0.8: the rest grows until the square root carries it."""
+    slow = plant_a(smc.law("super_twisting", k1=1.5, k2=0.5), lambda t: 0.4 * t * t)
+    assert slow.residual() > 0.5
+
+
+@pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
+def test_boundary_layer_ends_within_phi_d_over_k_and_a_constant_attains_it(k, phi, d):
+    law, bound = smc.law("boundary_layer", k=k, phi=phi), phi * d / k
+    assert plant_a(law, lambda t: d * t, duration=30).s[-1] == pytest.approx(bound, rel=1e-9)
+    assert plant_a(law, lambda t: -d / 7 * math.cos(7 * t), duration=30).residual() <= bound
+
+
+def test_boundary_layer_is_the_sign_outside_its_layer():
+    law, classical = smc.law("boundary_layer", k=2.0, phi=0.1), smc.law("classical", k=2.0)
+    for s in (-3.0, -0.1, 0.1, 5.0):
+        assert one(law, de=s) == one(classical, de=s)
+
+
+def one(law, **y):
+    """A law's first u and s."""
+    return law.function(measured(**y), plain.named(law), np.zeros(law.memory))
+
+
+def gain(law, run):
+    """K of an adaptive law at every sample."""
+    return law.gains["k0"] + run.memory
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.05])
+def test_adaptive_gain_never_decreases(sigma):
+    law = smc.law("adaptive", k0=0.3)
+    noise = sigma * np.random.default_rng(0).normal(size=10_000)
+    run = plant_a(law, wave, noise=noise)
+    assert np.all(np.diff(gain(law, run)) >= 0.0)
+    np.testing.assert_array_equal(np.abs(run.u), gain(law, run))
+
+
+def test_adaptive_gain_ends_above_an_unknown_disturbance_and_holds_it():
+    law = smc.law("adaptive")
+    run = plant_a(law, wave, duration=20)
+    K = gain(law, run)[-1]
+    assert K > 1.5
+    assert run.residual() <= 1e-3 * (K + 1.5)
+
+
+def test_noise_winds_up_the_adaptive_gain_without_end_and_the_leak_bounds_it():
+    noise = 0.05 * np.random.default_rng(1).normal(size=80_000)
+    plain_law, leaky = smc.law("adaptive", gamma=15.0), smc.law("adaptive_leak", gamma=15.0)
+    growing = plant_a(plain_law, wave, noise=noise, duration=80)
+    bounded = plant_a(leaky, wave, noise=noise, duration=80)
+    early, late = (gain(plain_law, growing)[k] for k in (40_000, 79_999))
+    assert late - early > 15.0 * 40 * 0.05 * math.sqrt(2 / math.pi) * 0.9  # gamma T E|noise|
+    K, g = gain(leaky, bounded), leaky.gains
+    assert K[40_000:].max() < 1.3 * K[20_000:40_000].max()
+    assert K.max() <= g["gamma"] * np.abs(bounded.s + noise).max() / g["leak"]
+    assert K.max() < late / 4
+
+
+def test_the_leak_forgets_exponentially_within_the_dead_zone():
+    law = smc.law("adaptive_leak", k0=2.0, leak=3.0)
+    memory, gains = np.zeros(law.memory), plain.named(law)
+    for _ in range(1000):
+        law.function(measured(de=0.01), gains, memory)
+    assert 2.0 + memory[0] == pytest.approx(2.0 * (1 - 3e-3) ** 1000, rel=1e-9)
+
+
+def test_observer_free_is_bounded_by_lam_and_saturates_there():
+    law = smc.law("observer_free", lam=2.5, k1=3.0)
+    states = np.random.default_rng(0).normal(scale=5.0, size=(1000, 2))
+    forces = np.array([one(law, e=e, de=de)[0] for e, de in states])
+    assert np.abs(forces).max() <= 2.5
+    assert one(law, e=1e9)[0] == -2.5
+    np.testing.assert_allclose(forces, -2.5 * np.tanh(states[:, 1] + 3.0 * states[:, 0]), rtol=1e-14)
+
+
+# Plant, (J, D, K) of its linearisation J x'' + D x' + K x = u at the origin, lam, k1.
+LOCAL = [
+    ("van_der_pol", (1.0, -1.0, 1.0), 0.8, 1.0),  # lam < -D
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.2, 1.0),
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.5, -0.8),  # lam k1 < -K
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.5, -0.5),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 2.0, 1.0),  # lam k1 < -K
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 3.0, 1.0),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 0.5, 4.0),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 0.5, 6.0),
+]
+
+
+@pytest.mark.parametrize(("plant", "linear", "lam", "k1"), LOCAL)
+def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, linear, lam, k1):
+    """The envelope of a tiny error grows or dies at the rate of the linearisation's slowest root."""
+    J, D, K = linear
+    law = smc.law("observer_free", lam=lam, k1=k1)
+    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=1e-6, duration=20.0, u_max=math.inf))
+    closed = np.array([[0.0, 1.0], [-(K + lam * k1) / J, -(D + lam) / J]])
+    stable = lam > -D and lam * k1 > -K
+    assert stable == bool(np.linalg.eigvals(closed).real.max() < 0)
+    states = np.array([np.linalg.norm(expm(closed * t) @ (1e-6, 0.0)) for t in trace.t[::500]])
+    norms = np.hypot(trace.x, trace.v)[::500, 0]
+    tiny = states < 1e-2
+    np.testing.assert_allclose(norms[tiny], states[tiny], rtol=0.05, atol=1e-9)
+    assert norms[tiny][-1] < 0.5e-6 if stable else norms[tiny][-1] > 3e-6
+
+
+@ACTING
+def test_every_law_brings_plant_a_in_and_its_mirror_image_drives_it_out(name):
+    law = smc.law(name)
+    right = plant_a(law, lambda t: 0.5 * t)
+    wrong = plant_a(law, lambda t: 0.5 * t, sign=-1.0, duration=3.0)
+    assert right.residual() < 0.3
+    assert wrong.residual() > 1.0
+
+
+@LAWS
+def test_every_law_is_zero_at_the_origin(name):
+    """sgn(0) = 0: nothing is commanded where there is no error."""
+    law = smc.law(name)
+    memory = np.zeros(law.memory)
+    for _ in range(3):
+        assert law.function(measured(), plain.named(law), memory) == (0.0, 0.0)
+
+
+@LAWS
+def test_every_law_is_odd_in_what_it_measures(name):
+    law = smc.law(name)
+    ours, mirrored = np.zeros(law.memory), np.zeros(law.memory)
+    for e, de, f in np.random.default_rng(0).normal(size=(500, 3)):
+        u, s = law.function(measured(e, de, f=f), plain.named(law), ours)
+        assert law.function(measured(-e, -de, f=-f), plain.named(law), mirrored) == (-u, -s)
+
+
+@ACTING
+def test_every_law_pushes_towards_its_surface(name):
+    law = smc.law(name)
+    for e, de in np.random.default_rng(0).normal(size=(200, 2)):
+        u, s = one(law, e=e, de=de)
+        assert u * s <= 0.0
+
+
+@LAWS
+def test_every_law_names_its_equation_and_its_source(name):
+    text = catalogue()[name].doc
+    assert "u = " in text
+    assert name == "none" or "Source" in text
+
+
+@LAWS
+@pytest.mark.parametrize("plant", smc.plants())
+def test_default_gains_run_on_every_plant(name, plant):
+    trace = smc.run(smc.Scenario(plant=plant, law=name, duration=1.0))
+    assert trace.failure is None
+    assert np.isfinite(trace.u).all()
+    assert np.abs(trace.u).max() <= 6.0
+
+
+@LAWS
+def test_no_gain_takes_nan_or_infinity(name):
+    for gain_name in catalogue()[name].defaults:
+        for value in (math.nan, math.inf):
+            with pytest.raises(smc.ScenarioError, match=gain_name):
+                smc.law(name, **{gain_name: value})
+
+
+def test_gains_that_would_turn_the_law_round_or_divide_by_zero_are_refused():
+    for name, gains in (("observer_free", {"lam": 0.0}), ("boundary_layer", {"phi": 0.0})):
+        with pytest.raises(smc.ScenarioError):
+            smc.law(name, **gains)
+
+
+@LAWS
+def test_memory_belongs_to_a_channel(name):
+    """Uncoupled pendulums, one at rest and two mirrored: the first stays at rest, the others stay mirrored."""
+    plant = smc.plant("pendulum_network", n=3, kc=0.0)
+    trace = smc.run(smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.5))
+    assert not trace.x[:, 1].any()
+    np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
+    np.testing.assert_array_equal(trace.u[:, 2], -trace.u[:, 0])
+
+
+@LAWS
+def test_memory_belongs_to_a_run(name):
+    law = smc.law(name)
+    scenario = smc.Scenario(plant="duffing", law=law, duration=0.2)
+    first, second = smc.run([scenario, scenario])
+    third = smc.run(scenario)
+    np.testing.assert_array_equal(first.u, second.u)
+    np.testing.assert_array_equal(first.u, third.u)
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])
+def test_dt_is_the_control_period(period):
+    """An immovable cart stands at e = -1, so s = -c: K = gamma c t and w = k2 t whatever the control period."""
+    anvil = smc.plant("duffing", M=1e12, alpha=0.0, beta=0.0, delta=0.0)
+    common = {"plant": anvil, "x0": 0.0, "reference": smc.Constant(1.0), "u_max": math.inf, "duration": 1.0}
+    laws = (
+        smc.law("adaptive", gamma=50.0, c=3.0),
+        smc.law("adaptive_leak", gamma=50.0, c=3.0, leak=0.0),
+        smc.law("super_twisting", k1=2.0, k2=5.0, c=3.0),
+    )
+    scenarios = [smc.Scenario(law=law, control_period=period, **common) for law in laws]
+    adaptive, leaky, twisting = smc.run(scenarios)
+    for trace in (adaptive, leaky):
+        np.testing.assert_allclose(trace.u[:, 0], 150.0 * trace.t, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(twisting.u[:, 0], 2.0 * math.sqrt(3.0) + 5.0 * twisting.t, rtol=1e-6)
