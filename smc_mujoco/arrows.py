@@ -1,7 +1,8 @@
 """Arrows in the scene: what the control and the disturbance do to each moving body.
 
-The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which switches
-faster than the film still shows how far it swings. Along a pendulum's arc beyond the bob, along the rail above a cart.
+The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which
+switches faster than the film still shows how far it swings. Arrows lie along a pendulum's arc, beyond the bob, and
+along the rail, above the cart.
 """
 
 from collections.abc import Sequence
@@ -15,8 +16,8 @@ from smc_mujoco.envelope import Envelope, samples, windows
 from smc_mujoco.trace import Trace
 
 HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the rail's
-LEAST = 0.02  # of the longest: shorter ones are not drawn
-SLENDER = 0.16  # thickest shaft, of the arrow's length
+LEAST = 0.05  # of the longest: shorter ones are not drawn
+SLENDER = 0.1  # thickest shaft of a short one, of its length
 BAR = 0.1  # of the longest: the least range that gets a bar
 
 
@@ -25,7 +26,7 @@ class Arrow(NamedTuple):
 
     low: float
     high: float
-    rgba: tuple[float, float, float, float]
+    rgba: tuple[float, ...]  # red, green, blue, opacity, 0 .. 1
     layer: int = 0  # further from the body
     size: float = 1.0
     head: bool = True
@@ -90,7 +91,7 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joi
         along, start = data.xaxis[joint], model.geom_size[body, 2] + 2.2 * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
-    width = min(arrow.size * width, SLENDER * (abs(high - low) + 0.05))
+    width = min(arrow.size * width, 0.006 + SLENDER * abs(high - low))
 
     kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
     geom, zero = scene.geoms[scene.ngeom], np.zeros(3)

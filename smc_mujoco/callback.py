@@ -78,6 +78,8 @@ from smc_mujoco.row import (
 )  # fmt: skip
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
+LEFT = 1.0 - 1e-9  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
+HUGE = 1e10  # MuJoCo drops every control where one is larger
 _lock = threading.RLock()
 
 
@@ -136,7 +138,7 @@ def _decide(base, row, log, k):
         if call(int(row[LAW]), base + 8 * given, _at(base, row, GAINS), memory, base + 8 * out) != 0:
             return RAISED
         u = min(max(row[out], -row[LIMIT]), row[LIMIT])
-        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1])):
+        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) < HUGE):
             return NOT_FINITE
         row[ring + i], log[2, k, i], log[4, k, i] = u, u, row[out + 1]
     return FINE
@@ -152,6 +154,7 @@ def _disturb(base, row, table, xfrc, t):
     for j in range(int(row[SIGNAL_COUNT])):
         at = first + SIGNAL_FIELDS * j
         address, values, random = int(row[at]), base + 8 * int(row[at + 1]), row[at + 2] != 0.0
+        row[given + 3] = noise.PROCESS + j
         for i in range(n):
             if random or i == 0:  # what is not random is the same in every channel
                 row[given + 2] = i
@@ -187,8 +190,8 @@ def _control(base, row, qpos, qvel, ctrl, xfrc, sensors):
         for i in range(n):
             ctrl[table[i, CTRL]] = row[ring + i]
     if row[SIGNAL_COUNT] != 0.0 and failure == FINE:
-        fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-        failure = _disturb(base, row, table, xfrc, (step + fraction) * row[STEP])
+        fraction = 0.0 if stage == 0 else (LEFT if stage == 3 else 0.5)
+        failure = _disturb(base, row, table, xfrc, k * row[PERIOD] + (within + fraction) * row[STEP])
     if failure != FINE:
         row[FAILURE], row[FAILED_STEP] = failure, step
         for i in range(n):
@@ -254,9 +257,10 @@ def installed(control=None) -> Iterator[None]:
     """Install the harness, or another control callback, for the length of a with block; other threads wait."""
     with _lock:
         before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
-        mujoco.set_mjcb_control(harness().ctypes if control is None else control)
-        mujoco.set_mju_user_warning(silence().ctypes)
         try:
+            mujoco.set_mjcb_control(None)  # MuJoCo compiles no model, ours neither, while a Python callback is installed
+            mujoco.set_mjcb_control(harness().ctypes if control is None else control)
+            mujoco.set_mju_user_warning(silence().ctypes)
             yield
         finally:
             mujoco.set_mjcb_control(before[0])

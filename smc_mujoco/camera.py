@@ -22,9 +22,9 @@ class Room(NamedTuple):
 def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
     """The nearest place, (3,) m, from which points (m, 3) are all seen within the room of a picture of `size` px.
 
-    With p and z a point's place across and along the view, a camera at c across and at distance D sees it between the
-    tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's width
-    and for its height; D is the least at which both leave room.
+    With p and z a point's place across and along the view, a camera at c across and at distance D sees it between
+    the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's
+    width and for its height; D is the least at which both leave room.
     """
     across, up, z = points @ turn[:, 0], points @ turn[:, 1], -points @ turn[:, 2]
     x, y = size[0] / 2, size[1] / 2

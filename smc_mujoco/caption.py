@@ -41,7 +41,7 @@ class Caption:
         side, below = 40 * scale, 52 * scale
         if abs(y) > abs(x):  # machines behind each other have their labels at the left
             side, below = max(self.width(text) for text in self.texts()) + 30 * scale, 20 * scale
-        self.room = Room(side, 84 * scale, size[0] - 40 * scale, size[1] - below)
+        self.room = Room(side, 106 * scale, size[0] - 40 * scale, size[1] - below)
         self.sheet = functools.lru_cache(maxsize=1)(self._sheet)
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:

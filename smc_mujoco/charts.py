@@ -1,13 +1,13 @@
 """The strip charts under a film: x and u of all traces, drawn once and uncovered as the clock runs.
 
-Two pictures are drawn: the charts with every curve, and the charts with the curves as a faint promise. A frame takes the
-columns up to the clock from the first and the rest from the second, so that it costs a copy, whatever the charts hold.
+Two pictures are drawn: the charts with every curve, and the charts with the curves as a faint promise. A frame takes
+the columns up to the clock from the first and the rest from the second, so that it costs a copy, whatever they hold.
 """
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -31,7 +31,7 @@ class Charts:
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], scale: float):
         self.end = max(trace.t[-1] for trace in traces)
         self.dot = max(2, round(4.5 * scale))
-        with rc_context(style.RC):
+        with style.page():
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, 2)
@@ -39,7 +39,7 @@ class Charts:
             draw_axes(axes, traces, self.end)
             drawn = [panels.over_time(ax, traces, colours, name) for ax, name in zip(axes, "xu", strict=True)]
             self.full = picture(canvas)
-            for artist in sum(drawn, []):
+            for artist in itertools.chain(*drawn):
                 artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))
             self.faint = picture(canvas)
             self.frames = [frame(ax, self.full.shape[0]) for ax in axes]

@@ -8,12 +8,14 @@ float array, zero at the start of a run, one per channel, free to change.
 import dataclasses
 import importlib
 import inspect
+import keyword
 import math
 import pkgutil
-from collections.abc import Callable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType
 
-from smc_mujoco.errors import ScenarioError, number, unknown
+from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -26,11 +28,33 @@ class Component:
     memory: int
     function: Callable | None = dataclasses.field(repr=False)
 
+    def __reduce__(self):
+        """By the name of its template where that can be found again: a decorated function cannot be pickled by its own."""
+        found = _at(getattr(self.function, "__module__", None), getattr(self.function, "__qualname__", None))
+        if isinstance(found, Template) and found.function is self.function:
+            return _bind, (self.function.__module__, self.function.__qualname__, dict(self.gains))
+        return super().__reduce__()
+
     def __hash__(self):
         return hash((self.kind, self.name, tuple(self.gains.items()), self.memory, self.function))
 
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
+
+
+def _at(module: str | None, name: str | None) -> object:
+    """What stands in a module under a dotted name, or None."""
+    found: object = sys.modules.get(module or "")
+    for part in (name or "?").split("."):
+        found = getattr(found, part, None)
+    return found
+
+
+def _bind(module: str, name: str, gains: dict[str, float]) -> Component:
+    importlib.import_module(module)
+    template = _at(module, name)
+    assert isinstance(template, Template)
+    return template(**gains)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -43,6 +67,7 @@ class Template:
     defaults: Mapping[str, float]
     memory: int
     positive: frozenset[str]
+    nonnegative: frozenset[str]
 
     @property
     def doc(self) -> str:
@@ -62,24 +87,26 @@ class Template:
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
             above = 0.0 if key in self.positive else -math.inf
-            values[key] = number(f"{self.name}'s {key}", value, above=above)
+            least = 0.0 if key in self.nonnegative else -math.inf
+            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least)
         return Component(kind=self.kind, name=self.name, gains=values, memory=self.memory, function=self.function)
 
 
 def template(
-    kind: str, gains: Mapping[str, float] | None, memory: int, positive: tuple[str, ...]
+    kind: str, gains: Mapping[str, float] | None, memory: int, positive: Iterable[str], nonnegative: Iterable[str]
 ) -> Callable[[Callable], Template]:
     """A decorator that makes a Template of a function.
 
     Raises:
       ScenarioError: a gain's name is no identifier, its default no number, or memory no whole number in 1 .. 10000.
     """
+    if not isinstance(gains, Mapping | None):
+        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
+    for key in gains or {}:
+        if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
+            raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
     defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
-    for key in defaults:
-        if not key.isidentifier() or key.startswith("_"):
-            raise ScenarioError(f"gain {key!r} is no plain name: call it something like 'k1'")
-    if memory != int(memory) or not 1 <= memory <= 10_000:
-        raise ScenarioError(f"memory is {memory}: give a whole number of floats from 1 to 10000")
+    size = whole("memory", memory, 1, 10_000)
 
     def decorate(function: Callable) -> Template:
         name = getattr(function, "__name__", type(function).__name__)
@@ -88,8 +115,9 @@ def template(
             name=name,
             function=function,
             defaults=defaults,
-            memory=int(memory),
+            memory=size,
             positive=frozenset(positive),
+            nonnegative=frozenset(nonnegative),
         )
 
     return decorate

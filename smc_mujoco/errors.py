@@ -1,20 +1,39 @@
-"""The one error users see: a sentence that names the thing, the value and the cure."""
+"""The one error users see: a sentence that names the thing, the value and the cure; and the checks that raise it."""
 
 import difflib
 import math
-from collections.abc import Iterable
+import numbers
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
 
 
 class ScenarioError(ValueError):
     """Bad input. The message is one sentence: the thing, its value, the cure."""
 
 
+def shown(value: object) -> str:
+    """A value on one line, cut where it is long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """The error for a name that is not among `known`, with the nearest that is."""
     names = sorted(known)
-    near = difflib.get_close_matches(str(name), names, n=1)
+    near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
     hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}"
-    return ScenarioError(f"unknown {kind} {name!r}: {hint}")
+    return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
+
+
+def find(kind: str, name: object, known: Mapping[str, T]) -> T:
+    """known[name], or the error that says what is known."""
+    if not isinstance(name, str) or name not in known:
+        raise unknown(kind, name, known)
+    return known[name]
 
 
 def number(
@@ -27,14 +46,16 @@ def number(
     infinite: bool = False,
 ) -> float:
     """`value` as a float in (above, inf) and [least, most], or ScenarioError naming `what`."""
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise ScenarioError(f"{what} is {value!r}: give a number")
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise ScenarioError(f"{what} is {shown(value)}: give a number")
     try:
-        x = float(value)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError):
-        raise ScenarioError(f"{what} is {value!r}: give a number") from None
+        x = float(value)
+    except OverflowError:
+        x = math.inf
     if math.isnan(x) or (math.isinf(x) and not infinite):
-        raise ScenarioError(f"{what} is {x}: give a finite number")
+        raise ScenarioError(f"{what} is {shown(value)}: give a finite number")
     if x <= above:
         raise ScenarioError(f"{what} is {x:g}: give a number greater than {above:g}")
     if x < least:
@@ -42,3 +63,13 @@ def number(
     if x > most:
         raise ScenarioError(f"{what} is {x:g}: give at most {most:g}")
     return x
+
+
+def whole(what: str, value: object, least: int, most: int) -> int:
+    """`value` as an int in [least, most], or ScenarioError naming `what`."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    integral = isinstance(value, numbers.Integral) or (isinstance(value, numbers.Real) and value == value // 1)
+    if isinstance(value, bool | np.bool_) or not integral or not least <= value <= most:  # pyright: ignore
+        raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
+    return int(value)  # pyright: ignore

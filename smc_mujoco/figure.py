@@ -7,9 +7,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -47,7 +47,7 @@ def figure(
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
     network = any(trace.x.shape[1] > 1 for trace in traces)
     rows = ["x", "spread", "u", "s"] if network else ["x", "u", "s"]
-    with rc_context(style.RC):
+    with style.page():
         page = _page(7.2)
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
         column = left.subgridspec(len(rows), 1)
@@ -63,9 +63,7 @@ def figure(
         axes["s"].set_xlim(0.0, max(trace.t[-1] for trace in traces))
         page.align_ylabels(list(axes.values()))
 
-        portrait, close = (
-            page.add_subplot(cell) for cell in right.subgridspec(2, 1, height_ratios=(1.5, 1.0))
-        )
+        portrait, close = (page.add_subplot(cell) for cell in right.subgridspec(2, 1, height_ratios=(1.5, 1.0)))
         panels.phase(portrait, traces, colours)
         portrait.set_xlabel(_name(traces[0], "x", network))
         portrait.set_ylabel(_name(traces[0], "v", network))
@@ -92,11 +90,9 @@ def signals(
     given = style.labels(style.same_plant(traces), labels)
     cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
     if len(cells) < len(traces):
-        raise ScenarioError(
-            "two traces of one law under one condition: give each condition a label of its own"
-        )
+        raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
-    with rc_context(style.RC):
+    with style.page():
         page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
         axes = page.subplots(len(laws), len(conditions), sharex=True, sharey=True, squeeze=False)
         for (law, condition), trace in cells.items():
@@ -107,9 +103,7 @@ def signals(
             ax.set_ylabel(_name(traces[0], "u", False).replace("control ", ""))
             ax.set_title(style.law_name(law), color=style.law_colour(law))
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
-            top.annotate(
-                condition, (0.5, 1.0), (0, 22), "axes fraction", "offset points", ha="center", fontsize=13
-            )
+            top.annotate(condition, (0.5, 1.0), (0, 22), "axes fraction", "offset points", ha="center", fontsize=13)
             bottom.set_xlabel("time (s)")
         axes[0, 0].set_ylim(panels.limits(traces, "u"))
         axes[0, 0].set_xlim(0.0, max(trace.t[-1] for trace in traces))
@@ -123,9 +117,9 @@ def signals(
 
 
 def _page(height: float) -> Figure:
-    page = Figure(figsize=(WIDTH, height), layout="constrained")
-    page.get_layout_engine().set(w_pad=0.1, h_pad=0.07, wspace=0.02, hspace=0.02)
-    return page
+    """An empty page, its height in inches."""
+    layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.07, wspace=0.02, hspace=0.02)
+    return Figure(figsize=(WIDTH, height), layout=layout)
 
 
 def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
@@ -172,8 +166,8 @@ def _write(page: Figure, path: str | os.PathLike) -> list[Path]:
     base = Path(path)
     base = base.with_suffix("") if base.suffix in (".svg", ".png", ".pdf") else base
     written = []
-    for suffix, options in ((".svg", {"metadata": {"Date": None}}), (".png", {"dpi": DPI})):
+    for suffix in (".svg", ".png"):
         written.append(base.with_name(base.name + suffix))
         with replacing(written[-1]) as part:
-            page.savefig(part, **options)
+            page.savefig(part, dpi=DPI, metadata={"Date": None} if suffix == ".svg" else None)
     return written

@@ -10,11 +10,11 @@ of the plant is the nominal f and g in its measurement.
 """
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from smc_mujoco.component import Component, Template, discover, template
-from smc_mujoco.errors import unknown
+from smc_mujoco.errors import find
 
 Law = Component
 
@@ -36,19 +36,23 @@ class Measurement(NamedTuple):
 
 
 def law_function(
-    *, gains: Mapping[str, float] | None = None, memory: int = 8, positive: tuple[str, ...] = ()
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
 ) -> Callable[[Callable], Template]:
     """Make a law of a function (y, gains, memory) -> (u, s).
 
     Args:
       gains: name -> default value.
       memory: floats of state per channel.
-      positive: gains that must be greater than 0.
+      positive, nonnegative: gains that must be greater than 0, or at least 0.
 
     Returns:
       A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.
     """
-    return template("law", gains, memory, positive)
+    return template("law", gains, memory, positive, nonnegative)
 
 
 @functools.cache
@@ -63,9 +67,7 @@ def law(name: str, **gains: float) -> Law:
     Raises:
       ScenarioError: unknown law or gain, or a gain out of its range.
     """
-    if name not in catalogue():
-        raise unknown("law", name, catalogue())
-    return catalogue()[name](**gains)
+    return find("law", name, catalogue())(**gains)
 
 
 def laws() -> list[str]:

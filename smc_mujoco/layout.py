@@ -87,9 +87,12 @@ def offsets() -> Offsets:
 
 def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     """The introspected offsets after comparing each with what the live model and data show."""
-    struct = _struct("mjData", last=Offsets._fields[-1])
-    nuserdata = _struct("mjModel", last="nuserdata").nuserdata.offset
-    arrays = [getattr(struct, name).offset for name in Offsets._fields[1:]]
+    try:
+        struct = _struct("mjData", last=Offsets._fields[-1])
+        nuserdata = _struct("mjModel", last="nuserdata").nuserdata.offset
+        arrays = [getattr(struct, name).offset for name in Offsets._fields[1:]]
+    except (AttributeError, ValueError) as error:
+        raise LayoutError(f"mujoco {mujoco.__version__} lacks a field of mjData ({error}): install mujoco 3.17") from error
     if ctypes.c_int64.from_address(model._address + nuserdata).value != model.nuserdata:
         raise _mismatch("mjModel.nuserdata", nuserdata)
     for name, offset in zip(Offsets._fields[1:], arrays, strict=True):

@@ -113,11 +113,11 @@ def reason(error: Exception) -> str:
 
 
 def jit(function: Callable) -> Callable:
-    """`function` itself if numba compiled it already, else compiled with bounds checks."""
+    """`function` compiled so that it raises where Python would: out of bounds, divided by zero."""
     if isinstance(function, Dispatcher):
-        return function
+        function = function.py_func
     try:
-        return njit(error_model="numpy", boundscheck=True)(function)
+        return njit(error_model="python", boundscheck=True)(function)
     except Exception as error:
         raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
 
@@ -154,14 +154,14 @@ def estimator(function: Callable, gains: tuple[str, ...], memory: int) -> Functi
 
 @functools.cache
 def signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
-    """inputs: t, seed, channel -> outputs: value, first and second derivative."""
+    """inputs: t, seed, channel, stream -> outputs: value, first and second derivative."""
     body, values = jit(kind.value), loader(named(names))
     random, memory = kind.random, max(kind.memory, 1)
 
     def native(y, p, m, out):
-        i = carray(pointer(y), (3,))
+        i = carray(pointer(y), (4,))
         if random:
-            ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2]))
+            ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2], i[3]))
         else:
             ok, result = attempt(body, (i[0], values(p)))
         if ok:

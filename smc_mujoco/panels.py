@@ -1,7 +1,7 @@
 """What one pair of axes shows: a quantity of several traces over time, their phase portrait, the last samples of u.
 
-Over time, a curve is the mean of the channels in each window (envelope.py); the band behind it is the range in the window,
-of u and s over all channels too. Single channels of a network are light.
+Over time, a curve is the mean of the channels in each window (envelope.py); the band behind it is the range in the
+window, of u and s over all channels too. Single channels of a network are light.
 """
 
 from collections.abc import Callable, Sequence
@@ -52,9 +52,7 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
         t, states = trace.t[: len(y)], name == "x"
         each, mean = columns(t, y, WINDOWS), columns(t, y.mean(axis=1, keepdims=True), WINDOWS)
         band = (mean.low, mean.high) if states else (each.low, each.high)
-        drawn.append(
-            ax.fill_between(mean.t, band[0].min(axis=1), band[1].max(axis=1), color=colour, alpha=0.22, lw=0)
-        )
+        drawn.append(ax.fill_between(mean.t, band[0].min(axis=1), band[1].max(axis=1), color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1 and states:
             for i in light(y.shape[1]):
                 drawn += ax.plot(each.t, each.mean[:, i], color=colour, alpha=0.3, lw=0.8)
@@ -64,9 +62,7 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
         if trace.diverged_at is not None:
             y = values(trace, name)
             end = np.clip(y[-1].mean(), *ax.get_ylim())
-            drawn += ax.plot(
-                trace.t[len(y) - 1], end, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5
-            )
+            drawn += ax.plot(trace.t[len(y) - 1], end, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
     return drawn
 
 

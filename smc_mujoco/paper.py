@@ -11,7 +11,7 @@ bound, and the plants' parameters stand in their files.
 
 from collections.abc import Callable, Sequence
 
-from smc_mujoco.errors import unknown
+from smc_mujoco.errors import find
 from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law
 from smc_mujoco.scenario import Jump, Noise, Scenario
@@ -118,16 +118,12 @@ def scenario(
     Raises:
       ScenarioError: a name that the study does not have.
     """
-    for kind, name, known in (("plant", plant, GAINS), ("condition", condition, CONDITIONS)):
-        if name not in known:
-            raise unknown(f"{kind} of the paper's study", name, known)
-    if law_name not in (gains := GAINS[plant] | {"none": {}}):
-        raise unknown("law of the paper's study", law_name, gains)
-    fields = CONDITIONS[condition]
+    gains = find("law of the paper's study", law_name, find("plant of the paper's study", plant, GAINS) | {"none": {}})
+    fields = find("condition of the paper's study", condition, CONDITIONS)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
     return Scenario(
         plant=plant,
-        law=law(law_name, **gains[law_name]),
+        law=law(law_name, **gains),
         **(common | (fields(plant) if callable(fields) else fields)),
     )
 

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import native, noise
-from smc_mujoco.callback import WORLD, installed
+from smc_mujoco.callback import HUGE, LEFT, WORLD, installed
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
 from smc_mujoco.component import Component
 from smc_mujoco.estimators import Reading
@@ -32,7 +32,8 @@ class Failure(Exception):
 
 def run(scenario: Scenario) -> Trace:
     """One run in the plain loop."""
-    loop = Loop(scenario)
+    with installed():
+        loop = Loop(scenario)
     total = scenario.samples * scenario.steps
     with installed(loop.control):
         for step in range(total + 1):
@@ -78,20 +79,21 @@ class Loop:
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """The callback: at the first stage of a sample the law, at every stage the disturbance."""
-        if self.failure:
-            return
+        if self.failure or data._address != self.data._address:
+            return  # a law may step a model of its own, and other threads load theirs
         step, stage = divmod(self.calls, self.stages)
         self.calls += 1
         try:
             if stage == 0:
                 self.begin(data, step)
-            fraction = (0.0, 0.5, 0.5, 1.0)[stage]
-            d = self.disturbance((step + fraction) * self.scenario.physics_step)
+            fraction = (0.0, 0.5, 0.5, LEFT)[stage]
+            k, within = divmod(step, self.scenario.steps)
+            d = self.disturbance(k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step)
             data.xfrc_applied.ravel()[self.table[:, XFRC]] = self.table[:, SIGN] * d
-            if stage == 0 and step % self.scenario.steps == 0:
+            if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
                 applied = data.ctrl[self.table[:, CTRL]]
-                self.log[:, step // self.scenario.steps] = x, v, self.commands[-1], applied, self.s, d
+                self.log[:, k] = x, v, self.commands[-1], applied, self.s, d
         except Failure as failure:
             self.failure, self.failed_step = str(failure), step
 
@@ -115,7 +117,7 @@ class Loop:
             if sigma.position or sigma.velocity:
                 z = normals(self.scenario.seed, i, noise.MEASUREMENT, k)
                 x[i], v[i] = x[i] + sigma.position * z[0], v[i] + sigma.velocity * z[1]
-            reading = Reading(self.scenario.control_period, x[i], v[i])
+            reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
             v[i] = guarded(estimator, i, reading, named(estimator), self.estimator_memory[i])
         return x, v
 
@@ -125,29 +127,29 @@ class Loop:
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         r, dr, ddr = type(scenario.reference).value(t, scenario.reference)
         for i in range(len(x)):
-            f, g = scenario.plant.nominal(x, v, i, self.nominal)
-            y = Measurement(t, scenario.control_period, x[i], v[i], x[i] - r, v[i] - dr, r, dr, ddr, f, g)
+            xi, vi, (f, g) = float(x[i]), float(v[i]), scenario.plant.nominal(x, v, i, self.nominal)
+            y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
             out = guarded(law, i, y, named(law), self.memory[i])
             try:
                 u[i], s[i] = out
             except (TypeError, ValueError):
                 raise Failure(f"law {law.name!r} returned {out!r} instead of the two numbers u, s") from None
-            if not (math.isfinite(u[i]) and math.isfinite(s[i])):
+            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and min(abs(u[i]), scenario.u_max) < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
         return np.clip(u, -scenario.u_max, scenario.u_max), s
 
     def disturbance(self, t: float) -> np.ndarray:
         """The sum of the disturbances, (n,)."""
         d = np.zeros(self.scenario.plant.n)
-        for signal, memory in zip(self.scenario.disturbance, self.signal_memory, strict=True):
-            d += [value(signal, t, memory[i], self.scenario.seed, i) for i in range(len(d))]
+        for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
+            d += [value(signal, t, memory[i], self.scenario.seed, i, noise.PROCESS + j) for i in range(len(d))]
         return d
 
 
-def value(signal: Signal, t: float, memory: np.ndarray, seed: int, channel: int) -> float:
+def value(signal: Signal, t: float, memory: np.ndarray, seed: int, channel: int, stream: int) -> float:
     """A disturbance at time t in one channel."""
     function: Callable[..., Any] = type(signal).value
-    return function(t, signal, memory, seed, channel)[0] if signal.random else function(t, signal)[0]
+    return (function(t, signal, memory, seed, channel, stream) if signal.random else function(t, signal))[0]
 
 
 def named(component: Component) -> tuple:

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.component import modules
-from smc_mujoco.errors import ScenarioError, number, unknown
+from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 
@@ -84,6 +84,8 @@ class Plant:
         """
         spec = self.spec()
         spec.nuserdata = nuserdata
+        # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
         model = spec.compile()
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -143,20 +145,15 @@ def plant(name: str, **parameters: float) -> Plant:
     Raises:
       ScenarioError: unknown name, or a parameter out of its range.
     """
-    if name not in catalogue():
-        raise unknown("plant", name, catalogue())
-    base = catalogue()[name]
-    least, most = base.sizes
-    n = parameters.pop("n", base.n)
-    if n != int(n) or not least <= n <= most:
-        raise ScenarioError(f"{name} has n = {n} channels: give a whole number from {least} to {most}")
+    base = find("plant", name, catalogue())
+    n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
     values = dict(base.parameters)
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         values[key] = number(f"{name}'s {key}", value, above=0.0 if key in base.positive else -np.inf)
-    x0 = tuple(base.x0[i % len(base.x0)] for i in range(int(n)))
-    return dataclasses.replace(base, parameters=values, n=int(n), x0=x0)
+    x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
+    return dataclasses.replace(base, parameters=values, n=n, x0=x0)
 
 
 def plants() -> list[str]:

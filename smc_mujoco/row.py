@@ -53,6 +53,7 @@ class Contents:
     steps: int  # physics steps per control sample
     stages: int  # callbacks per physics step
     step: float  # s
+    period: float  # s
     delay: int  # physics steps
     limit: float
     seed: int
@@ -81,7 +82,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
 
     row[IS_ROW] = mark
     row[CHANNELS], row[TABLE], row[STEPS], row[STAGES] = n, address(table), c.steps, c.stages
-    row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.step * c.steps, c.delay, rings
+    row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.period, c.delay, rings
     row[LIMIT], row[SEED], row[SIGMA_X], row[SIGMA_V] = c.limit, c.seed, c.sigma_x, c.sigma_v
     row[LAW], row[ESTIMATOR], row[NOMINAL] = c.law.address, c.estimator.address, c.nominal.address
     row[REFERENCE], row[SIGNAL_COUNT] = c.reference.address, len(c.disturbances)

@@ -18,7 +18,7 @@ from mujoco.batch import Batch, SimulationError
 from smc_mujoco import callback, native, plain, row
 from smc_mujoco.channels import QPOS, QVEL, channels
 from smc_mujoco.component import Component
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, shown, whole
 from smc_mujoco.plant import array
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal
@@ -73,9 +73,12 @@ def stream(
     slow: list[int] = []
     for index, scenario in enumerate(scenarios):
         if not isinstance(scenario, Scenario):
-            raise ScenarioError(f"cannot run {scenario!r}: give a smc.Scenario")
-        if scenario.law.function is None:
-            raise ScenarioError(f"law {scenario.law.name!r} came from a file without its code: give the law itself")
+            raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
+        for part in (scenario.law, scenario.velocity):
+            if part.function is None:
+                raise ScenarioError(
+                    f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}"
+                )
         try:
             contents(scenario)
             groups.setdefault(_layout(scenario), []).append(index)
@@ -86,7 +89,9 @@ def stream(
         size = _chunk_size(scenarios[indices[0]], threads)
         for start in range(0, len(indices), size):
             chunk = indices[start : start + size]
-            yield from zip(chunk, Chunk([scenarios[i] for i in chunk], threads).run(report), strict=True)
+            with callback.installed():
+                traces = Chunk([scenarios[i] for i in chunk], threads).run(report)
+            yield from zip(chunk, traces, strict=True)
     for index in slow:
         yield index, plain.run(scenarios[index])
         report(_steps(scenarios[index]))
@@ -111,6 +116,7 @@ def contents(scenario: Scenario) -> row.Contents:
         steps=scenario.steps,
         stages=4 if scenario.integrator == "RK4" else 1,
         step=scenario.physics_step,
+        period=scenario.control_period,
         delay=round(scenario.input_delay / scenario.physics_step),
         limit=scenario.u_max,
         seed=scenario.seed,
@@ -120,7 +126,7 @@ def contents(scenario: Scenario) -> row.Contents:
 
 
 class Chunk:
-    """Scenarios of one layout in one Batch."""
+    """Scenarios of one layout in one Batch; to be made and run while the callback is installed."""
 
     def __init__(self, scenarios: Sequence[Scenario], threads: int):
         first = self.first = scenarios[0]
@@ -151,12 +157,11 @@ class Chunk:
         """Simulate all of them to the end."""
         total = self.first.samples * self.first.steps
         starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step < total})
-        with callback.installed():
-            for start, end in zip(starts, [*starts[1:], total], strict=True):
-                if start:
-                    self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
-                self.advance(end - start, report)
-            self.attempt(self.batch.forward)  # the callback's last sample, at the end
+        for start, end in zip(starts, [*starts[1:], total], strict=True):
+            if start:
+                self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
+            self.advance(end - start, report)
+        self.attempt(self.batch.forward)  # the callback's last sample, at the end
         return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
@@ -204,7 +209,7 @@ class Chunk:
             row.FINE: None,
             row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
             row.RAISED: f"law {scenario.law.name!r} raised an exception",
-            row.NOT_FINITE: f"law {scenario.law.name!r} returned NaN or inf",
+            row.NOT_FINITE: f"law {scenario.law.name!r} returned NaN, inf or a command above {callback.HUGE:g}",
         }[failure]
         return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
 
@@ -221,7 +226,7 @@ def _signal(s: Signal) -> row.Part:
 
 def _layout(s: Scenario) -> tuple:
     """What the simulations of a Batch must have in common."""
-    return s.plant.name, s.plant.n, s.integrator, s.physics_step, s.control_period, s.samples
+    return s.plant.build, s.plant.fields, s.plant.n, s.integrator, s.physics_step, s.control_period, s.samples
 
 
 def _chunk_size(scenario: Scenario, threads: int) -> int:
@@ -237,9 +242,7 @@ def _steps(scenario: Scenario) -> int:
 def _threads(threads: int | None) -> int:
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise ScenarioError(f"threads is {threads!r}: give a whole number of at least 1, or None for every core")
-    return threads
+    return whole("threads", threads, 1, 1024)
 
 
 @contextlib.contextmanager

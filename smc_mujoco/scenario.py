@@ -9,15 +9,18 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, number, unknown
+from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.estimators import Estimator, estimator
 from smc_mujoco.law import Law, law
 from smc_mujoco.plant import Plant, plant
-from smc_mujoco.signals import Constant, Signal
+from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Signal
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
+SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
 MOST_STEPS = 100_000_000  # per run: minutes of computing
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 FAR = 1e6  # initial states beyond this have already diverged
@@ -125,11 +128,13 @@ class Scenario:
 
         put("plant", plant(self.plant) if isinstance(self.plant, str) else self.plant)
         if not isinstance(self.plant, Plant):
-            raise ScenarioError(f"plant is {self.plant!r}: give smc.plant(...) or one of the names smc.plants() lists")
+            raise ScenarioError(
+                f"plant is {shown(self.plant)}: give smc.plant(...) or one of the names smc.plants() lists"
+            )
         put("law", _component(self.law, "law", law))
         put("velocity", _component("measured" if self.velocity is None else self.velocity, "estimator", estimator))
-        for name in ("duration", "control_period"):
-            put(name, number(name, getattr(self, name), above=0.0))
+        put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
+        put("control_period", number("control_period", self.control_period, least=SHORTEST))
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
         put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
         put("physics_step", _physics_step(self.physics_step, self.control_period))
@@ -139,14 +144,13 @@ class Scenario:
         put("disturbance", _signals("disturbance", self.disturbance))
         put("noise", QUIET if self.noise is None else self.noise)
         if not isinstance(self.noise, Noise):
-            raise ScenarioError(f"noise is {self.noise!r}: give smc.Noise(position=..., velocity=...) or None")
+            raise ScenarioError(f"noise is {shown(self.noise)}: give smc.Noise(position=..., velocity=...) or None")
         put("mismatch", _factors("mismatch", {} if self.mismatch is None else self.mismatch))
         if not isinstance(self.jump, Jump | None):
-            raise ScenarioError(f"jump is {self.jump!r}: give smc.Jump(time=..., factors=...) or None")
-        if self.integrator not in INTEGRATORS:
+            raise ScenarioError(f"jump is {shown(self.jump)}: give smc.Jump(time=..., factors=...) or None")
+        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
             raise unknown("integrator", self.integrator, INTEGRATORS)
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**53:
-            raise ScenarioError(f"seed is {self.seed!r}: give a whole number from 0 to 2^53 - 1")
+        put("seed", whole("seed", self.seed, 0, 2**53 - 1))
         self._check()
 
     def _check(self) -> None:
@@ -167,6 +171,9 @@ class Scenario:
                 f"{self.samples * self.steps:.3g} physics steps: give a shorter duration or longer periods "
                 f"(at most {MOST_VALUES:.0e} values and {MOST_STEPS:.0e} steps)"
             )
+        for knots in (self.duration / d.dt for d in self.disturbance if isinstance(d, OrnsteinUhlenbeck)):
+            if knots > MOST_STEPS:
+                raise ScenarioError(f"OrnsteinUhlenbeck's dt makes {knots:.3g} knots: give at least duration / 1e8")
         if self.reference.random:
             raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
         if self.jump is not None and self.jump.time >= self.duration:
@@ -206,13 +213,13 @@ def _component(value: object, kind: str, find) -> Component:
     if isinstance(value, Component) and value.kind == kind:
         return value
     field = {"law": "law", "estimator": "velocity"}[kind]
-    raise ScenarioError(f"{field} is {value!r}: give smc.{kind}(...), one of your own, or a name")
+    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
 
 
 def _physics_step(step: object, period: float) -> float:
     if step is None:
         return period / math.ceil(period / LARGEST_STEP - 1e-9)
-    h = number("physics_step", step, above=0.0)
+    h = number("physics_step", step, least=SHORTEST)
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
@@ -220,7 +227,9 @@ def _physics_step(step: object, period: float) -> float:
 
 
 def _state(name: str, value: object, n: int) -> tuple[float, ...]:
-    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else (value,)
     if len(items) == 1:
         items *= n
     if len(items) != n:
@@ -232,13 +241,13 @@ def _signals(name: str, value: object) -> tuple[Signal, ...]:
     items: tuple[Any, ...] = () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
     for item in items:
         if not isinstance(item, Signal):
-            raise ScenarioError(f"{name} is {item!r}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
+            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
     if name == "reference" and len(items) != 1:
-        raise ScenarioError(f"reference is {value!r}: give one signal, such as smc.Constant(0.0)")
+        raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
     return items
 
 
 def _factors(name: str, value: object) -> Mapping[str, float]:
     if not isinstance(value, Mapping):
-        raise ScenarioError(f"{name} is {value!r}: give parameter names with their factors, such as {{'M': 1.3}}")
+        raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
     return {str(key): number(f"{name} of {key}", factor) for key, factor in value.items()}

@@ -2,7 +2,8 @@
 
 A signal is a frozen dataclass whose float fields are its parameters p and whose `value` is compiled. Deterministic
 signals read `value(t, p) -> (r, r', r'')`; as a disturbance only the first is used. Process noise depends on the
-channel, the seed and its own past, and reads `value(t, p, memory, seed, channel)`: memory is its per-channel state.
+channel, the seed and its own past, and reads `value(t, p, memory, seed, channel, stream)`: memory is its per-channel
+state, stream tells it from the run's other noises.
 Times in seconds, values in the unit of what the signal is added to (reference: m or rad; disturbance: N or N m).
 """
 
@@ -24,7 +25,7 @@ class Signal:
 
     memory: ClassVar[int] = 0  # floats of per-channel state
     positive: ClassVar[tuple[str, ...]] = ()  # parameters that must exceed 0
-    random: ClassVar[bool] = False  # whether value takes memory, seed and channel
+    random: ClassVar[bool] = False  # whether value takes memory, seed, channel and stream
 
     def __post_init__(self):
         for name, value in self.parameters().items():
@@ -119,21 +120,21 @@ class OrnsteinUhlenbeck(Signal):
         number("OrnsteinUhlenbeck's sigma", self.sigma, least=0.0)
 
     @staticmethod
-    def value(t, p, memory, seed, channel):
-        return _ornstein_uhlenbeck(t, p.sigma, p.tau, p.dt, memory, seed, channel), 0.0, 0.0
+    def value(t, p, memory, seed, channel, stream):
+        return _ornstein_uhlenbeck(t, p.sigma, p.tau, p.dt, memory, seed, channel, stream), 0.0, 0.0
 
 
 @njit(error_model="numpy")
-def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel):
+def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
     knot = t / dt
     if memory[0] == 0.0:
-        memory[2] = sigma * noise.normals(seed, channel, noise.PROCESS, 0)[0]
+        memory[2] = sigma * noise.normals(seed, channel, stream, 0)[0]
     a = math.exp(-dt / tau)
     while memory[0] <= knot:
         memory[1] = memory[2]
         memory[0] += 1.0
         memory[2] = (
-            a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, noise.PROCESS, memory[0])[0]
+            a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, stream, memory[0])[0]
         )
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 

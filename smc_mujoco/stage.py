@@ -1,7 +1,7 @@
 """The scene of a film: one machine a trace, side by side, under one camera that sees them all.
 
-Machines come from `plant.build` and stand `plant.lane` apart. The camera looks as the plant's own camera `look` does, from
-the nearest place that keeps every machine, wherever its trace takes it, inside the room that the page leaves.
+Machines come from `plant.spec()` and stand `plant.lane` apart. The camera looks as the plant's own camera `look` does,
+from the nearest place that keeps every machine, wherever its trace takes it, inside the room that the page leaves.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from smc_mujoco.trace import Trace
 
 SHOWN = 6  # channels of a network that a film shows: more would hide behind the next machine
 POSES = 24  # poses of each trace that must be in the picture
-QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 32, "numstacks": 16, "numquads": 1}  # looks and speed
+QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 24, "numstacks": 14, "numquads": 1}  # looks and speed
 
 
 class Stage:
@@ -29,9 +29,7 @@ class Stage:
       boxes: where each machine is in the picture, (machines, 4) px: left, top, right, bottom.
     """
 
-    def __init__(
-        self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], room: camera.Room
-    ):
+    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], room: camera.Room):
         plants = [small(trace.scenario.plant) for trace in traces]
         self.shown = [plant.n for plant in plants]
         self.model = compose(plants, size)

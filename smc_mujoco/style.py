@@ -62,6 +62,13 @@ RC = {
 }
 
 
+def page():
+    """A context in which matplotlib draws in this style."""
+    from matplotlib import rc_context
+
+    return rc_context(RC)  # pyright: ignore[reportArgumentType]
+
+
 def law_colour(law: str) -> str:
     """The colour of a law, "#RRGGBB"; a law of your own always gets the same one."""
     return COLOURS.get(law, OTHERS[zlib.crc32(law.encode()) % len(OTHERS)])
@@ -85,13 +92,16 @@ def law_name(law: str) -> str:
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     """One label a trace: the given ones, else the laws' names, numbered where a law comes again.
 
+    A given label that is the law's own name is written as people write it.
+
     Raises:
       ScenarioError: not as many labels as traces.
     """
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
-        return [str(label) for label in given]
+        own = [trace.scenario.law.name for trace in traces]
+        return [law_name(label) if label == law else str(label) for label, law in zip(given, own, strict=True)]
     names = [law_name(trace.scenario.law.name) for trace in traces]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
 

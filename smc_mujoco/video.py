@@ -6,7 +6,7 @@ written one by one: a film's length costs time but no memory.
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,13 @@ from smc_mujoco.files import replacing
 from smc_mujoco.stage import Stage
 from smc_mujoco.trace import Trace
 
+FPS = 30.0
 MOST = 8  # machines: more are too small to tell apart
 LEAST, LARGEST = (320, 180), (1920, 1080)  # px
 FULL = 1280  # px, the width for which sizes of letters are stated
 CHARTS = 0.36  # of the height
+SEEN = 1e-3  # rad, m, or of the longest arrow: less than half a pixel, and not worth a new picture
+REST = 1200  # ms for which a clip's last picture stays before it starts again
 CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
 Report = Callable[[int], None]
 
@@ -61,9 +64,7 @@ def film(
     with replacing(path) as part, contextlib.closing(pictures):
         first = next(pictures)
         options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
-        with mediapy.VideoWriter(
-            part, first.shape[:2], **options, ffmpeg_args="-movflags +faststart"
-        ) as writer:
+        with mediapy.VideoWriter(part, first.shape[:2], **options, ffmpeg_args="-movflags +faststart") as writer:
             writer.add_image(first)
             report(1)
             for picture in pictures:
@@ -82,7 +83,7 @@ def clip(
     fps: float = 20.0,
     report: Report = lambda frames: None,
 ) -> Path:
-    """Write an animated .webp of the span from .. to in s: small, and shown by web pages as an image. Else as `film`."""
+    """Write an animated .webp of the time `span`, s: small, and shown as an image by web pages. Else as `film`."""
     path = Path(path)
     if path.suffix != ".webp":
         raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
@@ -96,13 +97,9 @@ def clip(
     for picture in frames(traces, times, labels, title, size):
         pictures.append(Image.fromarray(picture))
         report(1)
-    ends = [round(1000 / fps)] * (len(times) - 1) + [
-        1200
-    ]  # ms; the last picture stays before it starts again
+    ends = [round(1000 / fps)] * (len(times) - 1) + [REST]
     with replacing(path) as part:
-        pictures[0].save(
-            part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4
-        )
+        pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
     return path
 
 
@@ -140,7 +137,7 @@ def frames(
     labels: Sequence[str] | None,
     title: str | None,
     size: tuple[int, int],
-) -> Iterator[np.ndarray]:
+) -> Generator[np.ndarray]:
     """The film's pictures at the given times, each (height, width, 3) uint8."""
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
     if len(traces) > MOST:
@@ -160,6 +157,7 @@ def frames(
     with Stage(traces, colours, above, caption.room) as stage:
         caption.put(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        shown, picture = np.empty(0), np.empty(0)
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
@@ -168,8 +166,11 @@ def frames(
                 stage.paint(k, style.FAILED if failed[k] else colour)
                 for i in range(0 if failed[k] else stage.shown[k]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
-            picture = caption.over(stage.render(drawn), time, failed)
-            yield np.concatenate([picture, charts.at(time)])
+            ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
+            state = np.concatenate([*(place[frame] for place in places), failed, ends])
+            if len(state) != len(shown) or np.abs(state - shown).max() > SEEN:
+                shown, picture = state, stage.render(drawn)
+            yield np.concatenate([caption.over(picture, time, failed), charts.at(time)])
 
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:

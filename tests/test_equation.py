@@ -1,7 +1,7 @@
-"""Each ideal plant is its differential equation, held against scipy's DOP853 on the equations as the study states them.
+"""Each ideal plant is its differential equation, held against scipy's DOP853 on the equations of the study.
 
-Nothing of the plants' own `nominal` or `fields` is used: the right-hand sides, the laws and the sample-and-hold with its
-delay are written again here.
+Nothing of the plants' own `nominal` is used: the right-hand sides, the laws and the sample-and-hold with its delay are
+written again here.
 """
 
 import dataclasses
@@ -186,9 +186,7 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     fields = CONDITIONS[condition]
     if condition == "jump":
         fields = {"jump": smc.Jump(time=HALF, factors=smc.paper.JUMP_MILD[plant]), "disturbance": SINE}
-    scenarios = [
-        dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in smc.laws()
-    ]
+    scenarios = [dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in smc.laws()]
     for trace in smc.run(scenarios):
         s = trace.scenario
         states = np.stack([trace.x, trace.v])

@@ -24,6 +24,12 @@ def measured(e=0.0, de=0.0, dt=1e-3, f=0.0, g=1.0):
     return Measurement(t=0.0, dt=dt, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=f, g=g)
 
 
+def called(law, y, memory):
+    """u and s of a law that keeps its memory."""
+    assert law.function is not None
+    return law.function(y, plain.named(law), memory)
+
+
 @dataclasses.dataclass(frozen=True)
 class Sampled:
     """A run of plant A: t, s, u and the first memory cell before each sample, (K,) each."""
@@ -126,7 +132,7 @@ def test_boundary_layer_is_the_sign_outside_its_layer():
 
 def one(law, **y):
     """A law's first u and s."""
-    return law.function(measured(**y), plain.named(law), np.zeros(law.memory))
+    return called(law, measured(**y), np.zeros(law.memory))
 
 
 def gain(law, run):
@@ -166,9 +172,9 @@ def test_noise_winds_up_the_adaptive_gain_without_end_and_the_leak_bounds_it():
 
 def test_the_leak_forgets_exponentially_within_the_dead_zone():
     law = smc.law("adaptive_leak", k0=2.0, leak=3.0)
-    memory, gains = np.zeros(law.memory), plain.named(law)
+    memory = np.zeros(law.memory)
     for _ in range(1000):
-        law.function(measured(de=0.01), gains, memory)
+        called(law, measured(de=0.01), memory)
     assert 2.0 + memory[0] == pytest.approx(2.0 * (1 - 3e-3) ** 1000, rel=1e-9)
 
 
@@ -225,7 +231,7 @@ def test_every_law_is_zero_at_the_origin(name):
     law = smc.law(name)
     memory = np.zeros(law.memory)
     for _ in range(3):
-        assert law.function(measured(), plain.named(law), memory) == (0.0, 0.0)
+        assert called(law, measured(), memory) == (0.0, 0.0)
 
 
 @LAWS
@@ -233,8 +239,8 @@ def test_every_law_is_odd_in_what_it_measures(name):
     law = smc.law(name)
     ours, mirrored = np.zeros(law.memory), np.zeros(law.memory)
     for e, de, f in np.random.default_rng(0).normal(size=(500, 3)):
-        u, s = law.function(measured(e, de, f=f), plain.named(law), ours)
-        assert law.function(measured(-e, -de, f=-f), plain.named(law), mirrored) == (-u, -s)
+        u, s = called(law, measured(e, de, f=f), ours)
+        assert called(law, measured(-e, -de, f=-f), mirrored) == (-u, -s)
 
 
 @ACTING

@@ -1,6 +1,6 @@
 """The compiled callback and the plain Python loop give the same numbers, to the last bit, whatever else runs.
 
-The plain loop uses numpy's own generator and calls the laws as the Python functions they are, so that agreement holds the
+The plain loop uses numpy's own generator and calls the laws as the Python functions they are: agreement holds the
 callback's clock, noise, delay, estimators, signals, saturation and logging against a second telling of them.
 """
 
@@ -144,9 +144,24 @@ def test_the_law_and_the_trace_share_one_clock(period, steps):
     same(trace, plain.run(scenario))
 
 
+@pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
+def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
+    step = smc.Step(1.0, time=2 * period)
+    scenario = smc.Scenario(
+        plant="duffing", law="none", control_period=period, physics_step=period / steps, duration=0.5, disturbance=step
+    )
+    assert smc.run(scenario).d[:4, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
 def test_applied_is_the_command_of_the_delay_ago():
     delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
-    common = {"plant": "duffing", "law": "observer_free", "duration": 0.2, "control_period": 0.005, "physics_step": 0.001}
+    common = {
+        "plant": "duffing",
+        "law": "observer_free",
+        "duration": 0.2,
+        "control_period": 0.005,
+        "physics_step": 0.001,
+    }
     scenarios = [smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay) for delay in delays]
     for trace in smc.run(scenarios):
         samples = math.ceil(round(trace.scenario.input_delay / 0.001) / 5)  # a command acts from the next sample on
@@ -265,6 +280,8 @@ def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
     scenario = smc.Scenario(plant=plant, law=doomed(how=how), u_max=math.inf, duration=0.1, control_period=2e-3)
     trace = smc.run(scenario)
     same(trace, plain.run(scenario))
+    assert trace.diverged_at is not None
+    assert trace.failure is not None
     assert 0.05 <= trace.diverged_at <= 0.07
     assert f"t = {trace.diverged_at:g} s" in trace.failure
     for name in ("x", "v", "u", "applied", "s", "d"):
@@ -296,6 +313,21 @@ def test_plants_of_one_name_and_two_mechanisms_are_not_mixed():
     steep = dataclasses.replace(flat, plant=dataclasses.replace(duffing, build=tilted))
     for trace, scenario in zip(smc.run([flat, steep]), (flat, steep), strict=True):
         same(trace, plain.run(scenario))
+
+
+def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
+    """An autoreset wipes userdata, and with it the row: without a word, the rest of the trace would be raw memory."""
+    duffing = smc.plant("duffing")
+
+    def resetting(n):
+        spec = duffing.build(n)
+        spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+        return spec
+
+    plant = dataclasses.replace(duffing, name="resetting", build=resetting)
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, disturbance=smc.Constant(1e12)))
+    assert trace.diverged_at == 1e-3
+    assert "finite world" in str(trace.failure)
 
 
 class Policy:
@@ -330,7 +362,9 @@ def test_a_python_law_may_simulate_a_model_of_its_own():
     here = Path(__file__).parent
     env = os.environ | {"PYTHONPATH": f"{here.parent}{os.pathsep}{here}"}
     code = "import test_lockstep as t; t.predict()"
-    run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=100, check=False)
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=100, check=False
+    )
     assert run.returncode == 0, run.stderr[-500:]
 
 

@@ -120,7 +120,7 @@ TAU, SIGMA = 0.05, 0.7
 def path(signal, times, seed=0, channel=0):
     """The signal's values at rising times."""
     memory = np.zeros(signal.memory)
-    return np.array([type(signal).value(t, signal, memory, seed, channel)[0] for t in times])
+    return np.array([type(signal).value(t, signal, memory, seed, channel, noise.PROCESS)[0] for t in times])
 
 
 def test_process_noise_has_its_standard_deviation_and_correlation_time():

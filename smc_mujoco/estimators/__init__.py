@@ -1,11 +1,11 @@
 """Velocity estimators, one per file: (y, gains, memory) -> velocity; found by walking this package."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from smc_mujoco.component import Component, Template, discover, template
-from smc_mujoco.errors import unknown
+from smc_mujoco.errors import find
 
 Estimator = Component
 
@@ -19,10 +19,14 @@ class Reading(NamedTuple):
 
 
 def estimator_function(
-    *, gains: Mapping[str, float] | None = None, memory: int = 8, positive: tuple[str, ...] = ()
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
 ) -> Callable[[Callable], Template]:
     """Make an estimator of a function (y, gains, memory) -> velocity. Arguments as for `law_function`."""
-    return template("estimator", gains, memory, positive)
+    return template("estimator", gains, memory, positive, nonnegative)
 
 
 @functools.cache
@@ -37,9 +41,7 @@ def estimator(name: str, **gains: float) -> Estimator:
     Raises:
       ScenarioError: unknown estimator or gain, or a gain out of its range.
     """
-    if name not in catalogue():
-        raise unknown("velocity estimator", name, catalogue())
-    return catalogue()[name](**gains)
+    return find("velocity estimator", name, catalogue())(**gains)
 
 
 def estimators() -> list[str]:

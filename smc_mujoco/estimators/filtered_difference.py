@@ -7,7 +7,7 @@ The first estimate is 0, for want of a past position.
 from smc_mujoco.estimators import estimator_function
 
 
-@estimator_function(gains={"tau": 5e-3}, memory=3)
+@estimator_function(gains={"tau": 5e-3}, memory=3, nonnegative=("tau",))
 def filtered_difference(y, gains, memory):
     started, x_, v = memory
     if started:
