@@ -20,7 +20,7 @@ from rich.table import Table
 
 import smc_mujoco as smc
 from smc_mujoco.callback import installed
-from smc_mujoco.run import Chunk
+from smc_mujoco.chunk import Chunk
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9
@@ -46,7 +46,8 @@ def ratio(one: Callable[[], object], other: Callable[[], object]) -> tuple[float
 
 def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
     """A batch of equal runs, ready to step."""
-    return Chunk([dataclasses.replace(scenario, seed=seed) for seed in range(runs)], threads)
+    with installed():
+        return Chunk([dataclasses.replace(scenario, seed=seed) for seed in range(runs)], threads)
 
 
 def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:

@@ -19,6 +19,8 @@ from smc_mujoco import gl
 if TYPE_CHECKING:
     from smc_mujoco import paper as paper
     from smc_mujoco.cli import play as play
+    from smc_mujoco.conditions import Jump as Jump
+    from smc_mujoco.conditions import Noise as Noise
     from smc_mujoco.errors import ScenarioError as ScenarioError
     from smc_mujoco.estimators import estimator as estimator
     from smc_mujoco.estimators import estimator_function as estimator_function
@@ -34,8 +36,6 @@ if TYPE_CHECKING:
     from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning
     from smc_mujoco.run import run as run
     from smc_mujoco.run import stream as stream
-    from smc_mujoco.scenario import Jump as Jump
-    from smc_mujoco.scenario import Noise as Noise
     from smc_mujoco.scenario import Scenario as Scenario
     from smc_mujoco.scene import Scene as Scene
     from smc_mujoco.signals import (
@@ -68,7 +68,8 @@ _HOMES = {
     "cli": ("play",),
     "paper": ("paper",),
     "run": ("PlainLoopWarning", "run", "stream"),
-    "scenario": ("Jump", "Noise", "Scenario"),
+    "conditions": ("Jump", "Noise"),
+    "scenario": ("Scenario",),
     "scene": ("Scene",),
     "signals": ("Constant", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
     "trace": ("Trace", "load"),

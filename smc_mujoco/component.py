@@ -29,10 +29,11 @@ class Component:
     function: Callable | None = dataclasses.field(repr=False)
 
     def __reduce__(self):
-        """By the name of its template where that can be found again: a decorated function cannot be pickled by its own."""
-        found = _at(getattr(self.function, "__module__", None), getattr(self.function, "__qualname__", None))
+        """By the name of its template: that of the decorated function no longer leads to it."""
+        home = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
+        found = _at(*home)
         if isinstance(found, Template) and found.function is self.function:
-            return _bind, (self.function.__module__, self.function.__qualname__, dict(self.gains))
+            return _bind, (*home, dict(self.gains))
         return super().__reduce__()
 
     def __hash__(self):
@@ -42,10 +43,10 @@ class Component:
         return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
 
 
-def _at(module: str | None, name: str | None) -> object:
+def _at(module: str, name: str) -> object:
     """What stands in a module under a dotted name, or None."""
-    found: object = sys.modules.get(module or "")
-    for part in (name or "?").split("."):
+    found: object = sys.modules.get(module)
+    for part in name.split("."):
         found = getattr(found, part, None)
     return found
 
@@ -107,6 +108,9 @@ def template(
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
     defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
     size = whole("memory", memory, 1, 10_000)
+    for name in (*positive, *nonnegative):
+        if name not in defaults:
+            raise unknown("gain with a sign", name, defaults)
 
     def decorate(function: Callable) -> Template:
         name = getattr(function, "__name__", type(function).__name__)

@@ -92,7 +92,9 @@ def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
         nuserdata = _struct("mjModel", last="nuserdata").nuserdata.offset
         arrays = [getattr(struct, name).offset for name in Offsets._fields[1:]]
     except (AttributeError, ValueError) as error:
-        raise LayoutError(f"mujoco {mujoco.__version__} lacks a field of mjData ({error}): install mujoco 3.17") from error
+        raise LayoutError(
+            f"mujoco {mujoco.__version__} lacks a field of mjData ({error}): install mujoco 3.17"
+        ) from error
     if ctypes.c_int64.from_address(model._address + nuserdata).value != model.nuserdata:
         raise _mismatch("mjModel.nuserdata", nuserdata)
     for name, offset in zip(Offsets._fields[1:], arrays, strict=True):

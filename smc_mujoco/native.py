@@ -17,6 +17,7 @@ from collections.abc import Callable
 from llvmlite import ir
 from numba import carray, cfunc, njit, types
 from numba.core.dispatcher import Dispatcher
+from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from smc_mujoco.component import Component
@@ -61,6 +62,8 @@ def call(typingctx, address, inputs, parameters, memory, outputs):
 def attempt(typingctx, body, arguments):
     """(whether body(*arguments) returned, what it returned): an exception ends as False, not in Python."""
     resolved = body.get_call_type(typingctx, tuple(arguments), {})
+    if not isinstance(resolved.return_type, types.BaseTuple | types.Number | types.Boolean):
+        raise TypingError(f"it returns {resolved.return_type} instead of numbers")
 
     def codegen(context, builder, signature, args):
         compiled = body.dispatcher.overloads[resolved.args]
@@ -105,11 +108,27 @@ class Function:
         self.address: int = self._cfunc.address
 
 
+# How the lines of numba's errors begin that say where it was, not what it did not like.
+WHEREABOUTS = (
+    *(
+        "Failed in",
+        "No implementation",
+        "There are",
+        "- Of which",
+        "Overload",
+        "Intrinsic",
+        "With argument",
+        "Rejected",
+    ),
+    *("TypingError: Failed", "raised from", "During", "File ", ">>>", "[1]", "def ", "^", "<source"),
+)
+
+
 def reason(error: Exception) -> str:
     """The line of a compiler's error that says what it did not like."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    telling = [line for line in lines if not line.startswith(("Failed in", "During:", "File ", "[1]"))]
-    return (telling or lines or [type(error).__name__])[0]
+    lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~.")]
+    telling = [line for line in lines if not line.startswith(WHEREABOUTS)]
+    return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
 
 
 def jit(function: Callable) -> Callable:
@@ -196,10 +215,21 @@ def component(c: Component) -> Function:
     """A law or an estimator, compiled.
 
     Raises:
-      NotCompilable: with the compiler's reason.
+      NotCompilable: with its name and the compiler's reason.
     """
     compiler = {"law": law, "estimator": estimator}[c.kind]
+    return _named(f"{c.kind} {c.name!r}", compiler, c.function, tuple(c.gains), c.memory)
+
+
+def of_signal(s: Signal) -> Function:
+    """A signal, compiled; raises as `component`."""
+    return _named(type(s).__name__, signal, type(s), tuple(s.parameters()))
+
+
+def _named(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:
     try:
-        return compiler(c.function, tuple(c.gains), c.memory)
+        return compiler(*arguments)
+    except NotCompilable as error:
+        raise NotCompilable(f"{name} does not compile: {error}") from None
     except TypeError:
-        raise NotCompilable(f"{c.name} cannot be compiled once and found again: it is not hashable") from None
+        raise NotCompilable(f"{name} does not compile: it is not hashable") from None

@@ -11,10 +11,11 @@ bound, and the plants' parameters stand in their files.
 
 from collections.abc import Callable, Sequence
 
+from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import find
 from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law
-from smc_mujoco.scenario import Jump, Noise, Scenario
+from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Pulse, Sine, Step
 
 # The four laws that the paper compares; its higher-order one is the last.

@@ -6,17 +6,19 @@ microseconds.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco import native, noise
-from smc_mujoco.callback import HUGE, LEFT, WORLD, installed
+from smc_mujoco.callback import installed
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
 from smc_mujoco.component import Component
+from smc_mujoco.errors import shown
 from smc_mujoco.estimators import Reading
+from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
 from smc_mujoco.plant import Values, write
 from smc_mujoco.scenario import Scenario
@@ -73,6 +75,7 @@ class Loop:
         self.failed_step = 0  # physics step
 
     def set_parameters(self, factors: Mapping[str, float]) -> None:
+        """Give the mechanism other true parameters."""
         plant = self.scenario.plant
         write(self.model, plant.fields(self.model, plant.values(factors)))
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
@@ -95,7 +98,7 @@ class Loop:
                 applied = data.ctrl[self.table[:, CTRL]]
                 self.log[:, k] = x, v, self.commands[-1], applied, self.s, d
         except Failure as failure:
-            self.failure, self.failed_step = str(failure), step
+            self.failure, self.failed_step = " ".join(str(failure).split()), step
 
     def begin(self, data: mujoco.MjData, step: int) -> None:
         """The first stage of a physics step: at a sample the law; the command whose delay has passed."""
@@ -118,22 +121,20 @@ class Loop:
                 z = normals(self.scenario.seed, i, noise.MEASUREMENT, k)
                 x[i], v[i] = x[i] + sigma.position * z[0], v[i] + sigma.velocity * z[1]
             reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
-            v[i] = guarded(estimator, i, reading, named(estimator), self.estimator_memory[i])
+            out = guarded(estimator, i, reading, named(estimator), self.estimator_memory[i])
+            v[i] = numbers(f"estimator {estimator.name!r}", (out,), "a velocity")[0]
         return x, v
 
     def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Saturated commands and sliding variables, (n,) each."""
         scenario, law = self.scenario, self.scenario.law
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
-        r, dr, ddr = type(scenario.reference).value(t, scenario.reference)
+        r, dr, ddr = signalled(scenario.reference, t)
         for i in range(len(x)):
             xi, vi, (f, g) = float(x[i]), float(v[i]), scenario.plant.nominal(x, v, i, self.nominal)
             y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
             out = guarded(law, i, y, named(law), self.memory[i])
-            try:
-                u[i], s[i] = out
-            except (TypeError, ValueError):
-                raise Failure(f"law {law.name!r} returned {out!r} instead of the two numbers u, s") from None
+            u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and min(abs(u[i]), scenario.u_max) < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
         return np.clip(u, -scenario.u_max, scenario.u_max), s
@@ -142,14 +143,30 @@ class Loop:
         """The sum of the disturbances, (n,)."""
         d = np.zeros(self.scenario.plant.n)
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
-            d += [value(signal, t, memory[i], self.scenario.seed, i, noise.PROCESS + j) for i in range(len(d))]
+            stream = noise.PROCESS + j
+            d += [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(d))]
         return d
 
 
-def value(signal: Signal, t: float, memory: np.ndarray, seed: int, channel: int, stream: int) -> float:
-    """A disturbance at time t in one channel."""
-    function: Callable[..., Any] = type(signal).value
-    return (function(t, signal, memory, seed, channel, stream) if signal.random else function(t, signal))[0]
+def signalled(signal: Signal, t: float, *state: Any) -> list[float]:
+    """A signal and its two derivatives at time t; `state` is what random ones also take."""
+    name, function = type(signal).__name__, type(signal).value
+    try:
+        out = function(t, signal, *state) if signal.random else function(t, signal)
+    except Exception as error:
+        raise Failure(f"{name} raised {type(error).__name__} ({error})") from error
+    return numbers(name, out, "a value and two derivatives", 3)
+
+
+def numbers(who: str, out: Any, what: str, count: int = 1) -> list[float]:
+    """What a user's function returned, as floats."""
+    try:
+        values = [float(value) for value in out]
+    except (TypeError, ValueError, OverflowError):
+        values = []
+    if len(values) != count:
+        raise Failure(f"{who} returned {shown(out)} instead of {what}")
+    return values
 
 
 def named(component: Component) -> tuple:

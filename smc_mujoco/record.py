@@ -3,11 +3,12 @@
 import dataclasses
 
 from smc_mujoco.component import Component, Template
+from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import plant as find_plant
-from smc_mujoco.scenario import Jump, Noise, Scenario
+from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal, kinds
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
@@ -45,14 +46,14 @@ def restore(data: dict) -> Scenario:
 
 
 def _component(c: Component) -> dict:
-    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory}
+    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory, "module": getattr(c.function, "__module__", "")}
 
 
 def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
     template = known.get(data["name"])
-    if template is not None and set(template.defaults) == set(data["gains"]):
+    if template is not None and template.function.__module__ == data["module"]:
         return template(**data["gains"])
-    return Component(kind=kind, function=None, **data)
+    return Component(kind=kind, name=data["name"], gains=dict(data["gains"]), memory=data["memory"], function=None)
 
 
 def _signal(signal: Signal) -> dict:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.component import Component, Template
+from smc_mujoco.conditions import Jump, Noise, parameter_factors
 from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.estimators import Estimator, estimator
 from smc_mujoco.law import Law, law
@@ -26,32 +27,8 @@ MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 G
 FAR = 1e6  # initial states beyond this have already diverged
 
 
-@dataclasses.dataclass(frozen=True)
-class Noise:
-    """Zero-mean Gaussian measurement noise: standard deviations of position and velocity, in their SI units."""
-
-    position: float = 0.0
-    velocity: float = 0.0
-
-    def __post_init__(self):
-        number("Noise's position", self.position, least=0.0)
-        number("Noise's velocity", self.velocity, least=0.0)
-
-
 REST, QUIET = Constant(0.0), Noise()
 MISSING: Any = None  # a field left out, filled in when the scenario is made
-
-
-@dataclasses.dataclass(frozen=True)
-class Jump:
-    """The plant's parameters multiplied by `factors` (parameter name -> factor) from `time` on, s."""
-
-    time: float
-    factors: Mapping[str, float]
-
-    def __post_init__(self):
-        number("Jump's time", self.time, least=0.0)
-        object.__setattr__(self, "factors", _factors("Jump", self.factors))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -134,7 +111,7 @@ class Scenario:
         put("law", _component(self.law, "law", law))
         put("velocity", _component("measured" if self.velocity is None else self.velocity, "estimator", estimator))
         put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
-        put("control_period", number("control_period", self.control_period, least=SHORTEST))
+        put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
         put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
         put("physics_step", _physics_step(self.physics_step, self.control_period))
@@ -145,7 +122,7 @@ class Scenario:
         put("noise", QUIET if self.noise is None else self.noise)
         if not isinstance(self.noise, Noise):
             raise ScenarioError(f"noise is {shown(self.noise)}: give smc.Noise(position=..., velocity=...) or None")
-        put("mismatch", _factors("mismatch", {} if self.mismatch is None else self.mismatch))
+        put("mismatch", parameter_factors("mismatch", {} if self.mismatch is None else self.mismatch))
         if not isinstance(self.jump, Jump | None):
             raise ScenarioError(f"jump is {shown(self.jump)}: give smc.Jump(time=..., factors=...) or None")
         if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
@@ -171,9 +148,11 @@ class Scenario:
                 f"{self.samples * self.steps:.3g} physics steps: give a shorter duration or longer periods "
                 f"(at most {MOST_VALUES:.0e} values and {MOST_STEPS:.0e} steps)"
             )
-        for knots in (self.duration / d.dt for d in self.disturbance if isinstance(d, OrnsteinUhlenbeck)):
-            if knots > MOST_STEPS:
-                raise ScenarioError(f"OrnsteinUhlenbeck's dt makes {knots:.3g} knots: give at least duration / 1e8")
+        for d in self.disturbance:
+            if isinstance(d, OrnsteinUhlenbeck) and self.duration / d.dt > MOST_STEPS:
+                raise ScenarioError(
+                    f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more"
+                )
         if self.reference.random:
             raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
         if self.jump is not None and self.jump.time >= self.duration:
@@ -211,6 +190,8 @@ def _component(value: object, kind: str, find) -> Component:
     if isinstance(value, Template):
         value = value()
     if isinstance(value, Component) and value.kind == kind:
+        for name, gain in value.gains.items():
+            number(f"{value.name}'s {name}", gain)
         return value
     field = {"law": "law", "estimator": "velocity"}[kind]
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
@@ -219,7 +200,7 @@ def _component(value: object, kind: str, find) -> Component:
 def _physics_step(step: object, period: float) -> float:
     if step is None:
         return period / math.ceil(period / LARGEST_STEP - 1e-9)
-    h = number("physics_step", step, least=SHORTEST)
+    h = number("physics_step", step, above=0.0, least=SHORTEST)
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
@@ -245,9 +226,3 @@ def _signals(name: str, value: object) -> tuple[Signal, ...]:
     if name == "reference" and len(items) != 1:
         raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
     return items
-
-
-def _factors(name: str, value: object) -> Mapping[str, float]:
-    if not isinstance(value, Mapping):
-        raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
-    return {str(key): number(f"{name} of {key}", factor) for key, factor in value.items()}

@@ -7,8 +7,9 @@ from pathlib import Path
 from rich.console import Console
 
 from smc_mujoco import gl
+from smc_mujoco.chunk import contents
 from smc_mujoco.native import NotCompilable
-from smc_mujoco.run import contents, run
+from smc_mujoco.run import run
 from smc_mujoco.scene import Scene
 from smc_mujoco.trace import Trace
 

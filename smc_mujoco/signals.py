@@ -133,9 +133,7 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
     while memory[0] <= knot:
         memory[1] = memory[2]
         memory[0] += 1.0
-        memory[2] = (
-            a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, stream, memory[0])[0]
-        )
+        memory[2] = a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, stream, memory[0])[0]
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 
 

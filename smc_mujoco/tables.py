@@ -47,7 +47,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
 
 
 def number(value: float) -> str:
-    """Three significant digits, written short; "never" for inf, and no more than "<1e-9" for what rounding may have left."""
+    """Three significant digits, written short; "never" for inf; "<1e-9" where little but rounding is left."""
     if math.isinf(value):
         return "never"
     if 0.0 < abs(value) < 1e-9:

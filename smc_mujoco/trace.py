@@ -5,6 +5,7 @@ import json
 import math
 import os
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,9 @@ class Trace:
         for name in ARRAYS:
             getattr(self, name).flags.writeable = False
 
+    def __reduce__(self):  # so that a copy is as read-only as this
+        return _trace, ({f.name: getattr(self, f.name) for f in dataclasses.fields(self)},)
+
     def __repr__(self) -> str:
         end = "" if self.diverged_at is None else f", {self.failure}"
         return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
@@ -92,15 +96,21 @@ class Trace:
         return path
 
 
+def _trace(fields: dict) -> Trace:
+    return Trace(**fields)
+
+
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
     """The Trace of a log (6, K + 1, n) of x, v, u, applied, s, d; `failed_step` is the physics step of a failure."""
     t = np.arange(scenario.samples + 1) * scenario.control_period
-    r = np.repeat(scenario.reference(t)[:, None], scenario.plant.n, axis=1)
-    diverged_at = None
+    diverged_at, good = None, len(t)  # samples before the failure
     if failure is not None:
-        log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
+        good = math.ceil(failed_step / scenario.steps)
+        log[:, good:] = np.nan
         diverged_at = failed_step * scenario.physics_step
         failure = f"{failure}, at t = {diverged_at:.6g} s"
+    r = np.full_like(log[0], np.nan)
+    r[:good] = scenario.reference(t[:good])[:, None]
     arrays = dict(zip(LOGGED, log, strict=True))
     return Trace(**arrays, t=t, r=r, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
@@ -118,14 +128,26 @@ def load(path: str | os.PathLike) -> Trace:
             arrays = {name: file[name] for name in ARRAYS}
     except FileNotFoundError:
         raise ScenarioError(f"no trace at {path}: give the path of a .npz file that a run wrote") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, NotImplementedError):
         raise ScenarioError(f"{path} is no trace of smc_mujoco: give a .npz file that a run wrote") from None
-    end = {key: about.pop(key) for key in ("diverged_at", "failure")}
-    return Trace(**arrays, scenario=record.restore(about), **end)
+    try:
+        end = {key: about.pop(key) for key in ("diverged_at", "failure")}
+        scenario = record.restore(about)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        why = error if isinstance(error, ScenarioError) else f"{type(error).__name__}, {error}"
+        raise ScenarioError(
+            f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
+        ) from None
+    shape = (scenario.samples + 1, scenario.plant.n)
+    if any(a.shape != (shape[:1] if name == "t" else shape) or a.dtype != float for name, a in arrays.items()):
+        raise ScenarioError(f"{path} holds arrays that do not fit its scenario: give a file that a run wrote")
+    return Trace(**arrays, scenario=scenario, **end)
 
 
 def _suffixed(path: str | os.PathLike, suffix: str) -> Path:
     path = Path(path)
+    if not path.name or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
     if path.suffix not in ("", suffix):
         raise ScenarioError(f"cannot save to {path.name!r}: end the name in {suffix}")
     return path.with_suffix(suffix)

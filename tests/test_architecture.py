@@ -19,13 +19,14 @@ CATALOGUES = ("laws", "plants", "estimators")
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
     {"errors", "gl", "layout", "noise", "row", "coil"},
-    {"files", "channels", "component"},
+    {"files", "channels", "component", "conditions"},
     {"law", "estimators", "signals", "plant"},
     {"native", "scenario", "pendulum_chain"},
-    {"callback", "record", "paper", "scene"},
-    {"trace"},
+    {"harness", "record", "paper", "scene"},
+    {"callback", "trace"},
     {"plain", "measure"},
-    {"run", "metrics"},
+    {"chunk", "metrics"},
+    {"run"},
 )
 HEIGHT = {name: height for height, names in enumerate(CORE) for name in names}
 TOP = len(CORE)  # the height of what shows results

@@ -25,6 +25,7 @@ from smc_mujoco import plain
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 PLANTS = pytest.mark.parametrize("plant", smc.plants())
 runner = importlib.import_module("smc_mujoco.run")  # smc.run is the function
+chunk_module = importlib.import_module("smc_mujoco.chunk")
 
 
 def same(a, b):
@@ -219,7 +220,7 @@ def test_company_changes_no_bit(together):
 @pytest.mark.parametrize("slice_steps", [1, 777, 10**9])
 def test_chunks_and_slices_change_no_bit(together, monkeypatch, chunk_bytes, slice_steps):
     monkeypatch.setattr(runner, "CHUNK_BYTES", chunk_bytes)
-    monkeypatch.setattr(runner, "SLICE_STEPS", slice_steps)
+    monkeypatch.setattr(chunk_module, "SLICE_STEPS", slice_steps)
     assert digest(smc.run(batch(), threads=2)) == digest(together)
 
 

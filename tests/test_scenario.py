@@ -347,6 +347,20 @@ def test_a_plant_keeps_a_positive_mass(name, value):
     refused(lambda: scenario(jump=smc.Jump(0.5, {name: value})), name, f"{value:g}")
 
 
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"mismatch": {"mass": 1e-200, "M": 1e-200}},
+        {"mismatch": {"mass": 1e-200}, "jump": smc.Jump(0.5, {"mass": 1e-200})},
+        {"mismatch": {"alpha": 1e300}, "jump": smc.Jump(0.5, {"alpha": 1e300})},
+        {"plant": smc.plant("duffing", M=1e-200), "mismatch": {"mass": 1e-200}},
+    ],
+    ids=str,
+)
+def test_factors_that_together_leave_no_mechanism_are_refused(fields):
+    refused(lambda: scenario(**fields), "duffing")
+
+
 def test_mass_means_the_plant_s_mass():
     assert vars(smc.plant("duffing").values({"mass": 2.0}))["M"] == 2.0
     assert vars(smc.plant("pendulum_network").values({"mass": 2.0}))["m"] == 1.0
@@ -367,7 +381,7 @@ def test_a_jump_that_is_no_jump_is_refused(value):
     refused(lambda: scenario(jump=value), "jump")
 
 
-@pytest.mark.parametrize("seed", [-1, 2**53, 1.0, True, None, "1", NAN, [1]], ids=brief)
+@pytest.mark.parametrize("seed", [-1, 2**53, 1.5, True, None, "1", NAN, [1]], ids=brief)
 def test_a_seed_is_a_whole_number_that_a_float_holds(seed):
     refused(lambda: scenario(seed=seed), "seed", repr(seed))
 

@@ -1,6 +1,6 @@
 """The clips that README shows: four laws on each plant, a few seconds each, as animated WebP in videos/gallery.
 
-    make gallery          or          python videos/gallery.py
+make gallery          or          python videos/gallery.py
 """
 
 from pathlib import Path

@@ -1,0 +1,147 @@
+"""Scenarios of one layout in one Batch: from scenarios to rows, through the simulation, to traces."""
+
+from collections.abc import Callable, Sequence
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from smc_mujoco import callback, harness, native, plain, row
+from smc_mujoco.channels import QPOS, QVEL, channels
+from smc_mujoco.component import Component
+from smc_mujoco.plant import array
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.signals import Signal
+from smc_mujoco.trace import Trace, from_log
+
+SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
+
+Report = Callable[[int], None]  # told the number of simulated steps just done
+
+
+def contents(scenario: Scenario) -> row.Contents:
+    """What the scenario's row says, with everything it names compiled.
+
+    Raises:
+      NotCompilable: the law, the estimator, a signal or the plant's nominal model is not for numba.
+    """
+    nominal = scenario.plant.parameters
+    return row.Contents(
+        law=_component(scenario.law),
+        estimator=_component(scenario.velocity),
+        nominal=row.Part(
+            address=native.nominal(scenario.plant.nominal, tuple(nominal)).address, values=tuple(nominal.values())
+        ),
+        reference=_signal(scenario.reference),
+        disturbances=[_signal(d) for d in scenario.disturbance],
+        n=scenario.plant.n,
+        steps=scenario.steps,
+        stages=4 if scenario.integrator == "RK4" else 1,
+        step=scenario.physics_step,
+        period=scenario.control_period,
+        delay=round(scenario.input_delay / scenario.physics_step),
+        limit=scenario.u_max,
+        seed=scenario.seed,
+        sigma_x=scenario.noise.position,
+        sigma_v=scenario.noise.velocity,
+    )
+
+
+class Chunk:
+    """Scenarios of one layout in one Batch; to be made and run while the callback is installed."""
+
+    def __init__(self, scenarios: Sequence[Scenario], threads: int):
+        first = self.first = scenarios[0]
+        self.scenarios = scenarios
+        self.logs = [np.empty((6, first.samples + 1, first.plant.n)) for _ in scenarios]
+        self.table = np.empty((first.plant.n, 7), np.int64)
+        rows = [
+            row.pack(contents(scenario), callback.mark(), self.table, log)
+            for scenario, log in zip(scenarios, self.logs, strict=True)
+        ]
+        self.model = first.plant.load(nuserdata=max(map(len, rows)))
+        self.model.opt.timestep = first.physics_step
+        self.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
+        self.table[:] = channels(self.model)
+        self.batch = Batch(self.model, len(scenarios), min(threads, len(scenarios)))
+        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self.rows = self.batch.bind("userdata")
+        qpos, qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
+        for i, (scenario, packed) in enumerate(zip(scenarios, rows, strict=True)):
+            self.rows[i, : len(packed)] = packed
+            qpos[i, self.table[:, QPOS]] = scenario.x0
+            qvel[i, self.table[:, QVEL]] = scenario.v0
+        self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
+        self.errors: dict[int, str] = {}
+        self.set_parameters(0, range(len(scenarios)))
+
+    def run(self, report: Report) -> list[Trace]:
+        """Simulate all of them to the end."""
+        total = self.first.samples * self.first.steps
+        starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step < total})
+        for start, end in zip(starts, [*starts[1:], total], strict=True):
+            if start:
+                self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
+            self.advance(end - start, report)
+        self.attempt(self.batch.forward)  # the callback's last sample, at the end
+        return [self.trace(i) for i in range(len(self.scenarios))]
+
+    def set_parameters(self, step: int, indices: Sequence[int]) -> None:
+        """Give simulations the true parameters that hold from a step on."""
+        derived = []
+        for i in indices:
+            plant = self.scenarios[i].plant
+            for name, at, value in plant.fields(self.model, plant.values(self.scenarios[i].factors(step))):
+                held = self.fields[name][i] if name in self.fields else array(self.model, name)
+                if np.any(held[at] != value):
+                    self.fields[name] = self.batch.expand(name)
+                    self.fields[name][i][at] = value
+                    derived.append(i)
+        if derived:
+            self.batch.set_const(np.unique(derived).astype(np.int32))
+
+    def advance(self, steps: int, report: Report) -> None:
+        """Step the simulations that still run, in slices, so that progress shows and Ctrl-C is heard."""
+        size = len(self.scenarios) * self.first.plant.n
+        while steps:
+            count = min(steps, max(1, SLICE_STEPS // size))
+            self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count))
+            report(count * size)
+            steps -= count
+
+    def attempt(self, action: Callable[[np.ndarray], None]) -> None:
+        """Do something to the simulations that still run; note those in which MuJoCo raises."""
+        alive = np.flatnonzero(self.rows[:, row.FAILURE] == row.FINE).astype(np.int32)
+        try:
+            action(alive)
+        except SimulationError as error:
+            for i in error.ids:
+                self.errors[int(i)] = self.batch.error(int(i))
+                self.rows[i, row.FAILURE] = row.DIVERGED
+                self.rows[i, row.FAILED_STEP] = self.rows[i, row.CALLS] // self.rows[i, row.STAGES]
+
+    def trace(self, i: int) -> Trace:
+        """The Trace of simulation i."""
+        scenario, failure = self.scenarios[i], int(self.rows[i, row.FAILURE])
+        if failure in (row.RAISED, row.NOT_FINITE):
+            again = plain.run(scenario)  # Python knows what was raised, and where
+            if again.failure:
+                return again
+        reason = {
+            row.FINE: None,
+            row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
+            row.RAISED: f"law {scenario.law.name!r} raised an exception",
+            row.NOT_FINITE: f"law {scenario.law.name!r} returned NaN, inf or a command above {harness.HUGE:g}",
+        }[failure]
+        return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
+
+
+def _component(c: Component) -> row.Part:
+    return row.Part(address=native.component(c).address, values=tuple(c.gains.values()), memory=c.memory)
+
+
+def _signal(s: Signal) -> row.Part:
+    values = s.parameters()
+    return row.Part(
+        address=native.of_signal(s).address, values=tuple(values.values()), memory=s.memory, random=s.random
+    )
