@@ -37,7 +37,7 @@ def run(scenario: Scenario) -> Trace:
     with installed():
         loop = Loop(scenario)
     total = scenario.samples * scenario.steps
-    with installed(loop.control):
+    with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named
         for step in range(total + 1):
             if step == scenario.jump_step:
                 loop.set_parameters(scenario.factors(step))
