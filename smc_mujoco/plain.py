@@ -131,13 +131,21 @@ class Loop:
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         r, dr, ddr = signalled(scenario.reference, t)
         for i in range(len(x)):
-            xi, vi, (f, g) = float(x[i]), float(v[i]), scenario.plant.nominal(x, v, i, self.nominal)
+            xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
             y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
             out = guarded(law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and min(abs(u[i]), scenario.u_max) < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
         return np.clip(u, -scenario.u_max, scenario.u_max), s
+
+    def model_at(self, x: np.ndarray, v: np.ndarray, i: int) -> tuple[float, float]:
+        """Nominal f and g of channel i."""
+        plant = self.scenario.plant
+        try:
+            return plant.nominal(x, v, i, self.nominal)
+        except Exception as error:
+            raise Failure(f"the nominal model of {plant.name} raised {type(error).__name__} ({error})") from error
 
     def disturbance(self, t: float) -> np.ndarray:
         """The sum of the disturbances, (n,)."""
@@ -176,7 +184,7 @@ def named(component: Component) -> tuple:
 
 def guarded(component: Component, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:
     """What a law or an estimator returns; its exception as a Failure that names it."""
-    function: Any = component.function
+    function: Any = getattr(component.function, "py_func", component.function)  # as written, if numba compiled it
     try:
         return function(y, gains, memory)
     except Exception as error:

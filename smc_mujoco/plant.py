@@ -8,6 +8,7 @@ freedom: its actuator, its two sensors and its body are read off the compiled mo
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +19,8 @@ import numpy as np
 
 from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
+
+LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 
@@ -101,6 +104,9 @@ class Plant:
             if factor <= 0.0 and name in self.positive:
                 raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
             values[name] *= factor
+        for name, value in values.items():
+            if not math.isfinite(value) or (value <= 0.0 and name in self.positive):
+                raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
         return Values(**values)
 
 
@@ -151,7 +157,8 @@ def plant(name: str, **parameters: float) -> Plant:
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
-        values[key] = number(f"{name}'s {key}", value, above=0.0 if key in base.positive else -np.inf)
+        low = {"above": 0.0, "least": 1e-6} if key in base.positive else {"least": -LARGEST}
+        values[key] = number(f"{name}'s {key}", value, most=LARGEST, **low)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     return dataclasses.replace(base, parameters=values, n=n, x0=x0)
 

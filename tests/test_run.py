@@ -528,7 +528,7 @@ for factor in (1e-300, 1e-30, 1e-16, 1e30, 1e308):
     run("none", jump=smc.Jump(0.01, {"mass": factor}))
     run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), mismatch={"mass": factor})
 for name in ("alpha", "beta", "delta"):
-    for value in (-1e300, 1e300):
+    for value in (-1e9, 1e9):
         assert run("none", plant=smc.plant("duffing", **{name: value})).diverged_at is not None
         run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), plant=smc.plant("duffing", **{name: value}))
 assert run(law(lambda y, gains, memory: (math.nan, 0.0)), noise=smc.Noise(1e90, 1e90)).diverged_at == 0.0

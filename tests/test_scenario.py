@@ -353,7 +353,6 @@ def test_a_plant_keeps_a_positive_mass(name, value):
         {"mismatch": {"mass": 1e-200, "M": 1e-200}},
         {"mismatch": {"mass": 1e-200}, "jump": smc.Jump(0.5, {"mass": 1e-200})},
         {"mismatch": {"alpha": 1e300}, "jump": smc.Jump(0.5, {"alpha": 1e300})},
-        {"plant": smc.plant("duffing", M=1e-200), "mismatch": {"mass": 1e-200}},
     ],
     ids=str,
 )
