@@ -157,8 +157,8 @@ class Scenario:
             raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
         if self.jump is not None and self.jump.time >= self.duration:
             raise ScenarioError(f"jump at {self.jump.time:g} s comes after the end of the run at {self.duration:g} s")
-        for factors in (self.mismatch, self.jump.factors if self.jump else {}):
-            self.plant.values(factors)
+        for step in (0, self.samples * self.steps):
+            self.plant.values(self.factors(step))
 
     @property
     def steps(self) -> int:
