@@ -1,10 +1,9 @@
 """How does the observer-free law stop the Van der Pol oscillator when nothing disturbs it?
 
-The paper's figure 5. The reference for vdp_noise and vdp_disturbance The rivals run beside it under the same
-condition.
+The paper's figure 5, and the reference for vdp_noise and vdp_disturbance. The paper reports smooth and fast
+convergence without chattering. The rivals run beside it.
 
-Look for: the paper reports smooth and fast convergence without chattering.:a u without corners, and how much later x
-arrives than the clock at which u leaves its bound.
+Look for: a u without corners, and how much later x arrives than u leaves its bound.
 """
 
 import smc_mujoco as smc

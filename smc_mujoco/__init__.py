@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from smc_mujoco.estimators import estimator as estimator
     from smc_mujoco.estimators import estimator_function as estimator_function
     from smc_mujoco.estimators import estimators as estimators
+    from smc_mujoco.figure import figure as figure
     from smc_mujoco.law import Law as Law
     from smc_mujoco.law import law as law
     from smc_mujoco.law import law_function as law_function
@@ -58,8 +59,15 @@ if TYPE_CHECKING:
     )
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
+    from smc_mujoco.video import clip as clip
+    from smc_mujoco.video import film as film
+    from smc_mujoco.video import still as still
+
+__version__ = "0.1.0"
 
 _HOMES = {
+    "figure": ("figure",),
+    "video": ("clip", "film", "still"),
     "errors": ("ScenarioError",),
     "estimators": ("estimator", "estimator_function", "estimators"),
     "law": ("Law", "law", "law_function", "laws"),
@@ -100,4 +108,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted({*_HOME, "__doc__", "__version__"})

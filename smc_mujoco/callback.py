@@ -12,6 +12,7 @@ whose userdata hold no row of ours are left alone.
 import contextlib
 import functools
 import hashlib
+import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,21 +20,30 @@ from pathlib import Path
 import mujoco
 from numba import carray, cfunc, types
 
-from smc_mujoco import harness as harness_module
-from smc_mujoco import layout, native, noise
-from smc_mujoco import row as row_module
+from smc_mujoco import layout
+from smc_mujoco.compiled import integers, pointer
 from smc_mujoco.harness import control as run_row
-from smc_mujoco.native import integers, pointer
 from smc_mujoco.row import HEADER, IS_ROW
 
 _lock = threading.RLock()
 
 
+def _after_fork() -> None:
+    """A child has none of its parent's threads: neither who holds the lock, nor the run whose callback is installed."""
+    global _lock  # noqa: PLW0603
+    _lock = threading.RLock()
+    mujoco.set_mjcb_control(None)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
 @functools.cache
 def mark() -> float:
-    """What a row of ours begins with: it changes with the code, so that no cached harness reads a newer row."""
-    sources = [Path(str(module.__file__)).read_bytes() for module in (harness_module, native, noise, row_module)]
-    return float(int.from_bytes(hashlib.sha256(b"".join([Path(__file__).read_bytes(), *sources])).digest()[:6]))
+    """What a row of ours begins with: changes with any of our modules, so that no cached harness reads a newer row."""
+    sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+    return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 
 
 @functools.cache
@@ -80,14 +90,27 @@ def _compiled(signature, function: Callable):
 
 
 @contextlib.contextmanager
+def uninstalled() -> Iterator[None]:
+    """No control callback for the length of a with block: MuJoCo compiles no model while a Python one is installed."""
+    before = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(None)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(before)
+
+
+@contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
     """Install the harness, or another control callback, for the length of a with block; other threads wait."""
     with _lock:
         before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
+        with uninstalled():
+            function = harness().ctypes if control is None else control
+            silent = silence().ctypes
         try:
-            mujoco.set_mjcb_control(None)  # a Python callback keeps MuJoCo from compiling any model, ours too
-            mujoco.set_mjcb_control(harness().ctypes if control is None else control)
-            mujoco.set_mju_user_warning(silence().ctypes)
+            mujoco.set_mjcb_control(function)
+            mujoco.set_mju_user_warning(silent)
             yield
         finally:
             mujoco.set_mjcb_control(before[0])

@@ -18,14 +18,16 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     hinge's, so that its generalised force is d.
 
     Raises:
-      ScenarioError: an actuator that drives no hinge or slide, lacks a position or velocity sensor, or whose joint's
-        axis lies along no world axis.
+      ScenarioError: an actuator that drives no hinge or slide with gear 1, that lacks a position or velocity sensor, or
+        whose joint's axis lies along no world axis.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     table = np.empty((model.nu, 7), np.int64)
     for i in range(model.nu):
         name, joint = model.actuator(i).name, int(model.actuator_trnid[i, 0])
+        if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
+            raise ScenarioError(f"actuator {name!r} does not drive a joint with gear 1: give it one")
         hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
         if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
             raise ScenarioError(f"actuator {name!r} drives no hinge or slide joint: give it one")

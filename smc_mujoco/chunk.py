@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch, SimulationError
 
 from smc_mujoco import callback, harness, native, plain, row
 from smc_mujoco.channels import QPOS, QVEL, channels
@@ -13,6 +12,9 @@ from smc_mujoco.plant import array
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
+
+with callback.uninstalled():  # this import compiles a model
+    from mujoco.batch import Batch, SimulationError
 
 SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
 
@@ -33,7 +35,7 @@ def contents(scenario: Scenario) -> row.Contents:
             address=native.nominal(scenario.plant.nominal, tuple(nominal)).address, values=tuple(nominal.values())
         ),
         reference=_signal(scenario.reference),
-        disturbances=[_signal(d) for d in scenario.disturbance],
+        disturbances=[_signal(d, scenario.stream(i)) for i, d in enumerate(scenario.disturbance)],
         n=scenario.plant.n,
         steps=scenario.steps,
         stages=4 if scenario.integrator == "RK4" else 1,
@@ -53,7 +55,7 @@ class Chunk:
     def __init__(self, scenarios: Sequence[Scenario], threads: int):
         first = self.first = scenarios[0]
         self.scenarios = scenarios
-        self.logs = [np.empty((6, first.samples + 1, first.plant.n)) for _ in scenarios]
+        self.logs = [np.empty((7, first.samples + 1, first.plant.n)) for _ in scenarios]
         self.table = np.empty((first.plant.n, 7), np.int64)
         rows = [
             row.pack(contents(scenario), callback.mark(), self.table, log)
@@ -73,6 +75,7 @@ class Chunk:
             qvel[i, self.table[:, QVEL]] = scenario.v0
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}
+        self.retold = False  # whether a failure was run again for its words
         self.set_parameters(0, range(len(scenarios)))
 
     def run(self, report: Report) -> list[Trace]:
@@ -123,15 +126,22 @@ class Chunk:
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
         scenario, failure = self.scenarios[i], int(self.rows[i, row.FAILURE])
-        if failure in (row.RAISED, row.NOT_FINITE):
-            again = plain.run(scenario)  # Python knows what was raised, and where
+        if failure >= row.NOT_FINITE and not self.retold:
+            self.retold = True  # Python knows what was raised, and where; it is slow, so one run a chunk tells for all
+            again = plain.run(scenario)
             if again.failure:
                 return again
+        law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
         reason = {
             row.FINE: None,
             row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
-            row.RAISED: f"law {scenario.law.name!r} raised an exception",
-            row.NOT_FINITE: f"law {scenario.law.name!r} returned NaN, inf or a command above {harness.HUGE:g}",
+            row.NOT_FINITE: f"{law} returned NaN, inf or a command above {harness.HUGE:g}",
+            row.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
+            row.ESTIMATOR_RAISED: f"{estimator} raised an exception",
+            row.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
+            row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
+            row.LAW_RAISED: f"{law} raised an exception",
+            row.DISTURBANCE_RAISED: "a disturbance raised an exception",
         }[failure]
         return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
 
@@ -140,8 +150,6 @@ def _component(c: Component) -> row.Part:
     return row.Part(address=native.component(c).address, values=tuple(c.gains.values()), memory=c.memory)
 
 
-def _signal(s: Signal) -> row.Part:
-    values = s.parameters()
-    return row.Part(
-        address=native.of_signal(s).address, values=tuple(values.values()), memory=s.memory, random=s.random
-    )
+def _signal(s: Signal, stream: int = 0) -> row.Part:
+    values = tuple(s.parameters().values())
+    return row.Part(address=native.of_signal(s).address, values=values, memory=s.memory, stream=stream)

@@ -1,8 +1,10 @@
 """The command line: smc-mujoco list | run SCENE | show TRACE."""
 
 import contextlib
+import signal
 import sys
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -22,8 +24,22 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; what the user can mend ends in one sentence and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
+    warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {message}", file=sys.stderr)
+    app(arguments, prog_name="smc-mujoco")
+
+
+def play(scene: str) -> None:
+    """Run a scene file as a script: `if __name__ == "__main__": smc.play(__file__)`."""
+    main(["run", scene, *sys.argv[1:]])
+
+
+@contextlib.contextmanager
+def mendable() -> Iterator[None]:
+    """Errors that the user can mend, and Ctrl-C, as one sentence."""
     try:
-        app(arguments, prog_name="smc-mujoco")
+        yield
     except ScenarioError as error:
         _fail(str(error))
     except OSError as error:
@@ -32,39 +48,50 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _fail("stopped; files already written are complete", 130)
 
 
-def play(scene: str) -> None:
-    """Run a scene file as a script: `if __name__ == "__main__": smc.play(__file__)`."""
-    main(["run", scene, *sys.argv[1:]])
-
-
 def _fail(sentence: str, code: int = 2) -> None:
     print(f"smc-mujoco: {sentence}", file=sys.stderr)
     raise SystemExit(code)
 
 
+@contextlib.contextmanager
+def loading() -> Iterator[None]:
+    """Hold Ctrl-C back while libraries load: they cannot be interrupted halfway."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import smc_mujoco
+
+        print(f"smc-mujoco {smc_mujoco.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Options before a command."""
+
+
 @app.command("list")
 def list_() -> None:
-    """List plants, laws, velocity estimators, conditions of the paper's study, and scenes."""
-    from rich.console import Console
+    """List plants, laws, velocity estimators, scenes, and the conditions of the paper's study."""
+    with mendable():
+        with loading():
+            from rich.console import Console
 
-    from smc_mujoco import paper, scene, tables
-    from smc_mujoco.estimators import catalogue as estimators
-    from smc_mujoco.law import catalogue as laws
-    from smc_mujoco.plant import catalogue as plants
+            from smc_mujoco import show
 
-    def first(doc: str | None) -> str:
-        return (doc or "").strip().partition("\n")[0]
-
-    known = {
-        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
-        "Laws": ((name, first(t.doc)) for name, t in laws().items()),
-        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
-        "Scenes (smc-mujoco run NAME)": ((name, scene.question(path)) for name, path in scene.scenes().items()),
-    }
-    console = Console()
-    for title, rows in known.items():
-        console.print(tables.catalogue(title, rows), "")
-    console.print("[bold]Conditions of the study[/]", ", ".join(paper.CONDITIONS), sep="\n  ", highlight=False)
+        show.catalogues(Console())
 
 
 @app.command()
@@ -80,69 +107,47 @@ def run(
 
     Example: smc-mujoco run duffing --no-video --out results
     """
-    clock = Clock()
-    with clock("loading"):
-        from rich.console import Console
+    with mendable():
+        clock = Clock()
+        with clock("loading"), loading():
+            from rich.console import Console
 
-        from smc_mujoco import scene as scenes
-        from smc_mujoco import show, tables
+            from smc_mujoco import scene as scenes
+            from smc_mujoco import show
 
         path = scenes.find(name)
         scene = scenes.read(path)
         if seed is not None:
             scene = scene.seeded(seed)
-    out = out or Path("videos") / path.stem
-    console = Console()
-    with clock("compiling"):
-        show.compile_laws(scene)
-    with clock("simulating"):
-        traces = show.simulate(scene, threads)
-    for condition, runs in traces.items():
-        console.print(tables.scores(f"{scene.title}, {condition}", runs), "")
-    written = []
-    with clock("traces"):
-        written += show.save(traces, out)
-    with clock("figures"):
-        written += show.figures(scene, traces, out)
-    if video:
-        with clock("film"):
-            written += show.film(scene, traces, out, console)
-    console.print("wrote", style="dim")
-    for file in written:
-        console.print(f"  {file}", soft_wrap=True, highlight=False)
-    if timing:
-        console.print("  ".join(f"{what} {seconds:.2f} s" for what, seconds in clock.spent.items()), style="dim")
+        console = Console()
+        show.perform(scene, out or Path("videos") / path.stem, video, threads, clock, console)
+        if timing:
+            console.print(str(clock), style="dim", soft_wrap=True, highlight=False)
 
 
 @app.command()
 def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file that `run` or Trace.save wrote.")],
-    figure: Annotated[Path | None, typer.Option(help="Also draw it: FIGURE.svg and FIGURE.png.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
     export: Annotated[Path | None, typer.Option(help="Also write its columns, to a .csv or .mat file.")] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores."""
-    from rich.console import Console
+    with mendable():
+        with loading():
+            from rich.console import Console
 
-    from smc_mujoco import tables
-    from smc_mujoco.trace import load
+            from smc_mujoco.show import summary
+            from smc_mujoco.trace import load
 
-    loaded, console = load(trace), Console()
-    s = loaded.scenario
-    console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
-    for name in ("x", "v", "u", "s"):
-        column = getattr(loaded, name)[:, 0]
-        console.print(f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}", highlight=False)
-    if loaded.failure:
-        console.print(f"failed: {loaded.failure}", style="red")
-    else:
-        console.print(tables.trace_summary(loaded))
-    if export:
-        console.print(f"wrote {loaded.export(export)}")
-    if figure:
-        from smc_mujoco.figure import figure as draw
+        loaded, console = load(trace), Console()
+        written = [loaded.export(export)] if export else []
+        if figure:
+            from smc_mujoco.figure import figure as draw
 
-        for path in draw([loaded], figure):
-            console.print(f"wrote {path}")
+            written += draw([loaded], figure)
+        summary(loaded, console)
+        for path in written:
+            console.print(f"wrote {path}", soft_wrap=True, highlight=False)
 
 
 class Clock:
@@ -155,4 +160,8 @@ class Clock:
     def __call__(self, what: str) -> Iterator[None]:
         start = time.perf_counter()
         yield
-        self.spent[what] = time.perf_counter() - start
+        self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - start
+
+    def __str__(self) -> str:
+        parts = [f"{what} {seconds:.2f} s" for what, seconds in self.spent.items()]
+        return ", ".join([*parts, f"in all {sum(self.spent.values()):.2f} s"])

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType
 
 from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.frozen import frozen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -26,7 +27,10 @@ class Component:
     name: str
     gains: Mapping[str, float]
     memory: int
-    function: Callable | None = dataclasses.field(repr=False)
+    function: Callable | None
+
+    def __repr__(self) -> str:
+        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
         """By the name of its template: that of the decorated function no longer leads to it."""
@@ -36,8 +40,10 @@ class Component:
             return _bind, (*home, dict(self.gains))
         return super().__reduce__()
 
-    def __hash__(self):
-        return hash((self.kind, self.name, tuple(self.gains.items()), self.memory, self.function))
+    def __post_init__(self):
+        gains = {name: number(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
+        object.__setattr__(self, "gains", frozen(gains))
+        whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
@@ -114,6 +120,10 @@ def template(
 
     def decorate(function: Callable) -> Template:
         name = getattr(function, "__name__", type(function).__name__)
+        try:
+            inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
+        except TypeError as error:
+            raise ScenarioError(f"{kind} {name!r} takes (y, gains, memory): {error}") from None
         return Template(
             kind=kind,
             name=name,

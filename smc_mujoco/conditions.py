@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from smc_mujoco.errors import ScenarioError, number, shown
+from smc_mujoco.frozen import Frozen, frozen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Jump:
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
 
 
-def parameter_factors(name: str, value: object) -> dict[str, float]:
+def parameter_factors(name: str, value: object) -> Frozen[float]:
     """Parameter name -> factor, checked; `name` is what errors call it."""
     if not isinstance(value, Mapping):
         raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
-    return {str(key): number(f"{name} of {key}", factor) for key, factor in value.items()}
+    return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})

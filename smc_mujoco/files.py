@@ -22,10 +22,17 @@ def replacing(path: Path) -> Iterator[Path]:
         os.close(handle)
         try:
             yield Path(name)
-            os.chmod(name, 0o644)
+            os.chmod(name, 0o666 & ~_umask())
             os.replace(name, path)
         finally:
             Path(name).unlink(missing_ok=True)
     except OSError as error:
         why = error.strerror or error
         raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
+
+
+def _umask() -> int:
+    """The user's; it can only be read by setting it."""
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask

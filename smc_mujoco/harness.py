@@ -18,15 +18,17 @@ from numba import carray, njit
 
 from smc_mujoco import noise
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC
-from smc_mujoco.native import call, integers, pointer
+from smc_mujoco.compiled import call, integers, pointer
 from smc_mujoco.row import (
     CALLS,
     CHANNELS,
     DELAY,
+    DISTURBANCE_NOT_FINITE, DISTURBANCE_RAISED,
     DIVERGED,
     ESTIMATOR,
     ESTIMATOR_GAINS,
     ESTIMATOR_MEMORY,
+    ESTIMATOR_RAISED,
     ESTIMATOR_STRIDE,
     FAILED_STEP,
     FAILURE,
@@ -35,16 +37,18 @@ from smc_mujoco.row import (
     INPUT,
     LAW,
     LAW_MEMORY,
+    LAW_RAISED,
     LAW_STRIDE,
     LIMIT,
     LOG,
     NOMINAL,
+    NOMINAL_RAISED,
     NOMINAL_VALUES,
     NOT_FINITE,
     OUTPUT,
     PERIOD,
-    RAISED,
     REFERENCE,
+    REFERENCE_RAISED,
     REFERENCE_VALUES,
     RING,
     RINGS,
@@ -63,7 +67,7 @@ from smc_mujoco.row import (
 )  # fmt: skip
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
-LEFT = 1.0 - 1e-9  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
+LEFT = 1.0 - 1e-8  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
 HUGE = 1e10  # MuJoCo drops every control where one is larger
 
 
@@ -94,7 +98,7 @@ def _measure(base, row, table, sensors, k):
         row[given], row[given + 1], row[given + 2] = row[PERIOD], x, v
         memory = _at(base, row, ESTIMATOR_MEMORY) + 8 * i * int(row[ESTIMATOR_STRIDE])
         if call(int(row[ESTIMATOR]), base + 8 * given, _at(base, row, ESTIMATOR_GAINS), memory, base + 8 * out) != 0:
-            return RAISED
+            return ESTIMATOR_RAISED
         row[at + i], row[at + n + i] = x, row[out]
     return FINE
 
@@ -108,23 +112,23 @@ def _decide(base, row, log, k):
     t = k * row[PERIOD]
     y[0], y[1], y[2] = t, 0.0, 0.0
     if call(int(row[REFERENCE]), base + 8 * given, _at(base, row, REFERENCE_VALUES), 0, base + 8 * out) != 0:
-        return RAISED
+        return REFERENCE_RAISED
     y[1], y[6], y[7], y[8] = row[PERIOD], row[out], row[out + 1], row[out + 2]
     row[state + 1] = n
     for i in range(n):
         row[state] = i
         if call(int(row[NOMINAL]), base + 8 * state, _at(base, row, NOMINAL_VALUES), 0, base + 8 * out) != 0:
-            return RAISED
+            return NOMINAL_RAISED
         y[9], y[10] = row[out], row[out + 1]
         y[2], y[3] = row[state + 2 + i], row[state + 2 + n + i]
         y[4], y[5] = y[2] - y[6], y[3] - y[7]
         memory = _at(base, row, LAW_MEMORY) + 8 * i * int(row[LAW_STRIDE])
         if call(int(row[LAW]), base + 8 * given, _at(base, row, GAINS), memory, base + 8 * out) != 0:
-            return RAISED
+            return LAW_RAISED
         u = min(max(row[out], -row[LIMIT]), row[LIMIT])
         if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) < HUGE):
             return NOT_FINITE
-        row[ring + i], log[2, k, i], log[4, k, i] = u, u, row[out + 1]
+        row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
     return FINE
 
 
@@ -137,15 +141,18 @@ def _disturb(base, row, table, xfrc, t):
         xfrc[table[i, XFRC]] = 0.0
     for j in range(int(row[SIGNAL_COUNT])):
         at = first + SIGNAL_FIELDS * j
-        address, values, random = int(row[at]), base + 8 * int(row[at + 1]), row[at + 2] != 0.0
-        row[given + 3] = noise.PROCESS + j
+        address, values, stream = int(row[at]), base + 8 * int(row[at + 1]), row[at + 2]
+        row[given + 3] = stream
         for i in range(n):
-            if random or i == 0:  # what is not random is the same in every channel
+            if stream != 0.0 or i == 0:  # what is not random is the same in every channel
                 row[given + 2] = i
                 memory = base + 8 * (int(row[at + 3]) + i * int(row[at + 4]))
                 if call(address, base + 8 * given, values, memory, base + 8 * out) != 0:
-                    return RAISED
+                    return DISTURBANCE_RAISED
             xfrc[table[i, XFRC]] += table[i, SIGN] * row[out]
+    for i in range(n):
+        if not math.isfinite(xfrc[table[i, XFRC]]):
+            return DISTURBANCE_NOT_FINITE
     return FINE
 
 
@@ -159,7 +166,7 @@ def control(base, row, qpos, qvel, ctrl, xfrc, sensors):
     step, stage = calls // int(row[STAGES]), calls % int(row[STAGES])
     table = carray(integers(int(row[TABLE])), (n, 7))
     k, within = step // int(row[STEPS]), step % int(row[STEPS])
-    log = carray(pointer(int(row[LOG])), (6, int(row[SAMPLES]), n))
+    log = carray(pointer(int(row[LOG])), (7, int(row[SAMPLES]), n))
     sampling = stage == 0 and within == 0
     failure = FINE
     if stage == 0 and _escaped(row, table, qpos, qvel):

@@ -11,7 +11,7 @@ of the plant is the nominal f and g in its measurement.
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 from smc_mujoco.component import Component, Template, discover, template
 from smc_mujoco.errors import find
@@ -35,13 +35,25 @@ class Measurement(NamedTuple):
     g: float
 
 
+@overload
+def law_function(function: Callable, /) -> Template: ...
+@overload
 def law_function(
     *,
     gains: Mapping[str, float] | None = None,
     memory: int = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
-) -> Callable[[Callable], Template]:
+) -> Callable[[Callable], Template]: ...
+def law_function(
+    function: Callable | None = None,
+    /,
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+) -> Callable[[Callable], Template] | Template:
     """Make a law of a function (y, gains, memory) -> (u, s).
 
     Args:
@@ -49,10 +61,15 @@ def law_function(
       memory: floats of state per channel.
       positive, nonnegative: gains that must be greater than 0, or at least 0.
 
+    The function must be pure: what it is to remember goes into memory, what is to vary into gains. Compiled, it keeps
+    the globals and closed-over values that it was compiled with, and random numbers in it would come from a shared
+    generator. A function made anew for each value is compiled anew, and kept.
+
     Returns:
       A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.
     """
-    return template("law", gains, memory, positive, nonnegative)
+    decorate = template("law", gains, memory, positive, nonnegative)
+    return decorate if function is None else decorate(function)
 
 
 @functools.cache

@@ -141,7 +141,8 @@ def reaching_time(trace: Trace) -> float:
     """Time from which |s| stays within 2 % of its start.
 
     Last exit of max_i |s_i| from 2 % of max_i |s_i(0)|: permanent entry, not first touch. A run that starts
-    on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout.
+    on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout, as for a law
+    without a surface. s is what the law computed from its measurement: under noise it may never stay.
     """
     size = np.abs(trace.s).max(axis=1)
     return last_exit(trace.t, size, BAND * (size[0] or size.max()))

@@ -1,9 +1,9 @@
 """The study of the paper: its plants' gains and the conditions under which its laws are compared.
 
 The paper (J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition") states d(t) = 0.2 sin(5t), five
-pendulums and Gaussian noise on x and v; it states no gain and no other parameter. Those here were chosen for this study
-before any run was judged: every law is bounded by the same |u| <= 6, the gains are a first tuning of all laws to that
-bound, and the plants' parameters stand in their files.
+pendulums and Gaussian noise on x and v; it states no gain and no other parameter. Those here were chosen for this
+study: every law is bounded by the same |u| <= 6, and the gains are a first tuning of all laws to that bound, kept
+whatever the results. The plants' parameters stand in their files.
 
     scenario("duffing", "classical", "noise", seed=3)      # one Scenario
     comparison("duffing", "noise")                         # the four laws: name -> Scenario

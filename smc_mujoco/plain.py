@@ -12,9 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco import native, noise
+from smc_mujoco import noise
 from smc_mujoco.callback import installed
 from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
+from smc_mujoco.compiled import named as record_type
 from smc_mujoco.component import Component
 from smc_mujoco.errors import shown
 from smc_mujoco.estimators import Reading
@@ -69,8 +70,8 @@ class Loop:
         self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
-        self.s = np.zeros(n)
-        self.log = np.full((6, scenario.samples + 1, n), np.nan)
+        self.s, self.r = np.zeros(n), np.zeros(n)
+        self.log = np.full((7, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
 
@@ -96,7 +97,7 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
                 applied = data.ctrl[self.table[:, CTRL]]
-                self.log[:, k] = x, v, self.commands[-1], applied, self.s, d
+                self.log[:, k] = x, v, self.commands[-1], applied, self.s, d, self.r
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
@@ -130,6 +131,7 @@ class Loop:
         scenario, law = self.scenario, self.scenario.law
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         r, dr, ddr = signalled(scenario.reference, t)
+        self.r[:] = r
         for i in range(len(x)):
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
             y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
@@ -151,8 +153,10 @@ class Loop:
         """The sum of the disturbances, (n,)."""
         d = np.zeros(self.scenario.plant.n)
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
-            stream = noise.PROCESS + j
+            stream = self.scenario.stream(j)
             d += [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(d))]
+        if not np.all(np.isfinite(d)):
+            raise Failure("the disturbance became NaN or inf")
         return d
 
 
@@ -179,7 +183,7 @@ def numbers(who: str, out: Any, what: str, count: int = 1) -> list[float]:
 
 def named(component: Component) -> tuple:
     """A component's gains as the record its function reads."""
-    return native.named(tuple(component.gains))(*(component.gains.values() or [0.0]))
+    return record_type(tuple(component.gains))(*(component.gains.values() or [0.0]))
 
 
 def guarded(component: Component, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:

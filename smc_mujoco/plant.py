@@ -19,6 +19,7 @@ import numpy as np
 
 from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.frozen import frozen
 
 LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
@@ -68,6 +69,10 @@ class Plant:
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
     nominal: Nominal
     lane: tuple[float, float, float]
+
+    def __repr__(self) -> str:
+        values = [f"{name}={value:g}" for name, value in self.parameters.items()]
+        return f"plant({', '.join([repr(self.name), *([f'n={self.n}'] if self.n > 1 else []), *values])})"
 
     @property
     def positive(self) -> frozenset[str]:
@@ -157,10 +162,10 @@ def plant(name: str, **parameters: float) -> Plant:
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
-        low = {"above": 0.0, "least": 1e-6} if key in base.positive else {"least": -LARGEST}
-        values[key] = number(f"{name}'s {key}", value, most=LARGEST, **low)
+        above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -LARGEST)
+        values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=LARGEST)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
-    return dataclasses.replace(base, parameters=values, n=n, x0=x0)
+    return dataclasses.replace(base, parameters=frozen(values), n=n, x0=x0)
 
 
 def plants() -> list[str]:

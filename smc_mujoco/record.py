@@ -1,7 +1,9 @@
 """A scenario as JSON data and back."""
 
 import dataclasses
+from importlib.metadata import version
 
+from smc_mujoco import __version__
 from smc_mujoco.component import Component, Template
 from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
@@ -9,7 +11,7 @@ from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
-from smc_mujoco.signals import Signal, kinds
+from smc_mujoco.signals import Recorded, Signal, kinds
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 
@@ -17,7 +19,9 @@ PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "inp
 def describe(scenario: Scenario) -> dict:
     """The scenario as plain data that JSON holds without loss."""
     return {name: getattr(scenario, name) for name in PLAIN} | {
-        "plant": {"name": scenario.plant.name, "n": scenario.plant.n} | dict(scenario.plant.parameters),
+        "plant": {"name": scenario.plant.name, "n": scenario.plant.n, "module": scenario.plant.build.__module__}
+        | dict(scenario.plant.parameters),
+        "versions": {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")},
         "law": _component(scenario.law),
         "velocity": _component(scenario.velocity),
         "reference": _signal(scenario.reference),
@@ -29,8 +33,10 @@ def describe(scenario: Scenario) -> dict:
 
 
 def restore(data: dict) -> Scenario:
-    """The scenario that was described. A law that is not in the library keeps its name and gains, not its code."""
+    """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code."""
     plant = dict(data["plant"])
+    if plant.pop("module") != find_plant(plant["name"]).build.__module__:
+        raise ScenarioError(f"plant {plant['name']!r} is not the library's: run it where it is defined")
     fields = {name: data[name] for name in PLAIN}
     return Scenario(
         **fields,
@@ -57,13 +63,13 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
 
 
 def _signal(signal: Signal) -> dict:
-    return {"kind": type(signal).__name__} | signal.parameters()
+    if isinstance(signal, Recorded):
+        return {"kind": signal.kind, "module": signal.module} | signal.parameters()
+    return {"kind": type(signal).__name__, "module": type(signal).__module__} | signal.parameters()
 
 
 def _restore_signal(data: dict) -> Signal:
-    known = {kind.__name__: kind for kind in kinds()}
     values = dict(data)
-    kind = values.pop("kind")
-    if kind not in known:
-        raise ScenarioError(f"the trace has a signal {kind!r}: import the module that defines it first")
-    return known[kind](**values)
+    kind, module = values.pop("kind"), values.pop("module")
+    found = {(k.__name__, k.__module__): k for k in kinds()}.get((kind, module))
+    return found(**values) if found else Recorded(kind, module, values)

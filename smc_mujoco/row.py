@@ -23,11 +23,12 @@ import numpy as np
     HEADER,
 ) = range(37)  # fmt: skip
 
-# Of each disturbance: function, offset of its parameters, whether random, offset and stride of its memory.
+# Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory.
 SIGNAL_FIELDS = 5
 
 # What FAILURE says.
-FINE, DIVERGED, RAISED, NOT_FINITE = range(4)
+FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE = range(4)
+ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED, DISTURBANCE_RAISED = range(4, 9)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -37,7 +38,7 @@ class Part:
     address: int
     values: Sequence[float]
     memory: int = 0
-    random: bool = False
+    stream: int = 0  # of random numbers; 0: it takes none, and is the same in every channel
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -68,7 +69,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
       c: its contents.
       mark: what tells it from any other userdata, `callback.mark()`.
       table: the channel table, (n, 7) int64, which must outlive the run.
-      log: (6, K + 1, n) float64 for x, v, u, applied, s, d, written at samples, which must outlive the run.
+      log: (7, K + 1, n) float64 for x, v, u, applied, s, d, r, written at samples, which must outlive the run.
     """
     row = [0.0] * HEADER
     n, rings = c.n, c.delay // c.steps + 1
@@ -98,7 +99,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     reserve(STATE, 2 + 2 * n)  # the nominal model's input: i, n, measured x, estimated v
     for i, d in enumerate(c.disturbances):
         at = int(row[SIGNALS]) + SIGNAL_FIELDS * i
-        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.random, len(row) + len(d.values), d.memory]
+        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.stream, len(row) + len(d.values), d.memory]
         row.extend([*d.values, *[0.0] * (d.memory * n)])
     reserve(LAW_MEMORY, c.law.memory * n)
     reserve(ESTIMATOR_MEMORY, c.estimator.memory * n)

@@ -11,17 +11,19 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
 
-from smc_mujoco import callback, native, plain
+from smc_mujoco import callback, plain
 from smc_mujoco.chunk import Chunk, Report, contents
+from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError, shown, whole
 from smc_mujoco.scenario import Scenario
+from smc_mujoco.signals import Recorded
 from smc_mujoco.trace import Trace
 
 CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
 
 
 class PlainLoopWarning(UserWarning):
-    """A law or signal does not compile and runs in the plain loop, some fifty times slower."""
+    """A law or signal does not compile and runs in the plain loop, several times slower and on one core."""
 
 
 @overload
@@ -44,6 +46,8 @@ def run(
 
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
+
+    MuJoCo's control callback is global to the process: while a run lasts, another thread's own callback is not called.
     """
     many = [scenarios] if isinstance(scenarios, Scenario) else _listed(scenarios)
     found: list[Trace | None] = [None] * len(many)
@@ -70,16 +74,17 @@ def stream(
                 raise ScenarioError(
                     f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}"
                 )
+        for signal in (scenario.reference, *scenario.disturbance):
+            if isinstance(signal, Recorded):
+                raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
         try:
-            contents(scenario)
+            contents(scenario)  # compiles
             groups.setdefault(_layout(scenario), []).append(index)
-        except native.NotCompilable as error:
+        except NotCompilable as error:
             warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
             slow.append(index)
     for indices in groups.values():
-        size = _chunk_size(scenarios[indices[0]], threads)
-        for start in range(0, len(indices), size):
-            chunk = indices[start : start + size]
+        for chunk in _chunks(scenarios, indices, threads):
             with callback.installed():
                 traces = Chunk([scenarios[i] for i in chunk], threads).run(report)
             yield from zip(chunk, traces, strict=True)
@@ -93,10 +98,26 @@ def _layout(s: Scenario) -> tuple:
     return s.plant.build, s.plant.fields, s.plant.n, s.integrator, s.physics_step, s.control_period, s.samples
 
 
-def _chunk_size(scenario: Scenario, threads: int) -> int:
-    """How many such runs one Batch holds: as many as CHUNK_BYTES allow, at least one a thread."""
-    samples, rings = scenario.samples + 1, scenario.input_delay / scenario.control_period
-    return max(threads, int(CHUNK_BYTES // (8 * scenario.plant.n * (6 * samples + rings + 100))))
+def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int) -> Iterator[list[int]]:
+    """Indices in chunks of at most CHUNK_BYTES, though at least one a thread."""
+    chunk: list[int] = []
+    held = 0
+    for index in indices:
+        size = _bytes(scenarios[index])
+        if len(chunk) >= threads and held + size > CHUNK_BYTES:
+            yield chunk
+            chunk, held = [], 0
+        chunk.append(index)
+        held += size
+    if chunk:
+        yield chunk
+
+
+def _bytes(s: Scenario) -> int:
+    """What a simulation takes: its log, and twice its row (packed, and in the Batch) with the state beside it."""
+    memories = s.law.memory + s.velocity.memory + sum(d.memory for d in s.disturbance)
+    row = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 40)
+    return int(8 * (7 * (s.samples + 1) * s.plant.n + 2 * row))
 
 
 def _steps(scenario: Scenario) -> int:

@@ -16,6 +16,7 @@ from smc_mujoco.conditions import Jump, Noise, parameter_factors
 from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.estimators import Estimator, estimator
 from smc_mujoco.law import Law, law
+from smc_mujoco.noise import PROCESS
 from smc_mujoco.plant import Plant, plant
 from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Signal
 
@@ -175,6 +176,11 @@ class Scenario:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)
 
+    def stream(self, i: int) -> int:
+        """The stream of random numbers of disturbance i, 0 for one that takes none."""
+        random = [d.random for d in self.disturbance]
+        return PROCESS + sum(random[:i]) if random[i] else 0
+
     def factors(self, step: int) -> dict[str, float]:
         """The true plant's parameter factors at a physics step: mismatch, and from its time on the jump."""
         factors = dict(self.mismatch)
@@ -190,8 +196,6 @@ def _component(value: object, kind: str, find) -> Component:
     if isinstance(value, Template):
         value = value()
     if isinstance(value, Component) and value.kind == kind:
-        for name, gain in value.gains.items():
-            number(f"{value.name}'s {name}", gain)
         return value
     field = {"law": "law", "estimator": "velocity"}[kind]
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")

@@ -7,12 +7,15 @@ A scene file has a docstring - the question, the figure of the paper it answers,
 
 import ast
 import dataclasses
+import re
 import runpy
+import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from smc_mujoco.errors import ScenarioError, unknown
+from smc_mujoco.errors import ScenarioError, shown, unknown
+from smc_mujoco.errors import find as lookup
 from smc_mujoco.plant import shipped
 from smc_mujoco.scenario import Scenario
 
@@ -34,8 +37,21 @@ class Scene:
     figure: str = "overview"
 
     def __post_init__(self):
-        if not self.conditions or not all(self.conditions.values()):
-            raise ScenarioError(f"scene {self.title!r} has a condition without runs: give each at least one Scenario")
+        if not isinstance(self.conditions, Mapping) or not self.conditions:
+            raise ScenarioError(f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs")
+        for condition, runs in self.conditions.items():
+            if not isinstance(runs, Mapping) or not runs or not all(isinstance(s, Scenario) for s in runs.values()):
+                raise ScenarioError(
+                    f"condition {condition!r} of scene {self.title!r} is {shown(runs)}: give labels with Scenarios"
+                )
+            if len(plants := {s.plant.name for s in runs.values()}) > 1:
+                raise ScenarioError(
+                    f"condition {condition!r} of scene {self.title!r} has the plants {', '.join(sorted(plants))}, "
+                    "which share no axes: give each plant a condition of its own"
+                )
+        for names in (self.conditions, *self.conditions.values()):
+            if len({slug(name) for name in names}) < len(names):
+                raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(names)}")
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
         if self.film not in self.conditions:
             raise unknown(f"condition to film in scene {self.title!r}", self.film, self.conditions)
@@ -64,13 +80,11 @@ def scenes() -> dict[str, Path]:
 
 def find(name: str) -> Path:
     """The scene file at a path, or the one of that name that comes with the package."""
-    if Path(name).suffix == ".py":
-        if Path(name).is_file():
-            return Path(name)
-        name = Path(name).stem
-    if name not in scenes():
-        raise unknown("scene", name, scenes())
-    return scenes()[name]
+    if Path(name).is_file():
+        return Path(name)
+    if Path(name).suffix or Path(name).name != name:
+        raise ScenarioError(f"no scene file {name}: give the path of one, or a name that smc-mujoco list shows")
+    return lookup("scene", name, scenes())
 
 
 def read(path: Path) -> Scene:
@@ -79,14 +93,11 @@ def read(path: Path) -> Scene:
     Raises:
       ScenarioError: the file fails, or declares none.
     """
-    try:
-        scene = runpy.run_path(str(path)).get("scene")
-    except ScenarioError:
-        raise
-    except Exception as error:  # whatever a user's script raises
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-        where = f"{path}, line {lines[-1]}" if lines else str(path)
-        raise ScenarioError(f"{where}: {type(error).__name__}: {error}; mend the scene file") from error
+    main = sys.modules["__main__"]
+    if getattr(main, "__file__", None) and Path(str(main.__file__)).resolve() == path.resolve():
+        scene = vars(main).get("scene")  # it is running already, as a script
+    else:
+        scene = _execute(path).get("scene")
     if not isinstance(scene, Scene):
         raise ScenarioError(f"{path} declares no scene: write `scene = smc.Scene(title=..., conditions=...)`")
     return scene
@@ -95,3 +106,20 @@ def read(path: Path) -> Scene:
 def question(path: Path) -> str:
     """The first line of a scene file's docstring."""
     return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0]
+
+
+def _execute(path: Path) -> dict:
+    """What a scene file defines; modules beside it can be imported, as in a script."""
+    sys.path.insert(0, str(path.resolve().parent))
+    try:
+        return runpy.run_path(str(path))
+    except Exception as error:  # whatever a user's script raises
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+        where = f"{path}, line {lines[-1]}" if lines else str(path)
+        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; mend the file"
+        raise ScenarioError(f"{where}: {what}") from error
+
+
+def slug(name: str) -> str:
+    """A name as part of a file name."""
+    return re.sub(r"[^\w.=+-]+", "_", name.lower()).strip("_") or "run"

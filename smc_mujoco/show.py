@@ -1,19 +1,61 @@
-"""A scene from its declaration to files: simulate, save, draw, film."""
+"""What the commands do: a scene from its declaration to files, a trace in the terminal, the catalogues."""
 
-import re
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from rich.console import Console
 
-from smc_mujoco import gl
+from smc_mujoco import gl, paper, scene, tables
 from smc_mujoco.chunk import contents
-from smc_mujoco.native import NotCompilable
+from smc_mujoco.compiled import NotCompilable
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.estimators import catalogue as estimators
+from smc_mujoco.law import catalogue as laws
+from smc_mujoco.plant import catalogue as plants
 from smc_mujoco.run import run
-from smc_mujoco.scene import Scene
+from smc_mujoco.scene import Scene, slug
 from smc_mujoco.trace import Trace
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
+Timer = Callable[[str], AbstractContextManager[None]]
+
+
+def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Timer, console: Console) -> None:
+    """Run a scene: print its scores, write its traces, figures and film to the folder `out`."""
+    _writable(out)
+    with clock("compiling"):
+        compile_laws(scene)
+    with clock("simulating"):
+        traces = simulate(scene, threads)
+    for condition, runs in traces.items():
+        console.print(tables.scores(_title(scene, condition), runs))
+        for label, trace in runs.items():
+            if trace.failure:
+                console.print(f"{label}: {trace.failure}", style="red", highlight=False, markup=False)
+        console.print()
+    with clock("traces"):
+        written = save(traces, out)
+    with clock("figures"):
+        written += figures(scene, traces, out)
+    if video:
+        with clock("film"):
+            written += film(scene, traces, out, console)
+    console.print("wrote", style="dim")
+    for file in written:
+        console.print(f"  {file}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _writable(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ScenarioError(f"cannot make the folder {out} ({error.strerror}): choose another with --out") from error
+
+
+def _title(scene: Scene, condition: str) -> str:
+    return f"{scene.title}, {condition}" if len(scene.conditions) > 1 else scene.title
 
 
 def compile_laws(scene: Scene) -> None:
@@ -53,8 +95,8 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
         return signals([t for _, t in flat], out / "signals", labels=[c for c, _ in flat], title=scene.title)
     written: list[Path] = []
     for condition, runs in traces.items():
-        title = f"{scene.title}, {condition}" if len(traces) > 1 else scene.title
-        written += figure(list(runs.values()), out / slug(condition), labels=list(runs), title=title)
+        path = out / f"{slug(condition)}.svg"
+        written += figure(list(runs.values()), path, labels=list(runs), title=_title(scene, condition))
     return written
 
 
@@ -62,8 +104,10 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
     from rich.progress import Progress
 
+    for sentence in (gl.note(), gl.missing()):
+        if sentence:
+            console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
     if gl.missing():
-        console.print(str(gl.missing()), style="yellow", soft_wrap=True)
         return []
     from smc_mujoco import video
 
@@ -71,10 +115,39 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     shown = list(runs.values())
     with Progress(transient=True, console=console) as bar:
         task = bar.add_task("film", total=len(video.clock(shown, video.FPS)))
-        path = out / f"{slug(scene.film)}.mp4"
-        return [video.film(shown, path, list(runs), scene.title, report=lambda n: bar.advance(task, n))]
+        path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
+        return [video.film(shown, path, list(runs), title, report=lambda n: bar.advance(task, n))]
 
 
-def slug(name: str) -> str:
-    """A name as part of a file name."""
-    return re.sub(r"[^a-z0-9.]+", "_", name.lower()).strip("_") or "run"
+def summary(trace: Trace, console: Console) -> None:
+    """What a trace is of, the course of its first channel, and its scores."""
+    s = trace.scenario
+    console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
+    if s.plant.n > 1:
+        console.print(f"channel 1 of {s.plant.n}:")
+    for name in ("x", "v", "u", "s"):
+        column = getattr(trace, name)[:, 0]
+        line = f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
+        console.print(line, highlight=False, soft_wrap=True)
+    if trace.failure:
+        console.print(f"failed: {trace.failure}", style="red", highlight=False, markup=False)
+    else:
+        console.print(tables.trace_summary(trace))
+
+
+def catalogues(console: Console) -> None:
+    """Everything there is to choose from, with a line about each."""
+
+    def first(doc: str | None) -> str:
+        return (doc or "").strip().partition("\n")[0]
+
+    known = {
+        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
+        "Laws": ((name, first(t.doc)) for name, t in laws().items()),
+        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
+        "Scenes, for smc-mujoco run": ((name, scene.question(path)) for name, path in scene.scenes().items()),
+    }
+    for title, rows in known.items():
+        console.print(tables.catalogue(title, rows), "")
+    names = ", ".join(paper.CONDITIONS)
+    console.print(tables.catalogue("Conditions, for smc.paper.comparison(plant, condition)", [("", names)]))

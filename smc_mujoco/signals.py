@@ -9,7 +9,7 @@ Times in seconds, values in the unit of what the signal is added to (reference: 
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +17,9 @@ from numba import njit
 
 from smc_mujoco import noise
 from smc_mujoco.errors import ScenarioError, number
+from smc_mujoco.frozen import frozen
+
+EARLY = 1.0 - 1e-15  # sums and products of decimal times miss a sample's time by an ulp or two, to either side
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,7 +83,7 @@ class Step(Signal):
 
     @staticmethod
     def value(t, p):
-        return (p.amplitude if t >= p.time else 0.0), 0.0, 0.0
+        return (p.amplitude if t >= p.time * EARLY else 0.0), 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,7 +98,8 @@ class Pulse(Signal):
 
     @staticmethod
     def value(t, p):
-        return (p.amplitude if p.time <= t < p.time + p.width else 0.0), 0.0, 0.0
+        on = p.time * EARLY <= t < (p.time + p.width) * EARLY
+        return (p.amplitude if on else 0.0), 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,6 +139,21 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
         memory[0] += 1.0
         memory[2] = a * memory[1] + sigma * math.sqrt(1.0 - a * a) * noise.normals(seed, channel, stream, memory[0])[0]
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded(Signal):
+    """A signal that a file names and that is not at hand: its parameters without its function; it cannot run."""
+
+    kind: str
+    module: str
+    values: Mapping[str, float]
+
+    def parameters(self) -> dict[str, float]:
+        return dict(self.values)
+
+    def __post_init__(self):
+        object.__setattr__(self, "values", frozen(self.values))
 
 
 def kinds() -> list[type[Signal]]:

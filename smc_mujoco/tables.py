@@ -33,7 +33,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     networks = {m.name for m in metrics() if m.network}
     shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks}
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, **LEAN)
-    table.add_column("law", no_wrap=True, vertical="bottom")
+    table.add_column("law", no_wrap=True, vertical="bottom", max_width=16, overflow="ellipsis")
     for head, name in shown.items():
         table.add_column(f"{head}\n[dim]{units[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
     for label, trace in traces.items():

@@ -15,7 +15,7 @@ from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.scenario import Scenario
 
-LOGGED = ("x", "v", "u", "applied", "s", "d")  # what the callback writes, in its order
+LOGGED = ("x", "v", "u", "applied", "s", "d", "r")  # what the callback writes, in its order
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
 
@@ -101,18 +101,15 @@ def _trace(fields: dict) -> Trace:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """The Trace of a log (6, K + 1, n) of x, v, u, applied, s, d; `failed_step` is the physics step of a failure."""
+    """The Trace of a log (7, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure."""
     t = np.arange(scenario.samples + 1) * scenario.control_period
-    diverged_at, good = None, len(t)  # samples before the failure
+    diverged_at = None
     if failure is not None:
-        good = math.ceil(failed_step / scenario.steps)
-        log[:, good:] = np.nan
+        log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
         diverged_at = failed_step * scenario.physics_step
         failure = f"{failure}, at t = {diverged_at:.6g} s"
-    r = np.full_like(log[0], np.nan)
-    r[:good] = scenario.reference(t[:good])[:, None]
     arrays = dict(zip(LOGGED, log, strict=True))
-    return Trace(**arrays, t=t, r=r, scenario=scenario, diverged_at=diverged_at, failure=failure)
+    return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
 
 def load(path: str | os.PathLike) -> Trace:
@@ -122,6 +119,8 @@ def load(path: str | os.PathLike) -> Trace:
       ScenarioError: no such file, or not a trace.
     """
     path = Path(path)
+    if not path.exists() and path.with_name(f"{path.name}.npz").exists():
+        path = path.with_name(f"{path.name}.npz")
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))

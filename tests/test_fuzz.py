@@ -1,5 +1,6 @@
 """Random scenarios, sane or absurd: each is refused in one sentence, or runs to a trace without an unmarked NaN."""
 
+# pyright: reportOperatorIssue=false, reportOptionalOperand=false
 import math
 import os
 

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 from smc_mujoco.component import Component, Template, discover, template
 from smc_mujoco.errors import find
@@ -18,15 +18,28 @@ class Reading(NamedTuple):
     v: float  # reading of the velocity sensor
 
 
+@overload
+def estimator_function(function: Callable, /) -> Template: ...
+@overload
 def estimator_function(
     *,
     gains: Mapping[str, float] | None = None,
     memory: int = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
-) -> Callable[[Callable], Template]:
+) -> Callable[[Callable], Template]: ...
+def estimator_function(
+    function: Callable | None = None,
+    /,
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+) -> Callable[[Callable], Template] | Template:
     """Make an estimator of a function (y, gains, memory) -> velocity. Arguments as for `law_function`."""
-    return template("estimator", gains, memory, positive, nonnegative)
+    decorate = template("estimator", gains, memory, positive, nonnegative)
+    return decorate if function is None else decorate(function)
 
 
 @functools.cache

@@ -11,9 +11,9 @@ import math
 from smc_mujoco.law import law_function
 
 
-@law_function(gains={"gamma": 50.0, "c": 3.0, "k0": 0.0})
+@law_function(gains={"gamma": 50.0, "c": 3.0, "k0": 0.0}, nonnegative=("gamma", "c", "k0"))
 def adaptive(y, gains, memory):
     s = y.de + gains.c * y.e
     K = gains.k0 + memory[0]
     memory[0] += y.dt * gains.gamma * abs(s)
-    return (-math.copysign(K, s) if s != 0.0 else 0.0), s
+    return (-K * math.copysign(1.0, s) if s != 0.0 else 0.0), s

@@ -1,7 +1,7 @@
 """Adaptive gain with leakage: u = -K sgn(s), K' = gamma |s| [|s| > deadzone] - leak K, K(0) = k0, s = de + c e.
 
 The dead zone and the leak (sigma modification) keep K bounded under noise and sampling, at the price of a residual s.
-K is integrated by the explicit Euler rule, stable for leak dt < 2.
+K is integrated by the explicit Euler rule and kept from falling below 0, where leak dt > 1 would take it.
 Source: P. Ioannou & P. Kokotovic, "Instability analysis and improvement of robustness of adaptive control",
 Automatica 20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (in a switching gain).
 """
@@ -11,10 +11,13 @@ import math
 from smc_mujoco.law import law_function
 
 
-@law_function(gains={"gamma": 15.0, "c": 3.0, "leak": 3.0, "deadzone": 0.05, "k0": 0.0})
+@law_function(
+    gains={"gamma": 15.0, "c": 3.0, "leak": 3.0, "deadzone": 0.05, "k0": 0.0},
+    nonnegative=("gamma", "c", "leak", "deadzone", "k0"),
+)
 def adaptive_leak(y, gains, memory):
     s = y.de + gains.c * y.e
     K = gains.k0 + memory[0]
     growth = gains.gamma * abs(s) if abs(s) > gains.deadzone else 0.0
-    memory[0] += y.dt * (growth - gains.leak * K)
-    return (-math.copysign(K, s) if s != 0.0 else 0.0), s
+    memory[0] = max(K + y.dt * (growth - gains.leak * K), 0.0) - gains.k0
+    return (-K * math.copysign(1.0, s) if s != 0.0 else 0.0), s

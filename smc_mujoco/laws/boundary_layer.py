@@ -7,7 +7,7 @@ s' = u + d. Source: J.-J. Slotine, "Sliding controller design for non-linear sys
 from smc_mujoco.law import law_function
 
 
-@law_function(gains={"k": 6.0, "c": 3.0, "phi": 0.5}, positive=("phi",))
+@law_function(gains={"k": 6.0, "c": 3.0, "phi": 0.5}, positive=("phi",), nonnegative=("k", "c"))
 def boundary_layer(y, gains, memory):
     s = y.de + gains.c * y.e
     return -gains.k * min(max(s / gains.phi, -1.0), 1.0), s

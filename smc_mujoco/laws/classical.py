@@ -9,7 +9,7 @@ import math
 from smc_mujoco.law import law_function
 
 
-@law_function(gains={"k": 4.0, "c": 3.0})
+@law_function(gains={"k": 4.0, "c": 3.0}, nonnegative=("k", "c"))
 def classical(y, gains, memory):
     s = y.de + gains.c * y.e
-    return (-math.copysign(gains.k, s) if s != 0.0 else 0.0), s
+    return (-gains.k * math.copysign(1.0, s) if s != 0.0 else 0.0), s

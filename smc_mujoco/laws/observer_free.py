@@ -1,4 +1,4 @@
-"""The paper's law: u = -lam tanh(s), s = de + k1 e.
+"""Observer-free law of J. Gaber: u = -lam tanh(s), s = de + k1 e.
 
 A tanh boundary layer of fixed width 1 in the unit of s. Bounded by lam. On J x'' + D x' + K x = u the origin is
 locally stable for lam > -D and lam k1 > -K (linearisation tanh(s) ~ s, Routh-Hurwitz).

@@ -2,8 +2,10 @@
 
 Second-order sliding: s = s' = 0 in finite time for s' = u + d with |d'| <= L when k1 = 1.5 sqrt(L), k2 = 1.1 L; sampled
 with the explicit Euler rule the residual of s is O(dt^2). Any k2 > L with k1 > sqrt(k2 + L) suffices.
-Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993;
-R. Seeber & M. Horn, "Stability proof for a well-established super-twisting parameter setting", Automatica 84:241, 2017.
+Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993 (law
+and accuracy); A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (these
+gains); R. Seeber & M. Horn, "Stability proof for a well-established super-twisting parameter setting", Automatica
+84:241, 2017 (the condition).
 """
 
 import math
@@ -11,10 +13,10 @@ import math
 from smc_mujoco.law import law_function
 
 
-@law_function(gains={"k1": 3.0, "k2": 5.0, "c": 3.0})
+@law_function(gains={"k1": 3.0, "k2": 5.0, "c": 3.0}, nonnegative=("k1", "k2", "c"))
 def super_twisting(y, gains, memory):
     s = y.de + gains.c * y.e
     u = -gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
     if s != 0.0:
-        memory[0] -= y.dt * math.copysign(gains.k2, s)
+        memory[0] -= y.dt * gains.k2 * math.copysign(1.0, s)
     return u, s

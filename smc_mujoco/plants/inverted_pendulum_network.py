@@ -1,8 +1,6 @@
-"""Inverted pendulums in a chain, i = 0 .. n-1, with free ends:
+"""Inverted pendulums, coupled in a chain: m l^2 x_i'' = m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i + x_(i+1)) + u_i + d.
 
-    m l^2 x_i'' = m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i + x_(i+1)) + u_i + d
-
-They stand on one shaft, neighbours joined by torsion springs kc: the coupling is -kc times the path graph's
+i = 0 .. n-1 with free ends. They stand on one shaft, neighbours joined by torsion springs kc: the coupling is -kc times the path graph's
 Laplacian. Numbers: chosen for the paper study.
 """
 

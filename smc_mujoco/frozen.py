@@ -1,0 +1,26 @@
+"""A dict that cannot change: what plain data are made of, so that what was checked stays as it was."""
+
+from collections.abc import Mapping
+from typing import NoReturn, TypeVar
+
+V = TypeVar("V")
+
+
+class Frozen(dict[str, V]):
+    """A mapping that reads, compares and prints as a dict, hashes, pickles, and refuses to change."""
+
+    def __hash__(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return hash(tuple(self.items()))
+
+    def __reduce__(self):
+        return type(self), (dict(self),)
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("a checked mapping does not change: make a new one")
+
+    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse  # pyright: ignore
+
+
+def frozen(mapping: Mapping[str, V]) -> Frozen[V]:
+    """A frozen copy."""
+    return Frozen(mapping)
