@@ -150,6 +150,7 @@ class Recorded(Signal):
     values: Mapping[str, float]
 
     def parameters(self) -> dict[str, float]:
+        """Parameter name -> value, as recorded."""
         return dict(self.values)
 
     def __post_init__(self):
