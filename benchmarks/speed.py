@@ -11,6 +11,7 @@ import importlib.util
 import statistics
 import sys
 import time
+import warnings
 from collections.abc import Callable
 
 import mujoco
@@ -137,8 +138,9 @@ def dm_control_steps() -> tuple[Callable[[], object], int]:
 
 def gymnasium_steps() -> tuple[Callable[[], object], int]:
     """gymnasium's InvertedPendulum-v5 with a sliding-mode agent."""
-    import gymnasium
-
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # glfw misses a display that nobody asked for
+        import gymnasium
     environment = gymnasium.make("InvertedPendulum-v5").unwrapped
     count = STEPS // 20
 

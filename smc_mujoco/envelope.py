@@ -1,14 +1,22 @@
-"""A dense signal in few columns: its range and its mean in each window of time.
+"""A dense signal on paper: its range in few windows of time, and one line.
 
 A chattering control drawn sample by sample is a solid block. Its range says how hard it switches, its mean is what the
-plant feels: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992).
+plant feels: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is that mean while
+the signal chatters, and the signal itself while it does not.
 """
 
+import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.trace import Trace
+from smc_mujoco.trace import ARRAYS, Trace
+
+WINDOW = 0.01, 40  # what a mean is taken over: so much of the run, at least so many samples; chosen, see `window`
+STILL = 2e-3  # of the largest value: a smaller step from sample to sample is no move of a chattering signal
+REVERSALS = 6  # this many in a row are chattering, if each comes within a quarter of a window from the last
+POINTS = 2000  # of a line: its least and largest value in each is kept
 
 
 class Envelope(NamedTuple):
@@ -20,10 +28,20 @@ class Envelope(NamedTuple):
     high: np.ndarray
 
 
-def samples(trace: Trace) -> int:
-    """How many leading samples of the trace are finite."""
+def finite(trace: Trace) -> Trace:
+    """The trace up to its last finite sample. Of one that failed at once: where it started, and NaN for the rest."""
     bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
-    return int(np.argmax(bad)) if bad.any() else len(trace.t)
+    if not bad.any():
+        return trace
+    part = {name: getattr(trace, name)[: max(1, int(np.argmax(bad)))] for name in ARRAYS}
+    if bad[0]:
+        part |= {"x": np.array([trace.scenario.x0]), "v": np.array([trace.scenario.v0])}
+    return dataclasses.replace(trace, **part)
+
+
+def end(traces: Sequence[Trace]) -> float:
+    """When the longest run was to end, s."""
+    return max(trace.scenario.samples * trace.scenario.control_period for trace in traces)
 
 
 def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
@@ -48,3 +66,47 @@ def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
         return Envelope(t, y, y, y)
     edges = t[:: 2 * -(-count // (2 * most))]
     return windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
+
+
+def window(trace: Trace) -> int:
+    """How many samples a mean is taken over: an even number.
+
+    Of a control that switches irregularly between +-1, the mean over w samples is uncertain by some 2 / w. So a window
+    of a column's width on paper shows teeth that are not there; w is chosen so that they are thinner than a line.
+    """
+    share, least = WINDOW
+    return 2 * round(max(share * trace.scenario.samples, least) / 2)
+
+
+def stretches(y: np.ndarray, width: int) -> list[slice]:
+    """Where y (K+1,) chatters: from the first to the last of many reversals that follow each other closely."""
+    step = np.diff(y)
+    moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
+    turns = moves[1:][np.sign(step[moves[1:]]) != np.sign(step[moves[:-1]])]
+    groups = np.split(turns, np.flatnonzero(np.diff(turns) > width / 4) + 1)
+    return [slice(group[0], group[-1] + 1) for group in groups if len(group) >= REVERSALS]
+
+
+def smooth(y: np.ndarray, width: int) -> np.ndarray:
+    """y (K+1,), replaced by its running mean over `width` samples where it chatters.
+
+    No window leaves its stretch: near the ends of one, all samples share the last window that fits.
+    """
+    line = y.astype(float)
+    for part in stretches(y, width):
+        total = np.concatenate([[0.0], np.cumsum(y[part])])
+        count = len(total) - 1
+        size = min(width, count)
+        start = np.clip(np.arange(count) - size // 2, 0, count - size)
+        line[part] = (total[start + size] - total[start]) / size
+    return line
+
+
+def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """A curve for y (K+1,): smoothed where it chatters, in few points that keep every extreme."""
+    y, size = smooth(y, width), -(-len(t) // POINTS)
+    starts = np.arange(0, len(t), size)
+    padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)
+    keep = np.unique([0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1])
+    keep = keep[keep < len(t)]
+    return t[keep], y[keep]

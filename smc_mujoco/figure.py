@@ -7,13 +7,16 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from smc_mujoco import metrics, panels, style
+from smc_mujoco.envelope import end, finite
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.trace import Trace
@@ -30,11 +33,11 @@ def figure(
 ) -> list[Path]:
     """Draw traces of one plant: x, u and s over time, the phase portrait, the last samples of u.
 
-    Of a network: the mean of the channels, single channels light, and the spread max x - min x. A run that diverged is
-    drawn to its end, which is marked.
+    Of a network: the mean of the channels, single channels light, and the spread max x - min x. A run that failed is
+    drawn to its end, which is marked; the instant at which a plant changes is marked too.
 
     Args:
-      path: its ending, if any, gives way to .svg and .png.
+      path: without an ending, or with .svg or .png, which give way to both.
       labels: one a trace; default: the laws' names.
       title: default: the plant's name.
 
@@ -42,27 +45,16 @@ def figure(
       The two files.
 
     Raises:
-      ScenarioError: no traces, several plants, or a path that cannot be written.
+      ScenarioError: no traces, several plants, another ending, or a path that cannot be written.
     """
+    base = _base(path)
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
+    traces = [finite(trace) for trace in traces]
     network = any(trace.x.shape[1] > 1 for trace in traces)
-    rows = ["x", "spread", "u", "s"] if network else ["x", "u", "s"]
     with style.page():
         page = _page(7.2)
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
-        column = left.subgridspec(len(rows), 1)
-        axes: dict[str, Axes] = {}
-        for i, name in enumerate(rows):
-            axes[name] = page.add_subplot(column[i], sharex=axes.get("x"))
-            if name == "x":
-                panels.target(axes[name], traces)
-            panels.over_time(axes[name], traces, colours, name)
-            axes[name].set_ylabel(_name(traces[0], name, network))
-            axes[name].tick_params(labelbottom=name == "s")
-        axes["s"].set_xlabel("time (s)")
-        axes["s"].set_xlim(0.0, max(trace.t[-1] for trace in traces))
-        page.align_ylabels(list(axes.values()))
-
+        _overview(page, left, traces, names, colours)
         portrait, close = (page.add_subplot(cell) for cell in right.subgridspec(2, 1, height_ratios=(1.5, 1.0)))
         panels.phase(portrait, traces, colours)
         portrait.set_xlabel(_name(traces[0], "x", network))
@@ -71,7 +63,7 @@ def figure(
         close.set_xlabel("time before the end (ms)")
         close.set_ylabel(_name(traces[0], "u", False) + (", channel 1" if network else ""))
         _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours))
-        return _write(page, path)
+        return _write(page, base)
 
 
 def signals(
@@ -87,33 +79,56 @@ def signals(
 
     Returns, raises: as `figure`; also ScenarioError for two traces of one law under one condition.
     """
+    base = _base(path)
     given = style.labels(style.same_plant(traces), labels)
     cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
     if len(cells) < len(traces):
         raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
+    traces = [finite(trace) for trace in traces]
     with style.page():
         page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
         axes = page.subplots(len(laws), len(conditions), sharex=True, sharey=True, squeeze=False)
-        for (law, condition), trace in cells.items():
-            ax = axes[laws.index(law), conditions.index(condition)]
+        room = 72 * WIDTH / len(conditions)  # points, a column's width
+        for (law, condition), whole in cells.items():
+            ax, trace = axes[laws.index(law), conditions.index(condition)], finite(whole)
             panels.over_time(ax, [trace], [style.law_colour(law)], "u")
+            panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
             ax.set_title(_variation(trace), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         for law, ax in zip(laws, axes[:, 0], strict=True):
             ax.set_ylabel(_name(traces[0], "u", False).replace("control ", ""))
-            ax.set_title(style.law_name(law), color=style.law_colour(law))
+            words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
+            ax.set_title(words, color=style.law_colour(law), parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
-            top.annotate(condition, (0.5, 1.0), (0, 22), "axes fraction", "offset points", ha="center", fontsize=13)
+            words = style.cropped(condition, 0.85 * room, 13)
+            place = (0.5, 1.0), (0, 22), "axes fraction", "offset points"
+            top.annotate(words, *place, ha="center", fontsize=13, parse_math=False)
             bottom.set_xlabel("time (s)")
         axes[0, 0].set_ylim(panels.limits(traces, "u"))
-        axes[0, 0].set_xlim(0.0, max(trace.t[-1] for trace in traces))
-        meaning = (
-            Patch(color=style.MUTED, alpha=0.3, label="range of u"),
-            Line2D([], [], color=style.MUTED, label="mean of u"),
-            Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %"),
-        )
-        _head(page, title or f"{style.plant_name(traces[0])}: control", meaning)
-        return _write(page, path)
+        axes[0, 0].set_xlim(0.0, end(traces))
+        note = Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %")
+        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning(traces, "u"), note])
+        return _write(page, base)
+
+
+def _overview(
+    page: Figure, place: SubplotSpec, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]
+) -> None:
+    """The quantities over time, one below the other."""
+    network = traces[0].x.shape[1] > 1
+    rows = ["x", "spread", "u", "s"] if network else ["x", "u", "s"]
+    column, axes = place.subgridspec(len(rows), 1), {}
+    for i, name in enumerate(rows):
+        ax = axes[name] = page.add_subplot(column[i], sharex=axes.get("x"))
+        if name == "x":
+            panels.target(ax, traces)
+        panels.over_time(ax, traces, colours, name)
+        panels.jumps(ax, style.jumps(traces, names), named=name == "x")
+        ax.set_ylabel(_name(traces[0], name, network))
+        ax.tick_params(labelbottom=name == "s")
+    axes["s"].set_xlabel("time (s)")
+    axes["s"].set_xlim(0.0, end(traces))
+    page.align_ylabels(list(axes.values()))
 
 
 def _page(height: float) -> Figure:
@@ -123,17 +138,26 @@ def _page(height: float) -> Figure:
 
 
 def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
-    """The title, with the legend in one row under it."""
-    page.legend(
+    """The title, with the legend under it: in one row where it fits."""
+    size, room = 11, 72 * WIDTH - 16  # points
+    words = [style.cropped(str(handle.get_label()), 0.45 * room, size) for handle in handles]
+    widths = [style.font(size).getlength(text) + 5 * size for text in words]  # with the sample, and the gap to the next
+    fitting = (n for n in range(len(words), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
+    legend = page.legend(
         handles=handles,
-        title=title,
+        labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
+        title=style.cropped(" ".join(title.split()), room, 17, bold=True),
         title_fontproperties={"size": 17, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
-        ncols=len(handles),
-        fontsize=11,
+        ncols=next(fitting, 1),
+        fontsize=size,
         borderpad=0.2,
     )
+    legend.get_title().set_parse_math(False)
+    for shown, text in zip(legend.get_texts(), words, strict=True):
+        shown.set_text(text)
+        shown.set_parse_math(False)
 
 
 def _name(trace: Trace, name: str, network: bool) -> str:
@@ -146,25 +170,47 @@ def _name(trace: Trace, name: str, network: bool) -> str:
 
 
 def _key(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Line2D | Patch]:
-    """What the legend shows: the traces, and the reference with its band."""
+    """What the legend shows: the traces, the reference with its band, what lines and bands are."""
     handles: list[Line2D | Patch] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
-        end = "" if trace.diverged_at is None else f" (diverged at {trace.diverged_at:.3g} s)"
-        handles.append(Line2D([], [], color=colour, lw=3, label=name + end))
-    return [*handles, Patch(color=style.BAND, label="reference ± 2 %")]
+        how = style.ending(trace)
+        words = style.cropped(name, 300, 11) + (f" ({how})" if how else "")
+        handles.append(Line2D([], [], color=colour, lw=3, label=words))
+    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(traces, "u, s")]
+
+
+def _meaning(traces: Sequence[Trace], names: str) -> list[Line2D | Patch]:
+    """What the bands and the lines of the named quantities are, where they need words."""
+    n, over = traces[0].x.shape[1], panels.mean_window(traces)
+    words = [] if over is None and n == 1 else [f"band: range of {names}"]
+    words += [f"line: mean over {1e3 * over:.3g} ms"] if over else []
+    handles: list[Line2D | Patch] = [Patch(color=style.MUTED, alpha=0.3, label=", ".join(words))] if words else []
+    if n > 1:
+        shown = len(panels.light(n))
+        which = "single channels" if shown == n else f"{shown} of {n} channels"
+        handles.append(Line2D([], [], color=style.MUTED, alpha=0.5, lw=0.8, label=f"light: {which}"))
+    return handles
 
 
 def _variation(trace: Trace) -> str:
     """How much u moves in the last part of a run."""
     if trace.diverged_at is not None:
-        return f"diverged at {trace.diverged_at:.3g} s"
+        return style.ending(trace)
     rate = metrics.tv_rate(trace)
     return f"{rate:,.{0 if rate >= 10 else 2}f} {style.units(trace)['u']}/s"
 
 
-def _write(page: Figure, path: str | os.PathLike) -> list[Path]:
+def _base(path: str | os.PathLike) -> Path:
+    """The path without .svg or .png. What follows a point in "lam_0.5" or "a.b c" is no ending."""
     base = Path(path)
-    base = base.with_suffix("") if base.suffix in (".svg", ".png", ".pdf") else base
+    if base.suffix in (".svg", ".png"):
+        return base.with_suffix("")
+    if base.suffix[1:].isalnum() and base.suffix[1].isalpha():
+        raise ScenarioError(f"cannot draw to {base.name!r}: end the name in .svg or .png, for both are written")
+    return base
+
+
+def _write(page: Figure, base: Path) -> list[Path]:
     written = []
     for suffix in (".svg", ".png"):
         written.append(base.with_name(base.name + suffix))

@@ -1,21 +1,22 @@
 """What one pair of axes shows: a quantity of several traces over time, their phase portrait, the last samples of u.
 
-Over time, a curve is the mean of the channels in each window (envelope.py); the band behind it is the range in the
-window, of u and s over all channels too. Single channels of a network are light.
+Traces come cut to what is finite (envelope.finite). Over time, a curve is the mean of the channels, and where it
+chatters its mean over a window of time too (envelope.py); the band behind it is the range in a column of the picture,
+of u and s over all channels. Single channels of a network are light.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from smc_mujoco import style
-from smc_mujoco.envelope import columns, samples
+from smc_mujoco.envelope import columns, end, line, stretches, window
 from smc_mujoco.measure import BAND, scale
 from smc_mujoco.trace import Trace
 
-WINDOWS = 360  # of a panel
+COLUMNS = 360  # of a panel
 LAST = 60  # control samples in the close-up of u
 LIGHT = 9  # channels of a network drawn one by one
 FINE = 1 / 200  # of a phase portrait's diagonal: how far apart its points are
@@ -31,11 +32,6 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
 }
 
 
-def values(trace: Trace, name: str) -> np.ndarray:
-    """A quantity at the trace's finite samples, (samples, n)."""
-    return QUANTITIES[name](trace)[: samples(trace)]
-
-
 def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace, str, float]]:
     """Traces from the bottom to the top with their colours and how much wider their lines are.
 
@@ -44,41 +40,77 @@ def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace,
     return [(trace, colours[i], 0.5 * i) for i, trace in reversed(list(enumerate(traces)))]
 
 
+def curve(trace: Trace, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The line of a signal y (K+1,) on paper. Few samples are drawn as they are."""
+    return line(trace.t, y, window(trace)) if smoothed(trace) else (trace.t, y)
+
+
+def smoothed(trace: Trace) -> bool:
+    """Whether the trace has too many samples to show each."""
+    return trace.scenario.samples > COLUMNS
+
+
+def mean_window(traces: Sequence[Trace]) -> float | None:
+    """Over how many s the lines of u are means; None where no u chatters."""
+    found = [
+        window(trace) * trace.scenario.control_period
+        for trace in traces
+        if smoothed(trace) and stretches(trace.u.mean(axis=1), window(trace))
+    ]
+    return max(found, default=None)
+
+
 def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: str) -> list[Artist]:
     """Draw a quantity of every trace and set the vertical range."""
     drawn: list[Artist] = []
-    for trace, colour, wider in layers(traces, colours):
-        y = values(trace, name)
-        t, states = trace.t[: len(y)], name == "x"
-        each, mean = columns(t, y, WINDOWS), columns(t, y.mean(axis=1, keepdims=True), WINDOWS)
-        band = (mean.low, mean.high) if states else (each.low, each.high)
-        drawn.append(ax.fill_between(mean.t, band[0].min(axis=1), band[1].max(axis=1), color=colour, alpha=0.22, lw=0))
-        if y.shape[1] > 1 and states:
-            for i in light(y.shape[1]):
-                drawn += ax.plot(each.t, each.mean[:, i], color=colour, alpha=0.3, lw=0.8)
-        drawn += ax.plot(mean.t, mean.mean[:, 0], color=colour, lw=1.5 + wider)
     ax.set_ylim(limits(traces, name))
-    for trace, colour in zip(traces, colours, strict=True):
+    for trace, colour, wider in layers(traces, colours):
+        y, held = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
+        mean = y.mean(axis=1)
+        e = columns(trace.t, mean[:, None] if name == "x" else y, COLUMNS)
+        drawn.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
+        if y.shape[1] > 1:
+            for i in light(y.shape[1]):
+                drawn += ax.plot(*curve(trace, y[:, i]), color=colour, alpha=0.3, lw=0.8, drawstyle=held)
+        drawn += ax.plot(*curve(trace, mean), color=colour, lw=1.5 + wider, drawstyle=held)
         if trace.diverged_at is not None:
-            y = values(trace, name)
-            end = np.clip(y[-1].mean(), *ax.get_ylim())
-            drawn += ax.plot(trace.t[len(y) - 1], end, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
+            last = np.clip(mean[-1], *ax.get_ylim())
+            drawn += ax.plot(trace.t[-1], last, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
     return drawn
 
 
 def target(ax: Axes, traces: Sequence[Trace]) -> None:
-    """Draw each reference, and the settling band around it."""
-    for trace in {trace.scenario.reference: trace for trace in traces}.values():
-        e, half = columns(trace.t, trace.r[:, :1], WINDOWS), BAND * scale(trace)
-        r = e.mean[:, 0]
-        ax.fill_between(e.t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
-        ax.plot(e.t, r, color=style.MUTED, lw=0.9, ls=(0, (5, 3)), zorder=1.5)
+    """Draw each reference for as long as a run had it, and the settling band around it."""
+    for trace in {trace.scenario.reference: trace for trace in sorted(traces, key=lambda trace: len(trace.t))}.values():
+        if np.isfinite(trace.r).all():
+            (t, r), half = line(trace.t, trace.r[:, 0], 2), BAND * scale(trace)
+            ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
+            ax.plot(t, r, color=style.MUTED, lw=0.9, ls=(0, (5, 3)), zorder=1.5)
+
+
+def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
+    """Mark when a plant changed, time in s -> words; the words too if `named`."""
+    for time, words in changes.items():
+        ax.axvline(time, color=style.INK, lw=0.9, ls=(0, (2, 2)), zorder=1.5)
+        if named:
+            ax.annotate(
+                words,
+                (time, 1.0),
+                (4, -3),
+                ("data", "axes fraction"),
+                "offset points",
+                va="top",
+                fontsize=9,
+                bbox={"facecolor": style.PAPER, "alpha": 0.8, "pad": 1, "lw": 0},
+                parse_math=False,
+                zorder=4,
+            )
 
 
 def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     """Draw v over x, with a ring where each trace starts."""
     for trace, colour, wider in layers(traces, colours):
-        x, v = values(trace, "x"), values(trace, "v")
+        x, v = trace.x, trace.v
         if x.shape[1] > 1:
             for i in light(x.shape[1]):
                 ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=0.7)
@@ -96,14 +128,14 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
 def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     """Draw u of the first channel as it was held over the last samples."""
     period = max(trace.scenario.control_period for trace in traces)
-    end = max(trace.t[-1] for trace in traces)
-    begin = max(0.0, end - LAST * period)
+    stop = end(traces)
+    begin = max(0.0, stop - LAST * period)
     for trace, colour, wider in layers(traces, colours):
-        part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), samples(trace))
-        ax.step(1e3 * (trace.t[part] - end), trace.u[part, 0], where="post", color=colour, lw=1.2 + wider)
+        part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
+        ax.step(1e3 * (trace.t[part] - stop), trace.u[part, 0], where="post", color=colour, lw=1.2 + wider)
     if all(trace.diverged_at is not None for trace in traces):
         ax.text(0.5, 0.5, "no run lasted", transform=ax.transAxes, ha="center", color=style.MUTED)
-    ax.set_xlim(1e3 * (begin - end), 0.0)
+    ax.set_xlim(1e3 * (begin - stop), 0.0)
     ax.margins(y=0.12)
 
 
@@ -123,8 +155,9 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     """Least and largest value of the runs that lasted; where none did, of all runs without their ends."""
-    seen = [values(trace, name) for trace in traces if trace.diverged_at is None]
-    seen = seen or [y[: max(1, int(0.8 * len(y)))] for y in (values(trace, name) for trace in traces)]
+    seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
+    seen = seen or [y[: max(1, int(0.8 * len(y)))] for y in (QUANTITIES[name](trace) for trace in traces)]
+    seen = [y for y in seen if np.isfinite(y).all()] or [np.zeros(1)]
     return float(min(y.min() for y in seen)), float(max(y.max() for y in seen))
 
 

@@ -4,9 +4,12 @@ Colours are those of Okabe and Ito (Color Universal Design, 2008), told apart by
 colour everywhere. The fonts ship with matplotlib.
 """
 
+import functools
 import zlib
 from collections.abc import Sequence
+from pathlib import Path
 
+from smc_mujoco import plain
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.measure import EFFORT
 from smc_mujoco.trace import Trace
@@ -21,8 +24,10 @@ COLOURS = {
     "none": "#6E7781",
 }
 OTHERS = ("#6A4C93", "#8C5A2B", "#1A936F", "#B5179E", "#3D405B", "#7F9C1E")  # chosen: apart from those above
-NAMES = {
+NAMES = {  # a law of your own is called as you call it
     "observer_free": "Observer-free",
+    "classical": "Classical",
+    "adaptive": "Adaptive",
     "super_twisting": "Super-twisting",
     "boundary_layer": "Boundary layer",
     "adaptive_leak": "Adaptive + leak",
@@ -86,24 +91,64 @@ def colours(traces: Sequence[Trace]) -> list[str]:
 
 def law_name(law: str) -> str:
     """A law's name as people write it."""
-    return NAMES.get(law, law.replace("_", " ").capitalize())
+    return NAMES.get(law, law)
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     """One label a trace: the given ones, else the laws' names, numbered where a law comes again.
 
-    A given label that is the law's own name is written as people write it.
+    A given label that is the law's own name is written as people write it; any other is shown as it is, on one line.
 
     Raises:
       ScenarioError: not as many labels as traces.
     """
+    own = [trace.scenario.law.name for trace in traces]
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
-        own = [trace.scenario.law.name for trace in traces]
-        return [law_name(label) if label == law else str(label) for label, law in zip(given, own, strict=True)]
-    names = [law_name(trace.scenario.law.name) for trace in traces]
+        written = [" ".join(str(label).split()) for label in given]
+        return [law_name(law) if label == law else label for label, law in zip(written, own, strict=True)]
+    names = [law_name(law) for law in own]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
+
+
+def ending(trace: Trace) -> str:
+    """How a run ended before its time, "" if it did not: "diverged at 0.4 s" only where the plant went off."""
+    if trace.diverged_at is None:
+        return ""
+    off = trace.failure is None or trace.failure.startswith(plain.LEFT_THE_WORLD)
+    return f"{'diverged' if off else 'failed'} at {trace.diverged_at:.3g} s"
+
+
+def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
+    """When plants change, s -> how, as "mass × 2"; with the labels in front where it is not all of them."""
+    found: dict[tuple[float, str], list[str]] = {}
+    for trace, name in zip(traces, names, strict=True):
+        if jump := trace.scenario.jump:
+            words = ", ".join(f"{what} × {factor:.3g}" for what, factor in jump.factors.items())
+            found.setdefault((jump.time, words), []).append(name)
+    changes: dict[float, list[str]] = {}
+    for (time, words), who in sorted(found.items()):
+        changes.setdefault(time, []).append(words if len(who) == len(traces) else f"{', '.join(who)}: {words}")
+    return {time: "; ".join(parts) for time, parts in changes.items()}
+
+
+@functools.cache
+def font(size: float, bold: bool = False):
+    """DejaVu Sans, as matplotlib brings it, as a font of Pillow; letters `size` high."""
+    import matplotlib
+    from PIL import ImageFont
+
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)
+
+
+def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
+    """The text, cut with an ellipsis where it is wider than the room; both in the unit of the letters' size."""
+    width, cut = font(size, bold).getlength, text
+    while cut and width(cut if cut == text else f"{cut}…") > room:
+        cut = cut[:-1]
+    return text if cut == text else f"{cut.rstrip()}…"
 
 
 def same_plant(traces: Sequence[Trace]) -> Sequence[Trace]:
