@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import panels, style
-from smc_mujoco.envelope import Envelope, samples, windows
+from smc_mujoco.envelope import Envelope, windows
 from smc_mujoco.trace import Trace
 
 HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the rail's
+CHAIN = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
 LEAST = 0.05  # of the longest: shorter ones are not drawn
 SLENDER = 0.1  # thickest shaft of a short one, of its length
 BAR = 0.1  # of the longest: the least range that gets a bar
@@ -41,8 +42,8 @@ class Acts(NamedTuple):
 
 def acts(trace: Trace, times: np.ndarray, gap: float) -> Acts:
     """Ranges and means over the `gap` seconds before each time."""
-    n, edges = samples(trace), np.concatenate([[times[0] - gap], times])
-    return Acts(*(windows(trace.t[:n], y[:n], edges) for y in (trace.applied, trace.d)))
+    edges = np.concatenate([[times[0] - gap], times])
+    return Acts(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d)))
 
 
 class Longest(NamedTuple):
@@ -72,11 +73,11 @@ def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) ->
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > LEAST]
 
 
-def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joint: int, rail: float, arrow: Arrow):
+def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joint: int, unit: float, arrow: Arrow):
     """Add an arrow to a scene that holds the machines already.
 
     Args:
-      rail: length of the rail, m, if the joint is a slide.
+      unit: length of the rail, m, if the joint is a slide; else how much longer than HINGE the longest arrow is.
     """
     if scene.ngeom >= scene.maxgeom:
         return
@@ -84,10 +85,11 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joi
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
     if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
         arm = place - data.xanchor[joint]
-        reach, width, out = HINGE * np.linalg.norm(arm), 0.16 * radius + 0.012, arm / np.linalg.norm(arm)
+        length = np.linalg.norm(arm)
+        reach, width, out = unit * HINGE * length, 0.16 * radius + 0.012 * unit, arm / length
         along, start = np.cross(data.xaxis[joint], out), radius + 1.6 * width
     else:
-        reach, width, out = SLIDE * rail, 0.035, np.array([0.0, 0.0, 1.0])
+        reach, width, out = unit * SLIDE, 0.035, np.array([0.0, 0.0, 1.0])
         along, start = data.xaxis[joint], model.geom_size[body, 2] + 2.2 * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))

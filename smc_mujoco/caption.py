@@ -2,11 +2,9 @@
 
 import functools
 from collections.abc import Sequence
-from pathlib import Path
 
-import matplotlib
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from smc_mujoco import style
 from smc_mujoco.arrows import Longest
@@ -14,7 +12,10 @@ from smc_mujoco.camera import Room
 from smc_mujoco.stage import SHOWN
 from smc_mujoco.trace import Trace
 
-LABEL = 15  # px, height of a label's letters in a film of full size
+LABEL, TITLE, KEY = 15, 24, 13  # px, height of letters in a film of full size
+EDGE = 24  # px, from the picture's edge to words
+MOST = 0.3  # of the picture's width, for a label beside its machine
+NEWS = 1.5  # s for which a change of the plant is told loudly
 
 
 class Caption:
@@ -35,26 +36,38 @@ class Caption:
         longest: Longest,
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
-        self.title = title or style.plant_name(traces[0])
-        self.key = key(traces, longest)
+        self.jumps = style.jumps(traces, names)
+        inside = size[0] - 2 * EDGE * scale
+        clock = style.width("00.00 s", TITLE * scale, bold=True) + EDGE * scale
+        self.title = style.cropped(title or style.plant_name(traces[0]), inside - clock, TITLE * scale, bold=True)
+        notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
+        self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
+        self.key = wrapped(key(traces, longest), inside - self.note_room, KEY * scale)
         x, y, _ = traces[0].scenario.plant.lane
+        self.beside = abs(y) > abs(x)  # machines behind each other have their labels at the left
         side, below = 40 * scale, 52 * scale
-        if abs(y) > abs(x):  # machines behind each other have their labels at the left
+        self.most = (size[0] - side) / len(traces) - 0.8 * LABEL * scale  # width of a label
+        if self.beside:
+            self.most = MOST * size[0]
             side, below = max(self.width(text) for text in self.texts()) + 30 * scale, 20 * scale
-        self.room = Room(side, 106 * scale, size[0] - 40 * scale, size[1] - below)
+        top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
+        self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
         self.sheet = functools.lru_cache(maxsize=1)(self._sheet)
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """The labels; with its time where a machine has failed, or ever will when `failed` is not given."""
         failed = [True] * len(self.traces) if failed is None else failed
-        return [
-            f"{name}: diverged at {trace.diverged_at:.2f} s" if gone and trace.diverged_at is not None else name
-            for name, trace, gone in zip(self.names, self.traces, failed, strict=True)
-        ]
+        return [self.label(*each) for each in zip(self.names, self.traces, failed, strict=True)]
+
+    def label(self, name: str, trace: Trace, gone: bool) -> str:
+        """A name with how its machine has ended; as much of the name as there is room for."""
+        end = f": {style.ending(trace)}" if gone and trace.diverged_at is not None else ""
+        size = LABEL * self.scale
+        return style.cropped(name, self.most - self.width(end), size, bold=True) + end
 
     def width(self, text: str) -> float:
         """Width of a label, px."""
-        return font(LABEL * self.scale, bold=True).getlength(text) + 1.4 * LABEL * self.scale
+        return style.width(text, LABEL * self.scale, bold=True) + 1.4 * LABEL * self.scale
 
     def put(self, boxes: np.ndarray) -> None:
         """Place the labels under machines that stand in a row, else at the left of each. They never touch.
@@ -64,7 +77,7 @@ class Caption:
         """
         widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL * self.scale
         gap, middle = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2
-        if self.room.left < widths.max():  # no room at the left
+        if not self.beside:
             x = spread(middle[:, 0], widths + gap, self.size[0])
             y = np.full(len(x), min(boxes[:, 3].max() + 0.9 * height, self.size[1] - 0.7 * height))
         else:
@@ -74,43 +87,67 @@ class Caption:
 
     def over(self, picture: np.ndarray, time: float, failed: tuple[bool, ...]) -> np.ndarray:
         """The picture with the words on it."""
-        image, sheet, s = Image.fromarray(picture), self.sheet(failed), self.scale
+        past = max((start for start in self.jumps if start <= time), default=None)
+        image = Image.fromarray(picture)
+        sheet, s = self.sheet(failed, past, past is not None and time < past + NEWS), self.scale
         image.paste(sheet, mask=sheet)
-        place = self.size[0] - 24 * s, 16 * s
-        ImageDraw.Draw(image).text(place, f"{time:.2f} s", style.INK, font(24 * s, bold=True), anchor="ra")
+        place = self.size[0] - EDGE * s, 16 * s
+        ImageDraw.Draw(image).text(place, f"{time:.2f} s", style.INK, style.font(TITLE * s, bold=True), anchor="ra")
         return np.asarray(image)
 
-    def _sheet(self, failed: tuple[bool, ...]) -> Image.Image:
-        """Everything but the clock."""
+    def _sheet(self, failed: tuple[bool, ...], change: float | None, loud: bool) -> Image.Image:
+        """Everything but the clock; `change` is the time of the plant's last change."""
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
         draw, s = ImageDraw.Draw(sheet), self.scale
-        draw.text((24 * s, 16 * s), self.title, style.INK, font(24 * s, bold=True))
-        draw.text((25 * s, 48 * s), self.key, style.MUTED, font(13 * s))
+        draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE * s, bold=True))
+        for i, text in enumerate(self.key):
+            draw.text((EDGE * s, (48 + 1.4 * KEY * i) * s), text, style.MUTED, style.font(KEY * s))
+        if change is not None:
+            self._note(draw, f"{self.jumps[change]} since {change:g} s", loud)
         for text, colour, box, gone in zip(self.texts(failed), self.colours, self.pills, failed, strict=True):
             fill = style.FAILED if gone else colour
             draw.rounded_rectangle(tuple(box), radius=(box[3] - box[1]) / 2, fill=fill)
             middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-            draw.text(middle, text, style.letters_on(fill), font(LABEL * s, bold=True), anchor="mm")
+            draw.text(middle, text, style.letters_on(fill), style.font(LABEL * s, bold=True), anchor="mm")
         return sheet
 
+    def _note(self, draw: ImageDraw.ImageDraw, text: str, loud: bool) -> None:
+        """What has changed, under the clock; in a dark box while it is news."""
+        s = self.scale
+        text = style.cropped(text, self.note_room, KEY * s, bold=True)
+        right, y = self.size[0] - EDGE * s, 56 * s
+        if loud:
+            box = right - style.width(text, KEY * s, bold=True) - 8 * s, y - 11 * s, right + 8 * s, y + 11 * s
+            draw.rounded_rectangle(box, radius=5 * s, fill=style.INK)
+        colour = style.PAPER if loud else style.INK
+        draw.text((right, y), text, colour, style.font(KEY * s, bold=True), anchor="rm")
 
-@functools.cache
-def font(size: float, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, as matplotlib brings it."""
-    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)
 
-
-def key(traces: Sequence[Trace], longest: Longest) -> str:
+def key(traces: Sequence[Trace], longest: Longest) -> list[str]:
     """What the arrows mean, and how much of a network is shown."""
     unit = style.units(traces[0])["u"]
-    words = [f"coloured arrow: control, longest {longest.control:.2g} {unit}"]
+    words = []
+    if longest.control:
+        words.append(f"coloured arrow: mean control, longest {longest.control:.2g} {unit}")
+        words.append("bar: the range over which it switches")
     if longest.disturbance:
         words.append(f"dark arrow: disturbance, longest {longest.disturbance:.2g} {unit}")
     most = max(trace.scenario.plant.n for trace in traces)
     if most > SHOWN:
-        words.append(f"the first {SHOWN} of {most} pendulums")
-    return "     ".join(words)
+        words.append(f"machines: the first {SHOWN} of {most} pendulums")
+    return words
+
+
+def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:
+    """The parts in as few lines as the room allows."""
+    lines: list[str] = []
+    for part in parts:
+        longer = f"{lines[-1]}     {part}" if lines else part
+        if lines and style.width(longer, size) <= room:
+            lines[-1] = longer
+        else:
+            lines.append(style.cropped(part, room, size))
+    return lines
 
 
 def spread(centres: np.ndarray, widths: np.ndarray, room: float) -> np.ndarray:

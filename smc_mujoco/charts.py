@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from smc_mujoco import panels, style
-from smc_mujoco.envelope import columns
+from smc_mujoco.envelope import end
 from smc_mujoco.trace import Trace
 
 DPI = 100
@@ -28,15 +28,24 @@ class Charts:
       scale: pixels per px of a film 1280 wide, by which letters and lines grow.
     """
 
-    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], scale: float):
-        self.end = max(trace.t[-1] for trace in traces)
+    def __init__(
+        self,
+        traces: Sequence[Trace],
+        names: Sequence[str],
+        colours: Sequence[str],
+        size: tuple[int, int],
+        scale: float,
+    ):
+        self.end = end(traces)
         self.dot = max(2, round(4.5 * scale))
         with style.page():
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, 2)
             figure.subplots_adjust(left=0.062, right=0.985, bottom=0.2, top=0.855, wspace=0.155)
-            draw_axes(axes, traces, self.end)
+            draw_axes(axes, traces, self.end, DPI * scale / 72)
+            for ax in axes:
+                panels.jumps(ax, style.jumps(traces, names), named=ax is axes[0])
             drawn = [panels.over_time(ax, traces, colours, name) for ax, name in zip(axes, "xu", strict=True)]
             self.full = picture(canvas)
             for artist in itertools.chain(*drawn):
@@ -58,7 +67,7 @@ class Charts:
             image[rows, past] = self.full[rows, past]
             image[top : bottom + 1, now] = CURSOR
             for (t, y), colour in zip(paths, self.colours, strict=True):
-                if time <= t[-1] + 1e-9:  # a run that failed has no place on the cursor
+                if time <= t[-1] + 1e-9 and np.isfinite(y[0]):  # a run that failed has no place on the cursor
                     self.disc(image, now, np.interp(time, t, y), colour)
         return image
 
@@ -76,15 +85,30 @@ class Charts:
             image[rows, cols] = (image[rows, cols] * (1 - cover) + ink * cover).astype(np.uint8)
 
 
-def draw_axes(axes: Sequence[Axes], traces: Sequence[Trace], end: float) -> None:
-    """Frames, names and units."""
-    unit, several = style.units(traces[0]), any(trace.x.shape[1] > 1 for trace in traces)
+def draw_axes(axes: Sequence[Axes], traces: Sequence[Trace], end: float, point: float) -> None:
+    """Frames, names and units, and what lines and bands are; a point has `point` px."""
+    unit, n, window = style.units(traces[0]), traces[0].x.shape[1], panels.mean_window(traces)
     names = f"{style.quantity(traces[0])} x ({unit['x']})", f"control u ({unit['u']})"
-    for ax, name in zip(axes, names, strict=True):
-        ax.set_title(name + (": mean and single pendulums" if several and ax is axes[0] else ""))
+    for ax, name, words in zip(axes, names, (note(n), note(n, window, band=True)), strict=True):
+        room = ax.get_window_extent().width - style.width(name, 11 * point, bold=True) - 15 * point
+        ax.set_title(name)
+        ax.set_title(
+            style.cropped(words, room, 9.5 * point), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED
+        )
         ax.set_xlim(0.0, end)
         ax.set_xlabel("time (s)", labelpad=2)
         ax.tick_params(length=0)
+
+
+def note(n: int, window: float | None = None, band: bool = False) -> str:
+    """What is drawn of n channels, where a line is a mean over them or over a window of time in s."""
+    over = [f"of {n}"] if n > 1 else []
+    over += [f"over {1e3 * window:.3g} ms"] if window else []
+    if not over:
+        return ""
+    single = len(panels.light(n))
+    light = [f"light: {'each' if single == n else f'{single} of them'}"] if n > 1 else []
+    return ", ".join(["band: range"] * band + [f"line: mean {' '.join(over)}"] + light)
 
 
 def picture(canvas: FigureCanvasAgg) -> np.ndarray:
@@ -101,8 +125,6 @@ def frame(ax: Axes, height: int) -> tuple[int, int, int, int]:
 
 def path(ax: Axes, trace: Trace, name: str, height: int) -> tuple[np.ndarray, np.ndarray]:
     """Where a trace's dot is: times in s and px from the top, kept within the frame."""
-    u = panels.values(trace, name).mean(axis=1, keepdims=True)
-    e = columns(trace.t[: len(u)], u, panels.WINDOWS)
-    y = np.clip(e.mean[:, 0], *ax.get_ylim())
-    t = np.append(e.t[:-1], trace.t[len(u) - 1])
+    t, y = panels.curve(trace, panels.QUANTITIES[name](trace).mean(axis=1))
+    y = np.clip(y, *ax.get_ylim())
     return t, height - ax.transData.transform(np.column_stack([t, y]))[:, 1]

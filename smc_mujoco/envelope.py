@@ -16,7 +16,7 @@ from smc_mujoco.trace import ARRAYS, Trace
 WINDOW = 0.01, 40  # what a mean is taken over: so much of the run, at least so many samples; chosen, see `window`
 STILL = 2e-3  # of the largest value: a smaller step from sample to sample is no move of a chattering signal
 REVERSALS = 6  # this many in a row are chattering, if each comes within a quarter of a window from the last
-POINTS = 2000  # of a line: its least and largest value in each is kept
+POINTS = 250  # of a line: its least and largest value in each is kept
 
 
 class Envelope(NamedTuple):
@@ -33,8 +33,9 @@ def finite(trace: Trace) -> Trace:
     bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
     if not bad.any():
         return trace
-    part = {name: getattr(trace, name)[: max(1, int(np.argmax(bad)))] for name in ARRAYS}
-    if bad[0]:
+    count = int(np.argmax(bad))
+    part = {name: getattr(trace, name)[: max(1, count)] for name in ARRAYS}
+    if count == 0:
         part |= {"x": np.array([trace.scenario.x0]), "v": np.array([trace.scenario.v0])}
     return dataclasses.replace(trace, **part)
 
@@ -69,37 +70,43 @@ def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
 
 
 def window(trace: Trace) -> int:
-    """How many samples a mean is taken over: an even number.
+    """How many samples a mean is taken over: a multiple of 4.
 
     Of a control that switches irregularly between +-1, the mean over w samples is uncertain by some 2 / w. So a window
     of a column's width on paper shows teeth that are not there; w is chosen so that they are thinner than a line.
     """
     share, least = WINDOW
-    return 2 * round(max(share * trace.scenario.samples, least) / 2)
+    return 4 * round(max(share * trace.scenario.samples, least) / 4)
 
 
 def stretches(y: np.ndarray, width: int) -> list[slice]:
     """Where y (K+1,) chatters: from the first to the last of many reversals that follow each other closely."""
-    step = np.diff(y)
+    near, step = width // 4, np.diff(y)
     moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
     turns = moves[1:][np.sign(step[moves[1:]]) != np.sign(step[moves[:-1]])]
-    groups = np.split(turns, np.flatnonzero(np.diff(turns) > width / 4) + 1)
-    return [slice(group[0], group[-1] + 1) for group in groups if len(group) >= REVERSALS]
+    groups = np.split(turns, np.flatnonzero(np.diff(turns) > near) + 1)
+    ends = [(group[0] + 1, group[-1] + 1) for group in groups if len(group) >= REVERSALS]
+    return [slice(a if a > near else 0, b if b < len(y) - near else len(y)) for a, b in ends]
 
 
 def smooth(y: np.ndarray, width: int) -> np.ndarray:
-    """y (K+1,), replaced by its running mean over `width` samples where it chatters.
+    """y (K+1,), replaced where it chatters by its mean over `width` samples, the nearer ones weighing more.
 
-    No window leaves its stretch: near the ends of one, all samples share the last window that fits.
+    It is the mean of means over half the width each: a triangle, which leaves far less of a periodic signal than one
+    mean does.
     """
     line = y.astype(float)
     for part in stretches(y, width):
-        total = np.concatenate([[0.0], np.cumsum(y[part])])
-        count = len(total) - 1
-        size = min(width, count)
-        start = np.clip(np.arange(count) - size // 2, 0, count - size)
-        line[part] = (total[start + size] - total[start]) / size
+        line[part] = running(running(line[part], width // 2), width // 2)
     return line
+
+
+def running(y: np.ndarray, width: int) -> np.ndarray:
+    """Mean of y (K,) over windows of `width` samples; towards its ends they shrink about their middles, to a half."""
+    total, i = np.concatenate([[0.0], np.cumsum(y)]), np.arange(len(y))
+    size = np.minimum(2 * np.clip(np.minimum(i, len(y) - i), width // 4, width // 2), len(y))
+    start = np.clip(i - size // 2, 0, len(y) - size)
+    return (total[start + size] - total[start]) / size
 
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -23,6 +22,7 @@ from smc_mujoco.trace import Trace
 
 WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
 DPI = 150
+LETTERS = 11  # points, of the legend
 
 
 def figure(
@@ -81,22 +81,22 @@ def signals(
     """
     base = _base(path)
     given = style.labels(style.same_plant(traces), labels)
+    traces = [finite(trace) for trace in traces]
     cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
     if len(cells) < len(traces):
         raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
-    traces = [finite(trace) for trace in traces]
     with style.page():
         page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
         axes = page.subplots(len(laws), len(conditions), sharex=True, sharey=True, squeeze=False)
         room = 72 * WIDTH / len(conditions)  # points, a column's width
-        for (law, condition), whole in cells.items():
-            ax, trace = axes[laws.index(law), conditions.index(condition)], finite(whole)
+        for (law, condition), trace in cells.items():
+            ax = axes[laws.index(law), conditions.index(condition)]
             panels.over_time(ax, [trace], [style.law_colour(law)], "u")
             panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
             ax.set_title(_variation(trace), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         for law, ax in zip(laws, axes[:, 0], strict=True):
-            ax.set_ylabel(_name(traces[0], "u", False).replace("control ", ""))
+            ax.set_ylabel(_name(traces[0], "u", traces[0].x.shape[1] > 1).replace("control ", ""))
             words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
             ax.set_title(words, color=style.law_colour(law), parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
@@ -139,20 +139,21 @@ def _page(height: float) -> Figure:
 
 def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
     """The title, with the legend under it: in one row where it fits."""
-    size, room = 11, 72 * WIDTH - 16  # points
+    size, room = LETTERS, 72 * WIDTH - 16  # points
     words = [style.cropped(str(handle.get_label()), 0.45 * room, size) for handle in handles]
-    widths = [style.font(size).getlength(text) + 5 * size for text in words]  # with the sample, and the gap to the next
+    widths = [style.width(text, size) + 4.4 * size for text in words]  # with the sample, and the gap to the next
     fitting = (n for n in range(len(words), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
     legend = page.legend(
         handles=handles,
         labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
-        title=style.cropped(" ".join(title.split()), room, 17, bold=True),
+        title=style.cropped(title, room, 17, bold=True),
         title_fontproperties={"size": 17, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
         ncols=next(fitting, 1),
         fontsize=size,
         borderpad=0.2,
+        columnspacing=1.5,
     )
     legend.get_title().set_parse_math(False)
     for shown, text in zip(legend.get_texts(), words, strict=True):
@@ -164,7 +165,7 @@ def _name(trace: Trace, name: str, network: bool) -> str:
     """An axis' name with its unit."""
     unit = style.units(trace)["x" if name == "spread" else name]
     if name == "spread":
-        return f"max x − min x ({unit})"
+        return f"max − min x ({unit})"
     words = {"x": style.quantity(trace), "v": "velocity", "u": "control", "s": "sliding variable"}
     return f"{'mean' if network else words[name]} {name} ({unit})"
 
@@ -174,7 +175,7 @@ def _key(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) 
     handles: list[Line2D | Patch] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, 300, 11) + (f" ({how})" if how else "")
+        words = style.cropped(name, 0.3 * 72 * WIDTH, LETTERS) + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=3, label=words))
     return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(traces, "u, s")]
 

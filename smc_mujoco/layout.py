@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import mujoco
 from mujoco.introspect import ast_nodes, structs
 
+from smc_mujoco.errors import ScenarioError
+
 _SCALARS = {
     "mjtNum": ctypes.c_double,
     "mjtSize": ctypes.c_int64,
@@ -25,7 +27,7 @@ _SCALARS = {
 }
 
 
-class LayoutError(RuntimeError):
+class LayoutError(ScenarioError):
     """This MuJoCo lays out mjData in a way that the callback does not know."""
 
 

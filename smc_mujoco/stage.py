@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import arrows, camera, style
-from smc_mujoco.envelope import samples
 from smc_mujoco.plant import Plant, model_path
+from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
 SHOWN = 6  # channels of a network that a film shows: more would hide behind the next machine
@@ -39,8 +39,11 @@ class Stage:
             [self.model.actuator(f"m{k}/{u.name}").trnid[0] for u in plant.spec().actuators]
             for k, plant in enumerate(plants)
         ]
-        for k, (trace, colour) in enumerate(zip(traces, colours, strict=True)):
-            self.dress(k, plants[k].load(trace.scenario.factors(0)))
+        self.units = [self.rail if np.isfinite(self.rail) else arrows.CHAIN if plant.n > 1 else 1.0 for plant in plants]
+        self.shapes = [shapes(plant, trace.scenario) for plant, trace in zip(plants, traces, strict=True)]
+        self.dressed = [-1] * len(plants)
+        for k, colour in enumerate(colours):
+            self.dress(k, 0.0)
             self.paint(k, colour)
         corners = self.corners(traces)
         turn = self.data.cam("m0/look").xmat.reshape(3, 3)
@@ -58,8 +61,12 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         self.renderer.close()
 
-    def dress(self, k: int, single: mujoco.MjModel) -> None:
-        """Give machine k the shape of a compiled plant, whose rod may be longer."""
+    def dress(self, k: int, time: float) -> None:
+        """Give machine k the shape that it has at a time, s: its rod may be longer than the plant's, and may change."""
+        now = sum(time >= start for start, _ in self.shapes[k]) - 1
+        if now == self.dressed[k]:
+            return
+        self.dressed[k], (_, single) = now, self.shapes[k][now]
         for geom in range(single.ngeom):
             name = single.geom(geom).name
             if name and name != "floor":
@@ -80,7 +87,7 @@ class Stage:
         settle(self.model, self.data)
         self.renderer.update_scene(self.data, camera="film")
         for k, i, arrow in drawn:
-            arrows.draw(self.renderer.scene, self.model, self.data, self.joints[k][i], self.rail, arrow)
+            arrows.draw(self.renderer.scene, self.model, self.data, self.joints[k][i], self.units[k], arrow)
         return self.renderer.render()
 
     def corners(self, traces: Sequence[Trace]) -> list[np.ndarray]:
@@ -91,7 +98,9 @@ class Stage:
         found = []
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             for k, trace in enumerate(traces):
-                self.pose(k, trace.x[round(part * (samples(trace) - 1)), : self.shown[k]])
+                sample = round(part * (len(trace.t) - 1))
+                self.dress(k, float(trace.t[sample]))
+                self.pose(k, trace.x[sample, : self.shown[k]])
             settle(model, self.data)
             world = boxes(model, self.data)
             found.append([world[own].reshape(-1, 3) for own in mine])
@@ -109,6 +118,12 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     signs = np.array(list(itertools.product((-1, 1), repeat=3)))
     local = model.geom_aabb[:, None, :3] + signs * model.geom_aabb[:, None, 3:]
     return np.einsum("gij,gcj->gci", data.geom_xmat.reshape(-1, 3, 3), local) + data.geom_xpos[:, None]
+
+
+def shapes(plant: Plant, scenario: Scenario) -> list[tuple[float, mujoco.MjModel]]:
+    """The plant as it is from each time on, s: as the run starts, and after its jump."""
+    steps = [0] if scenario.jump is None else [0, scenario.jump_step]
+    return [(step * scenario.physics_step, plant.load(scenario.factors(step))) for step in steps]
 
 
 def small(plant: Plant) -> Plant:

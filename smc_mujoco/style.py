@@ -97,7 +97,7 @@ def law_name(law: str) -> str:
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     """One label a trace: the given ones, else the laws' names, numbered where a law comes again.
 
-    A given label that is the law's own name is written as people write it; any other is shown as it is, on one line.
+    A given label that is the law's own name is written as people write it; any other is shown as it is.
 
     Raises:
       ScenarioError: not as many labels as traces.
@@ -106,8 +106,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
-        written = [" ".join(str(label).split()) for label in given]
-        return [law_name(law) if label == law else label for label, law in zip(written, own, strict=True)]
+        return [law_name(law) if label == law else str(label) for label, law in zip(given, own, strict=True)]
     names = [law_name(law) for law in own]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
 
@@ -143,10 +142,15 @@ def font(size: float, bold: bool = False):
     return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)
 
 
+def width(text: str, size: float, bold: bool = False) -> float:
+    """How wide a text is, in the unit of the letters' size."""
+    return font(10 * size, bold).getlength(text) / 10  # Pillow rounds small letters to pixels
+
+
 def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
-    """The text, cut with an ellipsis where it is wider than the room; both in the unit of the letters' size."""
-    width, cut = font(size, bold).getlength, text
-    while cut and width(cut if cut == text else f"{cut}…") > room:
+    """The text, on one line, cut with an ellipsis where it is wider than the room."""
+    text = cut = " ".join(text.split())
+    while cut and width(cut if cut == text else f"{cut}…", size, bold) > room:
         cut = cut[:-1]
     return text if cut == text else f"{cut.rstrip()}…"
 

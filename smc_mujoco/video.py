@@ -6,7 +6,8 @@ written one by one: a film's length costs time but no memory.
 
 import contextlib
 import os
-from collections.abc import Callable, Generator, Sequence
+import signal
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from PIL import Image
 from smc_mujoco import arrows, gl, style
 from smc_mujoco.caption import Caption
 from smc_mujoco.charts import Charts
-from smc_mujoco.envelope import samples
+from smc_mujoco.envelope import end, finite
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.stage import Stage
@@ -52,25 +53,59 @@ def film(
     Raises:
       ScenarioError: nothing to show, a size that cannot be, or no OpenGL to render with.
     """
-    import imageio_ffmpeg
-    import mediapy
-
     path = Path(path)
     if path.suffix != ".mp4":
         raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
     times = clock(traces, fps)
     pictures = frames(traces, times, labels, title, size)
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     with replacing(path) as part, contextlib.closing(pictures):
         first = next(pictures)
-        options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
-        with mediapy.VideoWriter(part, first.shape[:2], **options, ffmpeg_args="-movflags +faststart") as writer:
-            writer.add_image(first)
+        with encoder(part, first.shape[:2], fps) as write:
+            write(first)
             report(1)
             for picture in pictures:
-                writer.add_image(picture)
+                write(picture)
                 report(1)
     return path
+
+
+@contextlib.contextmanager
+def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[np.ndarray], None]]:
+    """A function that adds a picture (height, width, 3) to the film at `path`.
+
+    Ctrl-C comes out as KeyboardInterrupt: the terminal sends it to ffmpeg too, which must not end first.
+
+    Raises:
+      ScenarioError: ffmpeg cannot write.
+    """
+    import imageio_ffmpeg
+    import mediapy
+
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
+    writer = mediapy.VideoWriter(path, shape, **options, ffmpeg_args="-movflags +faststart")
+    try:
+        with deaf():
+            writer.__enter__()
+        with contextlib.closing(writer):
+            yield writer.add_image
+    except (OSError, RuntimeError) as error:
+        if isinstance(error.__context__, KeyboardInterrupt):  # what ffmpeg says of half a picture
+            raise KeyboardInterrupt from None
+        raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
+
+
+@contextlib.contextmanager
+def deaf() -> Iterator[None]:
+    """Blocks SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def clip(
@@ -128,7 +163,7 @@ def clock(traces: Sequence[Trace], fps: float) -> np.ndarray:
     style.same_plant(traces)
     if not 1.0 <= fps <= 120.0:
         raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
-    return np.arange(int(max(trace.t[-1] for trace in traces) * fps + 1e-6) + 1) / fps
+    return np.arange(int(end(traces) * fps + 1e-6) + 1) / fps
 
 
 def frames(
@@ -150,10 +185,11 @@ def frames(
     below = 2 * round(CHARTS * size[1] / 2)
     above = size[0], size[1] - below
     gap = times[1] - times[0] if len(times) > 1 else 1 / 30
+    traces = [finite(trace) for trace in traces]
     longest = arrows.longest(traces)
     acts = [arrows.acts(trace, times, gap) for trace in traces]
     caption = Caption(traces, names, colours, title, above, scale, longest)
-    charts = Charts(traces, colours, (size[0], below), scale)
+    charts = Charts(traces, names, colours, (size[0], below), scale)
     with Stage(traces, colours, above, caption.room) as stage:
         caption.put(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
@@ -162,12 +198,13 @@ def frames(
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
             for k, colour in enumerate(colours):
+                stage.dress(k, time)
                 stage.pose(k, places[k][frame])
                 stage.paint(k, style.FAILED if failed[k] else colour)
                 for i in range(0 if failed[k] else stage.shown[k]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
             ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
-            state = np.concatenate([*(place[frame] for place in places), failed, ends])
+            state = np.concatenate([*(place[frame] for place in places), failed, stage.dressed, ends])
             if len(state) != len(shown) or np.abs(state - shown).max() > SEEN:
                 shown, picture = state, stage.render(drawn)
             yield np.concatenate([caption.over(picture, time, failed), charts.at(time)])
@@ -175,5 +212,4 @@ def frames(
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
     """x at the times, (times, n), between samples on a straight line; after a failure the last finite one."""
-    n = samples(trace)
-    return np.stack([np.interp(times, trace.t[:n], x) for x in trace.x[:n].T], axis=1)
+    return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco import envelope, panels, style
+from smc_mujoco import envelope, panels, plain, style
 from smc_mujoco.figure import figure, signals
 
 LAWS = ("observer_free", "classical")
@@ -24,13 +24,14 @@ def pair() -> list[smc.Trace]:
     return runs()
 
 
-def broken(trace: smc.Trace, at: int) -> smc.Trace:
+def broken(trace: smc.Trace, at: int, failure: str = plain.LEFT_THE_WORLD) -> smc.Trace:
     """The trace as if it had diverged at sample `at`, on its way to 1e5."""
-    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d")}
-    arrays["x"][at - 5 : at] = 1e5
+    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d", "r")}
+    arrays["x"][max(at - 5, 0) : at] = 1e5
     for array in arrays.values():
         array[at:] = np.nan
-    return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
+    at_time = float(trace.t[at])
+    return dataclasses.replace(trace, **arrays, diverged_at=at_time, failure=f"{failure}, at t = {at_time:g} s")
 
 
 def words(path) -> str:
@@ -66,7 +67,10 @@ def test_same_traces_give_the_same_files(pair, tmp_path):
 def test_network_shows_mean_and_spread_and_stays_small(tmp_path):
     svg, _ = figure(runs("pendulum_network", "noise", 10.0), tmp_path / "a")
     assert "mean x (rad)" in words(svg)
-    assert "max x − min x (rad)" in words(svg)
+    assert "max − min x (rad)" in words(svg)
+    assert "light: single channels" in words(svg)
+    assert "mean u (N·m)" in words(svg)
+    assert "control u (N·m), channel 1" in words(svg)
     assert svg.stat().st_size < 1_000_000
 
 
@@ -76,6 +80,28 @@ def test_a_diverged_run_is_named_and_does_not_squash_the_others(pair, tmp_path):
     assert "Classical (diverged at 0.4 s)" in words(svg)
     assert panels.limits(traces, "x") == panels.limits(pair[:1], "x")
     figure([broken(pair[1], 1)], tmp_path / "b")  # one finite sample
+
+
+@pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])
+def test_a_run_that_fails_at_once_is_an_x_where_it_started(plant, tmp_path):
+    good, bad = runs(plant, duration=0.5)
+    gone = broken(bad, 0, "law 'classical' raised ValueError (no)")
+    assert "Classical (failed at 0 s)" in words(figure([gone], tmp_path / "a")[0])
+    figure([good, gone], tmp_path / "b")
+    signals([good, gone], tmp_path / "c", ["all", "all"])
+    cut = envelope.finite(gone)
+    assert cut.x.tolist() == [list(gone.scenario.x0)]
+    assert np.isnan(cut.u).all()
+    low, high = panels.limits([cut], "x")
+    assert low < min(gone.scenario.x0) <= max(gone.scenario.x0) < high
+
+
+def test_a_jump_is_marked_with_what_has_changed(tmp_path):
+    factors = {"jump": smc.Jump(0.5, {"mass": 25.9, "delta": 2.0})}
+    jumping = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0, **factors))
+    assert "mass × 25.9, delta × 2" in words(figure([jumping], tmp_path / "a")[0])
+    still = dataclasses.replace(jumping, scenario=dataclasses.replace(jumping.scenario, jump=None))
+    assert style.jumps([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
 
 
 def test_signals_has_a_column_for_each_condition(pair, tmp_path):
@@ -109,6 +135,33 @@ def test_labels_are_the_laws_names_unless_given(pair):
     assert style.labels([*pair, pair[0]], None) == ["Observer-free 1", "Classical", "Observer-free 2"]
     assert style.labels(pair, ["observer_free", "heavy"]) == ["Observer-free", "heavy"]
 
+    @smc.law_function
+    def my_law(y, gains, memory):
+        return 0.0, y.e
+
+    own = smc.run(smc.Scenario(plant="duffing", law=my_law, duration=0.01))
+    assert style.labels([own], None) == style.labels([own], ["my_law"]) == ["my_law"]
+
+
+def test_long_and_odd_labels_stay_inside(pair, tmp_path):
+    labels = ["_lambda $6: " + "the law that the paper proposes, " * 3, "x" * 80]
+    svg, _ = figure(pair, tmp_path / "a", labels=labels, title="A long title " * 20)
+    text = words(svg)
+    assert "_lambda $6" in text
+    assert labels[0] not in text
+    assert text.count("…") == 3
+    assert style.cropped("short", 100.0, 11) == "short"
+    assert style.width(style.cropped("x" * 80, 100.0, 11), 11) <= 100.0
+
+
+def test_another_ending_is_refused(pair, tmp_path):
+    with pytest.raises(smc.ScenarioError, match="end the name in"):
+        figure(pair, tmp_path / "a.pdf")
+    with pytest.raises(smc.ScenarioError, match="end the name in"):
+        signals(pair, tmp_path / "a.pdf", ["all", "all"])
+    assert not list(tmp_path.iterdir())
+    assert figure(pair, tmp_path / "lam_0.5")[0].name == "lam_0.5.svg"
+
 
 def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
     t, y = np.arange(5) * 0.1, np.array([[0.0], [4.0], [2.0], [6.0], [1.0]])
@@ -118,9 +171,36 @@ def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
     assert e.mean.ravel().tolist() == [0.0, 2.0, 2.0, 3.0]
 
 
-def test_switching_at_every_sample_has_mean_zero():
-    t, u = np.arange(10_001) * 1e-3, np.where(np.arange(10_001) % 2, 6.0, -6.0)[:, None]
-    e = envelope.columns(t, u, 360)
-    assert len(e.t) <= 360
-    assert np.abs(e.mean[:-1]).max() < 1e-12
-    assert (e.low.min(), e.high.max()) == (-6.0, 6.0)
+def test_chattering_is_drawn_as_its_mean_without_teeth():
+    t, rng = np.arange(10_001) * 1e-3, np.random.default_rng(0)
+    switching = np.where(np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0)  # each value held 1 sample, or more
+    drift = np.clip(np.cumsum(rng.normal(size=10_001)), -0.1, 0.1)
+    for u in (np.where(np.arange(10_001) % 2, 6.0, -6.0), np.tile([6.0, 6.0, -6.0, -6.0, 6.0, -6.0], 1667)[:10_001]):
+        mean = envelope.smooth(u, 100)
+        assert np.abs(mean).max() < 0.15  # to the ends
+        assert np.abs(mean[50:-50]).max() < 0.02
+        band = envelope.columns(t, u[:, None], 360)
+        assert len(band.t) <= 360
+        assert (band.low.min(), band.high.max()) == (-6.0, 6.0)
+    assert np.abs(envelope.smooth(switching, 100) - envelope.smooth(switching + drift, 100)).max() < 0.2
+
+
+def test_what_does_not_chatter_is_drawn_as_it_is():
+    t = np.arange(10_001) * 1e-3
+    bang = np.where(t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0)))
+    mean = envelope.smooth(bang, 100)
+    assert (mean[:2000] == bang[:2000]).all()
+    assert np.abs(mean[2002:]).max() < 0.15
+    slow = 6 * np.sign(np.sin(2 * np.pi * 10 * t))  # ten times a second
+    assert (envelope.smooth(slow, 100) == slow).all()
+    x, y = envelope.line(t, slow, 100)
+    assert len(x) <= 2 * envelope.POINTS + 2
+    assert (x[0], x[-1]) == (t[0], t[-1])
+    assert np.abs(np.diff(np.sign(y))).sum() == np.abs(np.diff(np.sign(slow))).sum()
+
+
+def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
+    chattering = runs(duration=1.5)
+    assert "band: range of u, s, line: mean over 40 ms" in words(figure(chattering, tmp_path / "a")[0])
+    assert "band: range of u, line: mean over 40 ms" in words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
+    assert "band:" not in words(figure(pair, tmp_path / "c")[0])

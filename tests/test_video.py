@@ -1,6 +1,10 @@
 """Films: the right frames, moving machines in their laws' colours, arrows that push, failures that show."""
 
 import dataclasses
+import os
+import signal
+import subprocess
+import sys
 
 import imageio_ffmpeg
 import mediapy
@@ -11,6 +15,8 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco import camera, gl, style, video
 from smc_mujoco.arrows import Longest, acts, arrows
+from smc_mujoco.caption import Caption
+from smc_mujoco.stage import Stage
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 SIZE = (480, 270)
@@ -23,7 +29,7 @@ def runs(plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration
 
 def broken(trace: smc.Trace, at: int) -> smc.Trace:
     """The trace as if it had diverged at sample `at`."""
-    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d")}
+    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d", "r")}
     for array in arrays.values():
         array[at:] = np.nan
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
@@ -106,6 +112,69 @@ def test_a_failed_machine_turns_grey_and_stays_where_it_was():
     assert share(after, orange) < 0.2 * share(before, orange)  # brass is left
     right = machines(after).shape[1] // 2
     assert np.abs(machines(after)[:, right:].astype(int) - machines(later)[:, right:]).max() < 30
+
+
+@renders
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "pendulum_network"])
+def test_a_machine_that_fails_at_once_is_grey_from_the_start(plant):
+    good, bad = runs(plant, laws=LAWS[::3])
+    first, last = pictures([broken(bad, 0)], [0.0, 0.3])
+    assert share(first, style.law_colour(LAWS[3])) == 0.0
+    assert np.abs(machines(first).astype(int) - machines(last)).max() < 30
+    pictures([good, broken(bad, 0)], [0.0, 0.3])
+
+
+@renders
+def test_a_jump_changes_the_machine_and_is_told():
+    jump = smc.Jump(0.2, {"l": 1.5})
+    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.4, jump=jump))
+    room = camera.Room(10, 10, 470, 160)
+    with Stage([trace], ["#0072B2"], (480, 170), room) as stage:
+        lengths = []
+        for time in (0.1, 0.3, 0.1):
+            stage.dress(0, time)
+            lengths.append(float(stage.model.geom("m0/bob").pos[2]))
+    assert lengths == pytest.approx([0.5, 0.75, 0.5])
+    before, after = pictures([trace], [0.1, 0.3])
+    corner = slice(10, 50), slice(300, None)
+    assert (after[corner].mean(axis=2) < 80).sum() > 2 * (before[corner].mean(axis=2) < 80).sum()
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
+def test_long_words_stay_in_the_picture(plant):
+    bad = [broken(trace, 150) for trace in runs(plant)]
+    names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
+    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, Longest(6.0, 0.2))
+    caption.put(np.array([[300.0 * k, 80.0 * k, 300.0 * k + 290, 80.0 * k + 200] for k in range(4)]))
+    assert (caption.pills[:, :2] >= 0).all()
+    assert (caption.pills[:, 2:] <= size).all()
+    assert (caption.pills[:, 2] - caption.pills[:, 0] >= [caption.width(text) for text in caption.texts()]).all()
+    assert all(text.endswith("…: failed at 0.15 s") for text in caption.texts())
+    assert caption.title.endswith("…")
+    assert 24 + style.width(caption.title, 24, bold=True) < 1280 - 24 - style.width("10.00 s", 24, bold=True)
+
+
+@renders
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to interrupt")
+def test_ctrl_c_ends_a_film_as_itself_and_leaves_nothing(tmp_path):
+    code = """
+import sys
+import smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=100.0))
+smc.film([trace], sys.argv[1], size=(320, 180), report=lambda n: print(n, flush=True))
+"""
+    command = [sys.executable, "-c", code, str(tmp_path / "a.mp4")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, start_new_session=True, env=environment, **pipes) as process:
+        assert process.stdout is not None
+        for _ in range(5):
+            process.stdout.readline()
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        _, error = process.communicate(timeout=60)
+    assert error.strip().endswith("KeyboardInterrupt")
+    assert "RuntimeError" not in error
+    assert not list(tmp_path.iterdir())
 
 
 @renders

@@ -1,0 +1,160 @@
+"""What README and docs show works as it stands: code, commands, links, and the catalogues they name."""
+
+import contextlib
+import io
+import re
+import runpy
+import shlex
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+import typer
+
+import smc_mujoco as smc
+from smc_mujoco import cli, gl, scene, show
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+README = PAGES[0].read_text()
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The fenced blocks of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def commands(text: str) -> list[str]:
+    """Every line of shell, and every command in running text; comments and folders of programs cut off."""
+    lines = [line for block in blocks(text, "sh") for line in block.splitlines()]
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines += re.findall(r"`((?:smc-mujoco|make|python) [^`]+)`", prose)
+    found = [re.split(r"\s+#|\s+or:", line)[0].strip().removeprefix(".venv/bin/") for line in lines]
+    return list(dict.fromkeys(found))
+
+
+CODE = [(page, i, block) for page in PAGES for i, block in enumerate(blocks(page.read_text(), "python"))]
+LINES = [(page, line) for page in PAGES for line in commands(page.read_text())]
+LINKS = [(page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())]
+
+
+def named(value: object) -> str:
+    return value.name if isinstance(value, Path) else str(value)[:40]
+
+
+def rows(heading: str) -> set[str]:
+    """What stands in backquotes in the first column of README's table under a heading."""
+    table = re.search(rf"^\| {heading} \|.*?\n\n", README, re.MULTILINE | re.DOTALL)
+    assert table is not None
+    cells = [line.split("|")[1] for line in table[0].splitlines()[2:] if line]
+    return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
+
+
+def test_there_is_something_to_test():
+    assert len(CODE) >= 3
+    assert sum("smc-mujoco" in line for _, line in LINES) >= 3
+    assert len(LINKS) >= 2
+
+
+@pytest.mark.parametrize(("page", "i", "block"), CODE, ids=named)
+def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, block, tmp_path, monkeypatch):
+    if "smc.still" in block and gl.missing():
+        pytest.skip(gl.missing())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
+    Path("block.py").write_text(block)
+    played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
+    with contextlib.redirect_stdout(io.TextIOWrapper(io.BytesIO(), "utf-8")) as said, played as end:
+        runpy.run_path("block.py", run_name="__main__")
+    said.seek(0)
+    assert end is None or not end.value.code
+    assert ("print(" in block or end is not None) == (said.read().strip() != "")
+    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|svg|png))"', block))
+    written = {path.name for path in tmp_path.iterdir()} - {"block.py"}
+    assert wanted <= written
+    assert bool(written) == bool(wanted or end)
+
+
+@pytest.mark.parametrize(
+    ("page", "line"), [(page, line) for page, line in LINES if line.startswith("smc-mujoco ")], ids=named
+)
+def test_a_command_line_names_commands_options_and_files_that_exist(page, line):
+    word, *rest = shlex.split(line)[1:]
+    program = typer.main.get_command(cli.app)
+    known = program.commands  # pyright: ignore[reportAttributeAccessIssue]
+    assert word in known
+    options = {option for parameter in known[word].params for option in (*parameter.opts, *parameter.secondary_opts)}
+    assert [option for option in rest if option.startswith("-") and option.partition("=")[0] not in options] == []
+    given = [argument for argument in rest if not argument.startswith("-")]
+    if word == "run" and given != ["NAME"]:
+        assert isinstance(scene.read(scene.find(str(ROOT / given[0]) if "/" in given[0] else given[0])), smc.Scene)
+    if word == "show":
+        assert given[0] in results(Path(given[0]).parent)
+
+
+def results(folder: Path) -> set[str]:
+    """The traces that a run of a scene writes to its folder."""
+    runs = scene.read(scene.find(folder.name)).runs()
+    return {(folder / f"{scene.slug(condition)}-{scene.slug(label)}.npz").as_posix() for condition, label, _ in runs}
+
+
+def test_traces_are_named_as_these_tests_say(tmp_path):
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+    assert show.save({"A b": {"c": trace}}, tmp_path) == [tmp_path / f"{scene.slug('A b')}-{scene.slug('c')}.npz"]
+
+
+def test_make_targets_exist():
+    wanted = {re.match(r"make (\w+)", line) for _, line in LINES if line.startswith("make ")}
+    assert {"demo", "test"} <= {found[1] for found in wanted if found} <= TARGETS
+
+
+def test_files_that_command_lines_name_exist():
+    named = {
+        word for _, line in LINES for word in re.findall(r"[\w./-]+\.(?:py|lock|sh)\b", line) if "NAME" not in word
+    }
+    assert named >= {"scenes/inverted_pendulum.py", "requirements.lock"}
+    assert [name for name in named if not (ROOT / name).is_file()] == []
+
+
+@pytest.mark.parametrize(("page", "link"), [pair for pair in LINKS if "://" not in pair[1]], ids=named)
+def test_a_relative_link_or_picture_leads_somewhere(page, link):
+    path = page.parent / link.partition("#")[0]
+    assert path.is_file()
+    assert path.resolve().is_relative_to(ROOT)
+    assert path.stat().st_size > 0
+
+
+def test_readme_s_tables_name_every_plant_law_and_scene():
+    assert rows("plants") == set(smc.plants())
+    assert rows("laws") == set(smc.laws())
+    assert rows("scene") == set(scene.scenes())
+
+
+def test_readme_lists_what_a_law_sees():
+    from smc_mujoco.law import Measurement
+
+    assert f"`y` has `{' '.join(Measurement._fields)}`" in README
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_names_that_a_page_takes_from_the_package_are_there(page):
+    assert [name for name in re.findall(r"\bsmc\.(\w+)", page.read_text()) if not hasattr(smc, name)] == []
+
+
+def test_modules_that_the_design_lists_are_there():
+    text = (ROOT / "docs" / "design.md").read_text()
+    cells = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    names = [name for cell in cells for name in re.findall(r"`([\w/]+)`", cell)]
+    assert len(names) >= 15
+    places = [(ROOT / "smc_mujoco" / f"{name}.py", ROOT / "smc_mujoco" / name, ROOT / name) for name in names]
+    assert [name for name, paths in zip(names, places, strict=True) if not any(path.exists() for path in paths)] == []
+
+
+def test_the_python_that_readme_asks_for_is_the_one_that_the_package_asks_for():
+    (said,) = set(re.findall(r"Python (3\.\d+) or newer", README))
+    assert f'requires-python = ">={said}"' in (ROOT / "pyproject.toml").read_text()
+    assert sys.version_info >= tuple(map(int, said.split(".")))
