@@ -21,11 +21,14 @@ if TYPE_CHECKING:
     from smc_mujoco.cli import play as play
     from smc_mujoco.conditions import Jump as Jump
     from smc_mujoco.conditions import Noise as Noise
+    from smc_mujoco.draw.figure import figure as figure
+    from smc_mujoco.draw.video import clip as clip
+    from smc_mujoco.draw.video import film as film
+    from smc_mujoco.draw.video import still as still
     from smc_mujoco.errors import ScenarioError as ScenarioError
     from smc_mujoco.estimators import estimator as estimator
     from smc_mujoco.estimators import estimator_function as estimator_function
     from smc_mujoco.estimators import estimators as estimators
-    from smc_mujoco.figure import figure as figure
     from smc_mujoco.law import Law as Law
     from smc_mujoco.law import law as law
     from smc_mujoco.law import law_function as law_function
@@ -59,15 +62,12 @@ if TYPE_CHECKING:
     )
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
-    from smc_mujoco.video import clip as clip
-    from smc_mujoco.video import film as film
-    from smc_mujoco.video import still as still
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "figure": ("figure",),
-    "video": ("clip", "film", "still"),
+    "draw.figure": ("figure",),
+    "draw.video": ("clip", "film", "still"),
     "errors": ("ScenarioError",),
     "estimators": ("estimator", "estimator_function", "estimators"),
     "law": ("Law", "law", "law_function", "laws"),

@@ -142,7 +142,7 @@ def show(
         loaded, console = load(trace), Console()
         written = [loaded.export(export)] if export else []
         if figure:
-            from smc_mujoco.figure import figure as draw
+            from smc_mujoco.draw.figure import figure as draw
 
             written += draw([loaded], figure)
         summary(loaded, console)

@@ -88,7 +88,7 @@ def save(traces: Traces, out: Path) -> list[Path]:
 
 def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     """The scene's figures, SVG and PNG."""
-    from smc_mujoco.figure import figure, signals
+    from smc_mujoco.draw.figure import figure, signals
 
     if scene.figure == "signals":
         flat = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
@@ -109,7 +109,7 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
             console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
     if gl.missing():
         return []
-    from smc_mujoco import video
+    from smc_mujoco.draw import video
 
     runs = traces[scene.film]
     shown = list(runs.values())

@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from smc_mujoco import style
+from smc_mujoco.draw import style
 from smc_mujoco.metrics import metrics, score
 from smc_mujoco.trace import Trace
 

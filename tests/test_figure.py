@@ -9,8 +9,9 @@ import pytest
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco import envelope, panels, plain, style
-from smc_mujoco.figure import figure, signals
+from smc_mujoco import plain
+from smc_mujoco.draw import envelope, panels, style
+from smc_mujoco.draw.figure import figure, signals
 
 LAWS = ("observer_free", "classical")
 

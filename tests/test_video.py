@@ -13,10 +13,11 @@ import pytest
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco import camera, gl, style, video
-from smc_mujoco.arrows import Longest, acts, arrows
-from smc_mujoco.caption import Caption
-from smc_mujoco.stage import Stage
+from smc_mujoco import gl
+from smc_mujoco.draw import camera, style, video
+from smc_mujoco.draw.arrows import Longest, acts, arrows
+from smc_mujoco.draw.caption import Caption
+from smc_mujoco.draw.stage import Stage
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 SIZE = (480, 270)

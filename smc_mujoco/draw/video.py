@@ -13,13 +13,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from smc_mujoco import arrows, gl, style
-from smc_mujoco.caption import Caption
-from smc_mujoco.charts import Charts
-from smc_mujoco.envelope import end, finite
+from smc_mujoco import gl
+from smc_mujoco.draw import arrows, style
+from smc_mujoco.draw.caption import Caption
+from smc_mujoco.draw.charts import Charts
+from smc_mujoco.draw.envelope import end, finite
+from smc_mujoco.draw.stage import Stage
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
-from smc_mujoco.stage import Stage
 from smc_mujoco.trace import Trace
 
 FPS = 30.0

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco import panels, style
-from smc_mujoco.envelope import Envelope, windows
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.envelope import Envelope, windows
 from smc_mujoco.trace import Trace
 
 HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the rail's

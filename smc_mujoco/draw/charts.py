@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from smc_mujoco import panels, style
-from smc_mujoco.envelope import end
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.envelope import end
 from smc_mujoco.trace import Trace
 
 DPI = 100

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from smc_mujoco import style
-from smc_mujoco.envelope import columns, end, line, stretches, window
+from smc_mujoco.draw import style
+from smc_mujoco.draw.envelope import columns, end, line, stretches, window
 from smc_mujoco.measure import BAND, scale
 from smc_mujoco.trace import Trace
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco import arrows, camera, style
+from smc_mujoco.draw import arrows, camera, style
 from smc_mujoco.plant import Plant, model_path
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace

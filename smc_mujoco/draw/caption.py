@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
-from smc_mujoco import style
-from smc_mujoco.arrows import Longest
-from smc_mujoco.camera import Room
-from smc_mujoco.stage import SHOWN
+from smc_mujoco.draw import style
+from smc_mujoco.draw.arrows import Longest
+from smc_mujoco.draw.camera import Room
+from smc_mujoco.draw.stage import SHOWN
 from smc_mujoco.trace import Trace
 
 LABEL, TITLE, KEY = 15, 24, 13  # px, height of letters in a film of full size

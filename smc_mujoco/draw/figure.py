@@ -14,8 +14,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from smc_mujoco import metrics, panels, style
-from smc_mujoco.envelope import end, finite
+from smc_mujoco import metrics
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.envelope import end, finite
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.trace import Trace

@@ -1,0 +1,1 @@
+"""Pictures of traces: figures (figure, panels), films (video: stage, camera, arrows, charts, caption), one style."""
