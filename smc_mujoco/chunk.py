@@ -126,23 +126,25 @@ class Chunk:
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
         scenario, failure = self.scenarios[i], int(self.rows[i, row.FAILURE])
+        reason = None
         if failure >= row.NOT_FINITE and not self.retold:
             self.retold = True  # Python knows what was raised, and where; it is slow, so one run a chunk tells for all
-            again = plain.run(scenario)
-            if again.failure:
-                return again
+            reason = (plain.run(scenario).failure or "").rpartition(", at t = ")[0] or None
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
-        reason = {
-            row.FINE: None,
-            row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
-            row.NOT_FINITE: f"{law} returned NaN, inf or a command above {harness.HUGE:g}",
-            row.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
-            row.ESTIMATOR_RAISED: f"{estimator} raised an exception",
-            row.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
-            row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
-            row.LAW_RAISED: f"{law} raised an exception",
-            row.DISTURBANCE_RAISED: "a disturbance raised an exception",
-        }[failure]
+        reason = (
+            reason
+            or {
+                row.FINE: None,
+                row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
+                row.NOT_FINITE: f"{law} returned NaN, inf or a command above {harness.HUGE:g}",
+                row.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
+                row.ESTIMATOR_RAISED: f"{estimator} raised an exception",
+                row.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
+                row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
+                row.LAW_RAISED: f"{law} raised an exception",
+                row.DISTURBANCE_RAISED: "a disturbance raised an exception",
+            }[failure]
+        )
         return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
 
 

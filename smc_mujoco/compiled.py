@@ -5,14 +5,13 @@
 import functools
 from collections import namedtuple
 from collections.abc import Callable
-from types import CellType, FunctionType
-from typing import Any
 
 from llvmlite import ir
 from numba import cfunc, njit, types
-from numba.core.dispatcher import Dispatcher
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
+
+from smc_mujoco.remade import remade
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 
@@ -124,25 +123,7 @@ def reason(error: Exception) -> str:
 @functools.cache
 def jit(function: Callable) -> Callable:
     """`function`, and whatever compiled functions it calls, compiled to raise out of bounds and at division by zero."""
-    plain = getattr(function, "py_func", function)
     try:
-        return njit(error_model="python", boundscheck=True)(_checked(plain))
+        return remade(function, njit(error_model="python", boundscheck=True))
     except Exception as error:
         raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
-
-
-def _checked(function: Any) -> Any:
-    """`function` with the compiled functions among its globals and free variables checked as it is."""
-    if not isinstance(function, FunctionType):
-        return function
-    used = {name: function.__globals__[name] for name in function.__code__.co_names if name in function.__globals__}
-    inner = {name: jit(value) for name, value in used.items() if isinstance(value, Dispatcher)}
-    cells = tuple(
-        CellType(jit(cell.cell_contents)) if isinstance(cell.cell_contents, Dispatcher) else cell
-        for cell in function.__closure__ or ()
-    )
-    if not inner and cells == (function.__closure__ or ()):
-        return function
-    return FunctionType(
-        function.__code__, function.__globals__ | inner, function.__name__, function.__defaults__, cells
-    )

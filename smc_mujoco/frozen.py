@@ -10,7 +10,7 @@ class Frozen(dict[str, V]):
     """A mapping that reads, compares and prints as a dict, hashes, pickles, and refuses to change."""
 
     def __hash__(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return hash(tuple(self.items()))
+        return hash(frozenset(self.items()))
 
     def __reduce__(self):
         return type(self), (dict(self),)

@@ -22,6 +22,7 @@ from smc_mujoco.estimators import Reading
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
 from smc_mujoco.plant import Values, write
+from smc_mujoco.remade import remade
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
@@ -51,6 +52,11 @@ def run(scenario: Scenario) -> Trace:
     return from_log(scenario, loop.log, loop.failed_step, loop.failure)
 
 
+def as_written(function: Any) -> Any:
+    """What `remade` makes of compiled functions here: what they were."""
+    return function
+
+
 class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
@@ -65,6 +71,7 @@ class Loop:
         self.data.qvel[self.table[:, QVEL]] = scenario.v0
         self.stages = 4 if scenario.integrator == "RK4" else 1
         self.calls = 0
+        self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
         self.nominal = Values(**scenario.plant.parameters)
         self.memory = [np.zeros(scenario.law.memory) for _ in range(n)]
         self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
@@ -122,7 +129,7 @@ class Loop:
                 z = normals(self.scenario.seed, i, noise.MEASUREMENT, k)
                 x[i], v[i] = x[i] + sigma.position * z[0], v[i] + sigma.velocity * z[1]
             reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
-            out = guarded(estimator, i, reading, named(estimator), self.estimator_memory[i])
+            out = guarded(estimator, self.estimator, i, reading, named(estimator), self.estimator_memory[i])
             v[i] = numbers(f"estimator {estimator.name!r}", (out,), "a velocity")[0]
         return x, v
 
@@ -135,7 +142,7 @@ class Loop:
         for i in range(len(x)):
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
             y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
-            out = guarded(law, i, y, named(law), self.memory[i])
+            out = guarded(law, self.law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and min(abs(u[i]), scenario.u_max) < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
@@ -186,9 +193,8 @@ def named(component: Component) -> tuple:
     return record_type(tuple(component.gains))(*(component.gains.values() or [0.0]))
 
 
-def guarded(component: Component, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:
+def guarded(component: Component, function: Any, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:
     """What a law or an estimator returns; its exception as a Failure that names it."""
-    function: Any = getattr(component.function, "py_func", component.function)  # as written, if numba compiled it
     try:
         return function(y, gains, memory)
     except Exception as error:

@@ -49,9 +49,11 @@ class Scene:
                     f"condition {condition!r} of scene {self.title!r} has the plants {', '.join(sorted(plants))}, "
                     "which share no axes: give each plant a condition of its own"
                 )
-        for names in (self.conditions, *self.conditions.values()):
-            if len({slug(name) for name in names}) < len(names):
-                raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(names)}")
+        files = [(f"{slug(condition)}-{slug(label)}", label) for condition, label, _ in self.runs()]
+        for named in ([(slug(condition), condition) for condition in self.conditions], files):
+            made = [file for file, _ in named]
+            if same := [name for file, name in named if made.count(file) > 1]:
+                raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(same)}")
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
         if self.film not in self.conditions:
             raise unknown(f"condition to film in scene {self.title!r}", self.film, self.conditions)

@@ -22,7 +22,7 @@ SHOWN = {
     "TV rate": "tv_rate",
     "spread\nsettles": "spread_settling_time",
 }
-LEAN = {"padding": (0, 1, 0, 0), "show_edge": False, "pad_edge": False}
+LEAN = {"padding": 0, "show_edge": False, "pad_edge": False}
 SPARKS = "▁▂▃▄▅▆▇█"
 
 
@@ -39,7 +39,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     for label, trace in traces.items():
         name = Text(label, style=style.law_colour(trace.scenario.law.name))
         if trace.diverged_at is not None:
-            table.add_row(name, Text(f"failed at {number(trace.diverged_at)} s", style="red"))
+            table.add_row(name, Text("failed", style="red"))
             continue
         values = score(trace)
         table.add_row(name, *(number(values[metric]) for metric in shown.values()))

@@ -18,8 +18,8 @@ CATALOGUES = ("laws", "plants", "estimators")
 
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
-    {"errors", "gl", "noise", "row", "coil", "frozen", "compiled"},
-    {"files", "layout", "channels", "component", "conditions"},
+    {"errors", "gl", "noise", "row", "coil", "frozen", "remade"},
+    {"files", "layout", "compiled", "channels", "component", "conditions"},
     {"law", "estimators", "signals", "plant"},
     {"native", "scenario", "pendulum_chain"},
     {"harness", "record", "paper", "scene"},

@@ -1,0 +1,58 @@
+"""Functions remade: copies in which every numba-compiled function that they reach is compiled anew, or not at all.
+
+numba checks array bounds only where it was asked to. A law's own helpers were compiled as their author liked, so a
+law is run with copies of them: compiled with checks, or, in the plain loop, as the Python functions they were written.
+"""
+
+from collections.abc import Callable
+from types import CellType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+from numba.core.dispatcher import Dispatcher
+
+
+def remade(function: Any, finish: Callable[[Any], Any]) -> Any:
+    """`finish` of `function` as it was written, with what it calls finished likewise."""
+    return _remade(getattr(function, "py_func", function), finish, {})
+
+
+def _remade(function: Any, finish: Callable, made: dict) -> Any:
+    if not isinstance(function, FunctionType) or not _reaches(function):
+        return finish(function)
+    if function not in made:
+        space, names = dict(function.__globals__), _names(function.__code__)
+        cells = tuple(CellType() for _ in function.__closure__ or ())
+        made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))
+        # only now what it calls, which may be itself
+        space |= {name: _swapped(space[name], names, finish, made) for name in names & space.keys()}
+        for cell, old in zip(cells, function.__closure__ or (), strict=True):
+            cell.cell_contents = _swapped(old.cell_contents, names, finish, made)
+    return made[function]
+
+
+def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
+    """A compiled function remade; a module with those of its functions remade that a law names."""
+    if isinstance(value, Dispatcher):
+        return _remade(value.py_func, finish, made)
+    if isinstance(value, ModuleType) and _holds(value, names):
+        copy = ModuleType(value.__name__)
+        for name, thing in vars(value).items():
+            vars(copy)[name] = _swapped(thing, set(), finish, made) if name in names else thing
+        return copy
+    return value
+
+
+def _reaches(function: FunctionType) -> bool:
+    names = _names(function.__code__)
+    values = [function.__globals__[name] for name in names if name in function.__globals__]
+    values += [cell.cell_contents for cell in function.__closure__ or ()]
+    return any(isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names)) for v in values)
+
+
+def _holds(module: ModuleType, names: set[str]) -> bool:
+    return any(isinstance(vars(module).get(name), Dispatcher) for name in names)
+
+
+def _names(code: CodeType) -> set[str]:
+    """The names that a function uses, and the functions within it."""
+    return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
