@@ -113,7 +113,9 @@ def peers(table: Table) -> None:
         if importlib.util.find_spec(module) is None:
             console.print(f"{module} is not installed: make bench installs it", style="yellow")
             continue
-        action, steps = make()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # glfw misses a display that nobody asked for
+            action, steps = make()
         ratio_steps = steps / STEPS
         a, b, r = ratio(action, mine)
         row(table, f"{name} / ours, RK4", a * 1e6 / steps, b * 1e6 / STEPS, r / ratio_steps, "> 1")
@@ -138,9 +140,8 @@ def dm_control_steps() -> tuple[Callable[[], object], int]:
 
 def gymnasium_steps() -> tuple[Callable[[], object], int]:
     """gymnasium's InvertedPendulum-v5 with a sliding-mode agent."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # glfw misses a display that nobody asked for
-        import gymnasium
+    import gymnasium
+
     environment = gymnasium.make("InvertedPendulum-v5").unwrapped
     count = STEPS // 20
 
