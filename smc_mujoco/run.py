@@ -67,16 +67,7 @@ def stream(
     groups: dict[tuple, list[int]] = {}
     slow: list[int] = []
     for index, scenario in enumerate(scenarios):
-        if not isinstance(scenario, Scenario):
-            raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-        for part in (scenario.law, scenario.velocity):
-            if part.function is None:
-                raise ScenarioError(
-                    f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}"
-                )
-        for signal in (scenario.reference, *scenario.disturbance):
-            if isinstance(signal, Recorded):
-                raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
+        _check(scenario)
         try:
             contents(scenario)  # compiles
             groups.setdefault(_layout(scenario), []).append(index)
@@ -91,6 +82,18 @@ def stream(
     for index in slow:
         yield index, plain.run(scenarios[index])
         report(_steps(scenarios[index]))
+
+
+def _check(scenario: object) -> None:
+    """Raise ScenarioError for what is no scenario, or one whose functions a file could not bring back."""
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
+    for part in (scenario.law, scenario.velocity):
+        if part.function is None:
+            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
+    for signal in (scenario.reference, *scenario.disturbance):
+        if isinstance(signal, Recorded):
+            raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
 
 
 def _layout(s: Scenario) -> tuple:
