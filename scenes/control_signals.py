@@ -3,7 +3,8 @@
 The paper's figures 8 to 10 show u of the observer-free law on the Van der Pol oscillator, and no rival's. It reports u
 continuous within its bound, with small fluctuations under noise and gradual adaptation to 0.2 sin(5t).
 
-Look for: a tanh of a noisy argument is as noisy as its argument times lam; smooth in s is not smooth in time.
+Look for: a tanh of a noisy argument is as noisy as its argument times lam; smooth in s is not smooth in time. Super-
+twisting limit-cycles: its integrator winds up while u is clipped at 6 N, which the plain law does not prevent.
 """
 
 import smc_mujoco as smc

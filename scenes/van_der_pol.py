@@ -5,6 +5,7 @@ undershoot of the observer-free law, the largest oscillation under the higher-or
 adaptive law, and a slow classical law without overshoot.
 
 Look for: inside |x| < 1 (the rail's coloured band) the plant feeds energy in, and a bounded u must overcome that.
+Super-twisting limit-cycles: its integrator winds up while u is clipped at 6 N, which the plain law does not prevent.
 """
 
 import smc_mujoco as smc

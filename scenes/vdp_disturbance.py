@@ -3,7 +3,8 @@
 The paper's figure 7. The paper reports a trajectory nearly identical to the nominal one and strong rejection. The
 rivals run beside it under the same condition.
 
-Look for: the residual oscillation of x beside those of the switching laws, which have the same bound on u.
+Look for: the residual oscillation of x beside those of the switching laws, which have the same bound on u. Super-
+twisting limit-cycles: its integrator winds up while u is clipped at 6 N, which the plain law does not prevent.
 """
 
 import smc_mujoco as smc

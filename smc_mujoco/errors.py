@@ -24,9 +24,17 @@ def shown(value: object) -> str:
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """The error for a name that is not among `known`, with the nearest that is."""
     names = sorted(known)
-    near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
+    near = _nearest(name, names) if isinstance(name, str) else []
     hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
+
+
+def _nearest(name: str, names: list[str]) -> list[str]:
+    """The nearest of names in spelling, whatever the case, or the first that contains the name."""
+    plain = {known.casefold(): known for known in names}
+    wanted = name.casefold()
+    close = difflib.get_close_matches(wanted, list(plain), n=1)
+    return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:

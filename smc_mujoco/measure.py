@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, shown
 
 if TYPE_CHECKING:
     from smc_mujoco.trace import Trace
@@ -94,7 +94,9 @@ def label(trace: Trace) -> str:
 
 
 def refuse(trace: Trace) -> None:
-    """Raise ScenarioError if the run diverged, failed, or holds a NaN or an infinity."""
+    """Raise ScenarioError if it is no trace, or the run diverged, failed, or holds a NaN or an infinity."""
+    if not hasattr(trace, "scenario"):
+        raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
     signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r)
     finite = np.isfinite(trace.t)
     for signal in signals:

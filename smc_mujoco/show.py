@@ -104,9 +104,8 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
     from rich.progress import Progress
 
-    for sentence in (gl.note(), gl.missing()):
-        if sentence:
-            console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
+    if sentence := gl.missing() or gl.note():
+        console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
     if gl.missing():
         return []
     from smc_mujoco.draw import video

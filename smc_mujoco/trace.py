@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco import record
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.files import replacing
 from smc_mujoco.scenario import Scenario
 
@@ -60,7 +60,7 @@ class Trace:
         return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write a .npz file that `smc.load` reads back. An existing file is replaced whole or not at all."""
+        """Write a .npz file that `smc.load` reads back, making folders; an old file is replaced whole or not at all."""
         path = _suffixed(path, ".npz")
         about = json.dumps(record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
         arrays = {name: getattr(self, name) for name in ARRAYS}
@@ -90,7 +90,7 @@ class Trace:
             arrays = {name: getattr(self, name) for name in ARRAYS}
             about = json.dumps(record.describe(self.scenario))
             with replacing(path) as file:
-                savemat(file, arrays | {"scenario": about})
+                savemat(file, arrays | {"scenario": about}, oned_as="column")
         else:
             raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv or .mat")
         return path
@@ -118,6 +118,8 @@ def load(path: str | os.PathLike) -> Trace:
     Raises:
       ScenarioError: no such file, or not a trace.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"cannot load {shown(path)}: give the path of a .npz file that a run wrote")
     path = Path(path)
     if not path.exists() and path.with_name(f"{path.name}.npz").exists():
         path = path.with_name(f"{path.name}.npz")

@@ -218,4 +218,5 @@ def _write(page: Figure, base: Path) -> list[Path]:
         written.append(base.with_name(base.name + suffix))
         with replacing(written[-1]) as part:
             page.savefig(part, dpi=DPI, metadata={"Date": None} if suffix == ".svg" else None)
+        page.set_layout_engine("none")  # laid out once; the second file keeps it
     return written

@@ -1,7 +1,8 @@
 """Super-twisting: u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s), s = de + c e.
 
 Second-order sliding: s = s' = 0 in finite time for s' = u + d with |d'| <= L when k1 = 1.5 sqrt(L), k2 = 1.1 L; sampled
-with the explicit Euler rule the residual of s is O(dt^2). Any k2 > L with k1 > sqrt(k2 + L) suffices.
+with the explicit Euler rule the residual of s is O(dt^2). Any k2 > L with k1 > sqrt(k2 + L) suffices. Where the
+actuator saturates, w goes on integrating: it winds up, and may swing the plant from bound to bound.
 Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993 (law
 and accuracy); A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (these
 gains); R. Seeber & M. Horn, "Stability proof for a well-established super-twisting parameter setting", Automatica
