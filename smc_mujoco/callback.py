@@ -74,7 +74,7 @@ def harness():
 
 @functools.cache
 def silence():
-    """A C function that prints nothing: MuJoCo's warnings name no run, so we count them and report them by run."""
+    """A C function that prints nothing: MuJoCo's warnings name no run, and the harness marks each that diverges."""
 
     def silent(message):
         return

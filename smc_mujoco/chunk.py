@@ -38,10 +38,10 @@ def contents(scenario: Scenario) -> row.Contents:
         disturbances=[_signal(d, scenario.stream(i)) for i, d in enumerate(scenario.disturbance)],
         n=scenario.plant.n,
         steps=scenario.steps,
-        stages=4 if scenario.integrator == "RK4" else 1,
+        stages=scenario.stages,
         step=scenario.physics_step,
         period=scenario.control_period,
-        delay=round(scenario.input_delay / scenario.physics_step),
+        delay=scenario.delay_steps,
         limit=scenario.u_max,
         seed=scenario.seed,
         sigma_x=scenario.noise.position,
@@ -125,27 +125,28 @@ class Chunk:
 
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
-        scenario, failure = self.scenarios[i], int(self.rows[i, row.FAILURE])
-        reason = None
+        failure = int(self.rows[i, row.FAILURE])
+        reason = None if failure == row.FINE else self.reason(i, failure)
+        return from_log(self.scenarios[i], self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
+
+    def reason(self, i: int, failure: int) -> str:
+        """What went wrong in simulation i."""
+        scenario = self.scenarios[i]
         if failure >= row.NOT_FINITE and not self.retold:
             self.retold = True  # Python knows what was raised, and where; it is slow, so one run a chunk tells for all
-            reason = (plain.run(scenario).failure or "").rpartition(", at t = ")[0] or None
+            if told := plain.run(scenario).failure:
+                return told.rpartition(", at t = ")[0]
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
-        reason = (
-            reason
-            or {
-                row.FINE: None,
-                row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
-                row.NOT_FINITE: f"{law} returned NaN, inf or a command above {harness.HUGE:g}",
-                row.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
-                row.ESTIMATOR_RAISED: f"{estimator} raised an exception",
-                row.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
-                row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
-                row.LAW_RAISED: f"{law} raised an exception",
-                row.DISTURBANCE_RAISED: "a disturbance raised an exception",
-            }[failure]
-        )
-        return from_log(scenario, self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
+        return {
+            row.DIVERGED: self.errors.get(i, plain.LEFT_THE_WORLD),
+            row.NOT_FINITE: f"{law} returned NaN, inf or a command above {harness.HUGE:g}",
+            row.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
+            row.ESTIMATOR_RAISED: f"{estimator} raised an exception",
+            row.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
+            row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
+            row.LAW_RAISED: f"{law} raised an exception",
+            row.DISTURBANCE_RAISED: "a disturbance raised an exception",
+        }[failure]
 
 
 def _component(c: Component) -> row.Part:

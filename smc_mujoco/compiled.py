@@ -98,8 +98,8 @@ class Function:
 
 
 # How the lines of numba's errors begin that say where it was, not what it did not like.
-WHEREABOUTS = (
-    *(
+WHEREABOUTS = tuple(
+    [
         "Failed in",
         "No implementation",
         "There are",
@@ -108,8 +108,16 @@ WHEREABOUTS = (
         "Intrinsic",
         "With argument",
         "Rejected",
-    ),
-    *("TypingError: Failed", "raised from", "During", "File ", ">>>", "[1]", "def ", "^", "<source"),
+        "TypingError: Failed",
+        "raised from",
+        "During",
+        "File ",
+        ">>>",
+        "[1]",
+        "def ",
+        "^",
+        "<source",
+    ]
 )
 
 

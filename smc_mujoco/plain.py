@@ -69,7 +69,6 @@ class Loop:
         self.table = channels(self.model)
         self.data.qpos[self.table[:, QPOS]] = scenario.x0
         self.data.qvel[self.table[:, QVEL]] = scenario.v0
-        self.stages = 4 if scenario.integrator == "RK4" else 1
         self.calls = 0
         self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
         self.nominal = Values(**scenario.plant.parameters)
@@ -92,7 +91,7 @@ class Loop:
         """The callback: at the first stage of a sample the law, at every stage the disturbance."""
         if self.failure or data._address != self.data._address:
             return  # a law may step a model of its own, and other threads load theirs
-        step, stage = divmod(self.calls, self.stages)
+        step, stage = divmod(self.calls, self.scenario.stages)
         self.calls += 1
         try:
             if stage == 0:
@@ -116,7 +115,7 @@ class Loop:
         if within == 0:
             u, self.s = self.decide(*self.measure(data, k), k)
             self.commands.append(u)
-        past = step - round(self.scenario.input_delay / self.scenario.physics_step)
+        past = step - self.scenario.delay_steps
         if past >= 0:
             data.ctrl[self.table[:, CTRL]] = self.commands[past // self.scenario.steps]
 

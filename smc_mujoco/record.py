@@ -63,13 +63,14 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
 
 
 def _signal(signal: Signal) -> dict:
-    if isinstance(signal, Recorded):
-        return {"kind": signal.kind, "module": signal.module} | signal.parameters()
-    return {"kind": type(signal).__name__, "module": type(signal).__module__} | signal.parameters()
+    home = (signal.kind, signal.module) if isinstance(signal, Recorded) else _home(type(signal))
+    return {"kind": home[0], "module": home[1], "values": signal.parameters()}
 
 
 def _restore_signal(data: dict) -> Signal:
-    values = dict(data)
-    kind, module = values.pop("kind"), values.pop("module")
-    found = {(k.__name__, k.__module__): k for k in kinds()}.get((kind, module))
-    return found(**values) if found else Recorded(kind, module, values)
+    kind = {_home(known): known for known in kinds()}.get((data["kind"], data["module"]))
+    return kind(**data["values"]) if kind else Recorded(**data)
+
+
+def _home(kind: type) -> tuple[str, str]:
+    return kind.__name__, kind.__module__

@@ -1,6 +1,6 @@
 """One simulation's mjData.userdata: everything the callback needs besides the MuJoCo state, slices by name.
 
-    header | gains | nominal | estimator | reference | signals | reading | output | state | measured | memory ... | ring
+    header | gains: law, estimator, nominal, reference | disturbances | inputs | outputs | state | memories | ring
 
 The header holds scalars: counts, addresses (exact in a float64, they are below 2^53) and offsets of the other slices.
 What is the same for every simulation of a layout - the channel table - and what is only written - the log - lie outside

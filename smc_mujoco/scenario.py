@@ -172,6 +172,16 @@ class Scenario:
         return math.floor(self.duration / self.control_period + 1e-6)
 
     @property
+    def stages(self) -> int:
+        """Callbacks per physics step: one a stage of the integrator."""
+        return 4 if self.integrator == "RK4" else 1
+
+    @property
+    def delay_steps(self) -> int:
+        """The input delay in physics steps."""
+        return round(self.input_delay / self.physics_step)
+
+    @property
     def jump_step(self) -> int:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)

@@ -12,11 +12,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
-import numpy as np
 from numba import njit
 
 from smc_mujoco import noise
-from smc_mujoco.errors import ScenarioError, number
+from smc_mujoco.errors import number
 from smc_mujoco.frozen import frozen
 
 EARLY = 1.0 - 1e-15  # sums and products of decimal times miss a sample's time by an ulp or two, to either side
@@ -38,12 +37,6 @@ class Signal:
     def parameters(self) -> dict[str, float]:
         """Parameter name -> value."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-
-    def __call__(self, t) -> np.ndarray:
-        """The signal at times t, (...), s; deterministic signals only."""
-        if self.random:
-            raise ScenarioError(f"{type(self).__name__} has no value without a run: read Trace.d")
-        return np.vectorize(lambda time: type(self).value(float(time), self)[0], otypes=[float])(t)
 
     value: ClassVar[Callable[..., tuple[float, float, float]]]  # a static method: value, first and second derivative
 
