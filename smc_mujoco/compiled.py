@@ -3,6 +3,7 @@
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import functools
+import re
 from collections import namedtuple
 from collections.abc import Callable
 
@@ -98,33 +99,16 @@ class Function:
 
 
 # How the lines of numba's errors begin that say where it was, not what it did not like.
-WHEREABOUTS = tuple(
-    [
-        "Failed in",
-        "No implementation",
-        "There are",
-        "- Of which",
-        "Overload",
-        "Intrinsic",
-        "With argument",
-        "Rejected",
-        "TypingError: Failed",
-        "raised from",
-        "During",
-        "File ",
-        ">>>",
-        "[1]",
-        "def ",
-        "^",
-        "<source",
-    ]
+WHEREABOUTS = re.compile(
+    r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
+    r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
 )
 
 
 def reason(error: Exception) -> str:
     """The line of a compiler's error that says what it did not like."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~.")]
-    telling = [line for line in lines if not line.startswith(WHEREABOUTS)]
+    telling = [line for line in lines if not WHEREABOUTS.match(line)]
     return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
 
 
