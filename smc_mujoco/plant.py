@@ -27,11 +27,19 @@ Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 
 
 class Field(NamedTuple):
-    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option)."""
+    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option), or += where it adds."""
 
     name: str
     at: Any
     value: Any
+    adds: bool = False  # to what the fields before it have written
+
+
+class Variant(NamedTuple):
+    """Another build of a plant's mechanism: an edit of its MjSpec, and the fields its parameters then set."""
+
+    edit: Callable[[mujoco.MjSpec], None]
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
 
 
 class Nominal(Protocol):
@@ -56,6 +64,8 @@ class Plant:
       fields: (model, parameters) -> the model fields which the parameters set.
       nominal: the plant's own f and g.
       lane: offset in metres between machines that stand side by side in a film, (3,).
+      contacts: kind of contact -> the edit of the MjSpec that brings its obstacles and contact pairs.
+      mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
     """
 
     name: str
@@ -69,6 +79,12 @@ class Plant:
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
     nominal: Nominal
     lane: tuple[float, float, float]
+    contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
+    mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self):
+        for name in ("parameters", "contacts", "mechanisms"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def __repr__(self) -> str:
         values = [f"{name}={value:g}" for name, value in self.parameters.items()]
@@ -90,11 +106,7 @@ class Plant:
           factors: parameter name -> factor on its value (the true plant's mismatch).
           nuserdata: length of mjData.userdata.
         """
-        spec = self.spec()
-        spec.nuserdata = nuserdata
-        # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
-        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
-        model = spec.compile()
+        model = ready(self.spec(), nuserdata)
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
@@ -115,10 +127,19 @@ class Plant:
         return Values(**values)
 
 
+def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
+    """The compiled model of a spec, for runs with userdata of that length."""
+    spec.nuserdata = nuserdata
+    # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+    return spec.compile()
+
+
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
-    for name, at, value in fields:
-        array(model, name)[at] = value
+    for name, at, value, adds in fields:
+        held = array(model, name)
+        held[at] = held[at] + value if adds else value
 
 
 def array(model: mujoco.MjModel, name: str) -> np.ndarray:
@@ -165,7 +186,7 @@ def plant(name: str, **parameters: float) -> Plant:
         above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -LARGEST)
         values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=LARGEST)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
-    return dataclasses.replace(base, parameters=frozen(values), n=n, x0=x0)
+    return dataclasses.replace(base, parameters=values, n=n, x0=x0)
 
 
 def plants() -> list[str]:

@@ -1,0 +1,80 @@
+"""Parts: what makes a mechanism realistic, as edits of its model and numbers in its fields.
+
+A part is frozen data. `edit` adds to an MjSpec what it is made of - a rotor, a stop, an actuator that is a friction -
+and `fields` says which fields of the compiled model its numbers set, so that simulations with other numbers share one
+model in a Batch. What the parts do in motion, MuJoCo does.
+
+Names that parts go by: an actuator `passive:<joint>` belongs to a part and takes no command; `rotor:<joint>` is the
+joint that a channel's actuator drives where that is not the channel's own.
+"""
+
+import dataclasses
+from collections.abc import Hashable, Iterator
+from typing import ClassVar
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.plant import Field
+
+PASSIVE, ROTOR = "passive:", "rotor:"
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Base of all parts."""
+
+    stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Add to a mechanism, once for every channel, what the part is made of."""
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        """The fields of the edited, compiled model that the part's numbers set."""
+        del model
+        yield from ()
+
+    def structure(self) -> Hashable:
+        """What simulations must have in common to share a model: equal where `edit` does the same."""
+        return type(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Friction(Part):
+    """Base of frictions: what resists a channel's joint, beside the plant's own damping."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Actuator(Part):
+    """Base of actuators: what stands between a command u, the force asked of the joint, and the joint."""
+
+    @property
+    def scale(self) -> float:
+        """What the model's actuator takes per unit of u."""
+        return 1.0
+
+
+def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
+    """The actuators that take commands, one a channel."""
+    return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
+
+
+def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+    """The channels' joints, in the order of `drives`."""
+    return [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
+
+
+def drive_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The actuators that take commands, (n,)."""
+    return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
+
+
+def joint_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The channels' joints, (n,)."""
+    driven = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
+    return np.array([model.joint(name.removeprefix(ROTOR)).id for name in driven], int)
+
+
+def dof_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The channels' degrees of freedom, (n,)."""
+    return model.jnt_dofadr[joint_ids(model)]
