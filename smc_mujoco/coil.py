@@ -1,8 +1,8 @@
-"""A drawn spring: a helix of wire whose ends follow two bodies. Looks only: no mass, no force."""
+"""Drawn springs and dampers: a helix of wire or a tube whose ends follow two bodies. Looks only: no mass, no force."""
 
 import numpy as np
 
-SIDES = 6  # of the wire's cross-section
+SIDES = 6  # of a cross-section
 STEPS = 12  # a turn
 
 
@@ -16,16 +16,38 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
       turns: whole turns of the coil.
       material: its material's name.
     """
-    first, last = np.array(start[2], float), np.array(end[2], float)
-    axis = (last - first) / np.linalg.norm(last - first)
-    up = np.array([0.0, 0.0, 1.0])
+    first, last, axis, up = _line(start, end)
     s = np.linspace(0.0, 1.0, turns * STEPS + 1)
     turn = 2 * np.pi * turns * s[:, None]
     outward = np.cos(turn) * up + np.sin(turn) * np.cross(axis, up)
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
     centre = first + s[:, None] * (last - first) + radius * outward
     vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)
+    _skin(spec, name, start, end, material, vertices, s)
 
+
+def tube(spec, name, start, end, *, span, radius, material):
+    """Add the skin `name` to spec: a round tube over the part `span`, (from, to) in [0, 1], of the way to the end.
+
+    The other arguments as in `draw`. The tube stretches with the way.
+    """
+    first, last, axis, up = _line(start, end)
+    s = np.array([span[0], span[0], span[1], span[1]])
+    around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
+    outward = np.cos(around) * up + np.sin(around) * np.cross(axis, up)
+    size = radius * np.array([1e-3, 1.0, 1.0, 1e-3])  # closed at both ends
+    vertices = (first + s[:, None] * (last - first))[:, None] + size[:, None, None] * outward
+    _skin(spec, name, start, end, material, vertices, s)
+
+
+def _line(start, end):
+    """The way between two places in the world, its direction, and up."""
+    first, last = np.array(start[2], float), np.array(end[2], float)
+    return first, last, (last - first) / np.linalg.norm(last - first), np.array([0.0, 0.0, 1.0])
+
+
+def _skin(spec, name, start, end, material, vertices, s):
+    """The skin of rings of vertices (rings, SIDES, 3) that follow the two bodies by 1 - s and s, (rings,)."""
     ring = np.arange(len(s) - 1)[:, None] * SIDES
     a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)

@@ -108,16 +108,26 @@ def draw_spring(spec, i):
 
 def fields(model, p, side):
     """The fields that p sets; side: +1 where the bobs stand above the shaft, -1 where they hang."""
-    n = model.nv
+    springs = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
+    yield from pendulum_fields(model, p, side)
+    yield Field("tendon_stiffness", springs, p.kc)
+
+
+def pendulum_fields(model, p, side):
+    """The fields of the pendulums alone, without the springs between them."""
+    n = size(model)
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
     rods = [model.geom(f"p{i}/rod").id for i in range(n)]
     bobs = [model.geom(f"p{i}/bob").id for i in range(n)]
-    springs = [model.tendon(f"coupling{i}").id for i in range(n - 1)]
     yield Field("body_mass", bodies, p.m)
     yield Field("body_ipos", bodies, (0.0, 0.0, side * p.l))
-    yield Field("dof_damping", slice(None), p.b)
+    yield Field("dof_damping", model.body_dofadr[bodies], p.b)
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("tendon_stiffness", springs, p.kc)
     yield Field("geom_pos", rods, (0.0, 0.0, side * p.l / 2))
     yield Field("geom_size", (rods, 1), p.l / 2)
     yield Field("geom_pos", bobs, (0.0, 0.0, side * p.l))
+
+
+def size(model):
+    """How many pendulums a chain's model has; what drives them may have joints of its own."""
+    return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))

@@ -109,7 +109,7 @@ def test_every_parameter_is_felt_by_the_model(name, n):
 def test_default_fields_change_nothing_of_the_compiled_file(name, n):
     p = sized(name, n)
     model = p.spec().compile()
-    for field, index, value in p.fields(model, p.values({})):
+    for field, index, value, _ in p.fields(model, p.values({})):
         owner = model.opt if field.startswith("opt.") else model
         compiled = getattr(owner, field.removeprefix("opt."))
         assert np.all(compiled[index] == np.asarray(value)), field

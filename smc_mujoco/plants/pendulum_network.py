@@ -6,8 +6,8 @@ the path graph's Laplacian. Numbers: chosen for the paper study.
 
 from math import sin
 
-from smc_mujoco import pendulum_chain
-from smc_mujoco.plant import Plant
+from smc_mujoco import pendulum_chain, pendulum_row
+from smc_mujoco.plant import Plant, Variant
 
 X0 = (0.8, -0.4, 0.6, -0.2, 0.5)  # rad
 
@@ -18,6 +18,10 @@ def build(n):
 
 def fields(model, p):
     return pendulum_chain.fields(model, p, side=-1.0)
+
+
+def spring_fields(model, p):
+    return pendulum_row.spring_fields(model, p, side=-1.0)
 
 
 def nominal(x, v, i, p):
@@ -42,4 +46,6 @@ PENDULUM_NETWORK = Plant(
     fields=fields,
     nominal=nominal,
     lane=(1.15, 0.96, 0.0),  # across the view of `look`
+    contacts={"bobs": pendulum_row.bobs},
+    mechanisms={"springs": Variant(pendulum_row.springs, spring_fields)},
 )
