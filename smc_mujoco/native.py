@@ -19,6 +19,7 @@ from numba import carray
 
 from smc_mujoco.compiled import Function, NotCompilable, attempt, jit, loader, named, pointer
 from smc_mujoco.component import Component
+from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import Reading
 from smc_mujoco.law import Measurement
 from smc_mujoco.signals import Signal
@@ -56,14 +57,20 @@ def estimator(function: Callable, gains: tuple[str, ...], memory: int) -> Functi
 
 @functools.cache
 def signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
-    """inputs: t, seed, channel, stream -> outputs: value, first and second derivative."""
+    """inputs: t, seed, channel, stream -> outputs: value, first and second derivative.
+
+    After the parameters of a series follow the address of its data and their count.
+    """
     body, values = jit(kind.value), loader(named(names))
-    random, memory = kind.random, max(kind.memory, 1)
+    random, series, memory, behind = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
 
     def native(y, p, m, out):
         i = carray(pointer(y), (4,))
         if random:
             ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2], i[3]))
+        elif series:
+            data = carray(pointer(p + behind), (2,))
+            ok, result = attempt(body, (i[0], values(p), carray(pointer(int(data[0])), (2, int(data[1])))))
         else:
             ok, result = attempt(body, (i[0], values(p)))
         if ok:
@@ -107,6 +114,23 @@ def component(c: Component) -> Function:
 def of_signal(s: Signal) -> Function:
     """A signal, compiled; raises as `component`."""
     return _named(type(s).__name__, signal, type(s), tuple(s.parameters()))
+
+
+def values_of(s: Signal) -> tuple[float, ...]:
+    """What the compiled signal reads at its parameters' address; good for as long as the signal itself lives.
+
+    Raises:
+      ScenarioError: a series whose data are not (2, N) float64, C-contiguous.
+    """
+    values = tuple(s.parameters().values())
+    if not s.series:
+        return values
+    data = s.data
+    if data.shape[:1] != (2,) or data.ndim != 2 or data.dtype != float or not data.flags.c_contiguous:
+        raise ScenarioError(
+            f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, (2, N), C-contiguous"
+        )
+    return (*values, float(data.ctypes.data), float(data.shape[1]))
 
 
 def _named(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:

@@ -1,7 +1,9 @@
 """A scenario as JSON data and back."""
 
 import dataclasses
+from collections.abc import Sequence
 from importlib.metadata import version
+from typing import TypeVar
 
 from smc_mujoco import __version__
 from smc_mujoco.component import Component, Template
@@ -9,27 +11,36 @@ from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
+from smc_mujoco.part import Part
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
-from smc_mujoco.signals import Recorded, Signal, kinds
+from smc_mujoco.series import TimeSeries  # noqa: F401  # so that it is among the signals
+from smc_mujoco.signals import Recorded, Signal
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
+PARTS = ("friction", "contact", "actuator", "sensor")
+T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
     """The scenario as plain data that JSON holds without loss."""
-    return {name: getattr(scenario, name) for name in PLAIN} | {
-        "plant": {"name": scenario.plant.name, "n": scenario.plant.n, "module": scenario.plant.build.__module__}
-        | dict(scenario.plant.parameters),
-        "versions": {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")},
-        "law": _component(scenario.law),
-        "velocity": _component(scenario.velocity),
-        "reference": _signal(scenario.reference),
-        "disturbance": [_signal(d) for d in scenario.disturbance],
-        "noise": dataclasses.asdict(scenario.noise),
-        "mismatch": dict(scenario.mismatch),
-        "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
-    }
+    return (
+        {name: getattr(scenario, name) for name in PLAIN}
+        | {
+            "plant": {"name": scenario.plant.name, "n": scenario.plant.n, "module": scenario.plant.build.__module__}
+            | dict(scenario.plant.parameters),
+            "versions": {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")},
+            "law": _component(scenario.law),
+            "velocity": _component(scenario.velocity),
+            "reference": _signal(scenario.reference),
+            "disturbance": [_signal(d) for d in scenario.disturbance],
+            "noise": dataclasses.asdict(scenario.noise),
+            "mismatch": dict(scenario.mismatch),
+            "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
+            "mechanism": scenario.mechanism,
+        }
+        | {name: _parts(getattr(scenario, name)) for name in PARTS}
+    )
 
 
 def restore(data: dict) -> Scenario:
@@ -38,6 +49,8 @@ def restore(data: dict) -> Scenario:
     if plant.pop("module") != find_plant(plant["name"]).build.__module__:
         raise ScenarioError(f"plant {plant['name']!r} is not the library's: run it where it is defined")
     fields = {name: data[name] for name in PLAIN}
+    fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
+    fields |= {"mechanism": data["mechanism"]} if "mechanism" in data else {}
     return Scenario(
         **fields,
         plant=find_plant(plant.pop("name"), **plant),
@@ -63,13 +76,52 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
 
 
 def _signal(signal: Signal) -> dict:
-    home = (signal.kind, signal.module) if isinstance(signal, Recorded) else _home(type(signal))
-    return {"kind": home[0], "module": home[1], "values": signal.parameters()}
+    if isinstance(signal, Recorded):
+        return {"kind": signal.kind, "module": signal.module, "values": signal.parameters()}
+    return _thing(signal)
 
 
 def _restore_signal(data: dict) -> Signal:
-    kind = {_home(known): known for known in kinds()}.get((data["kind"], data["module"]))
-    return kind(**data["values"]) if kind else Recorded(**data)
+    kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
+    return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
+
+
+def _parts(value: Part | Sequence[Part] | None) -> dict | list[dict] | None:
+    if value is None or isinstance(value, Part):
+        return value and _thing(value)
+    return [_thing(part) for part in value]
+
+
+def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...] | None:
+    if data is None or isinstance(data, dict):
+        return None if data is None else _restore_part(data)
+    return tuple(_restore_part(part) for part in data)
+
+
+def _restore_part(data: dict) -> Part:
+    kind = _kinds(Part).get((data["kind"], data["module"]))
+    if kind is None:
+        raise ScenarioError(f"part {data['kind']!r} of {data['module']} is not at hand: import what defines it first")
+    return kind(**_values(data))
+
+
+def _thing(thing: Signal | Part) -> dict:
+    """What made it: its class by name, and the values of its fields."""
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
+    return dict(zip(("kind", "module"), _home(type(thing)), strict=True)) | {"values": values}
+
+
+def _values(data: dict) -> dict:
+    """The values of a thing's fields; JSON made lists of the tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
+
+
+def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
+    """Every class of the base's, users' own included, by its home."""
+    found = base.__subclasses__()
+    for kind in found:
+        found.extend(kind.__subclasses__())
+    return {_home(kind): kind for kind in found}
 
 
 def _home(kind: type) -> tuple[str, str]:

@@ -73,9 +73,17 @@ SMOOTH = st.one_of(
     st.builds(smc.Sine, WIDE, WIDE, WIDE),
     st.builds(smc.Step, WIDE, TIMES),
     st.builds(smc.Pulse, WIDE, TIMES, POSITIVE),
+    st.builds(smc.Impulse, WIDE, TIMES, st.one_of(st.floats(1e-3, 0.01), POSITIVE)),
+    st.lists(st.tuples(st.one_of(TIMES, WIDE), WIDE), min_size=2, max_size=9, unique_by=lambda point: point[0]).map(
+        lambda points: smc.TimeSeries(*zip(*sorted(points), strict=True))
+    ),
 )
 DISTURBANCE = st.one_of(
-    SMOOTH, st.builds(smc.OrnsteinUhlenbeck, POSITIVE, POSITIVE, st.one_of(st.floats(1e-5, 1.0), POSITIVE))
+    SMOOTH,
+    st.builds(smc.Gust, WIDE, TIMES, st.one_of(TIMES, POSITIVE)),
+    st.builds(smc.BandLimited, POSITIVE, st.just(0.0), POSITIVE),
+    st.builds(smc.BandLimited, POSITIVE, SMALL, st.one_of(st.floats(1.0, 100.0), POSITIVE)),
+    st.builds(smc.OrnsteinUhlenbeck, POSITIVE, POSITIVE, st.one_of(st.floats(1e-5, 1.0), POSITIVE)),
 )
 NAMES = ("mass", "M", "m", "l", "b", "k", "mu", "alpha", "kc", "grav", "nonsense")
 
