@@ -18,9 +18,14 @@ from smc_mujoco import gl
 
 if TYPE_CHECKING:
     from smc_mujoco import paper as paper
+    from smc_mujoco.actuators import DCMotor as DCMotor
+    from smc_mujoco.actuators import Lag as Lag
+    from smc_mujoco.actuators import RateLimit as RateLimit
+    from smc_mujoco.backlash import Backlash as Backlash
     from smc_mujoco.cli import play as play
     from smc_mujoco.conditions import Jump as Jump
     from smc_mujoco.conditions import Noise as Noise
+    from smc_mujoco.contact import Contact as Contact
     from smc_mujoco.draw.figure import figure as figure
     from smc_mujoco.draw.video import clip as clip
     from smc_mujoco.draw.video import film as film
@@ -29,10 +34,14 @@ if TYPE_CHECKING:
     from smc_mujoco.estimators import estimator as estimator
     from smc_mujoco.estimators import estimator_function as estimator_function
     from smc_mujoco.estimators import estimators as estimators
+    from smc_mujoco.friction import Coulomb as Coulomb
+    from smc_mujoco.friction import LuGre as LuGre
+    from smc_mujoco.friction import Viscous as Viscous
     from smc_mujoco.law import Law as Law
     from smc_mujoco.law import law as law
     from smc_mujoco.law import law_function as law_function
     from smc_mujoco.law import laws as laws
+    from smc_mujoco.mechanism import deviation as deviation
     from smc_mujoco.metrics import score as score
     from smc_mujoco.plant import Plant as Plant
     from smc_mujoco.plant import plant as plant
@@ -42,44 +51,44 @@ if TYPE_CHECKING:
     from smc_mujoco.run import stream as stream
     from smc_mujoco.scenario import Scenario as Scenario
     from smc_mujoco.scene import Scene as Scene
-    from smc_mujoco.signals import (
-        Constant as Constant,
-    )
-    from smc_mujoco.signals import (
-        OrnsteinUhlenbeck as OrnsteinUhlenbeck,
-    )
-    from smc_mujoco.signals import (
-        Pulse as Pulse,
-    )
-    from smc_mujoco.signals import (
-        Signal as Signal,
-    )
-    from smc_mujoco.signals import (
-        Sine as Sine,
-    )
-    from smc_mujoco.signals import (
-        Step as Step,
-    )
+    from smc_mujoco.sensors import Encoder as Encoder
+    from smc_mujoco.series import TimeSeries as TimeSeries
+    from smc_mujoco.signals import BandLimited as BandLimited
+    from smc_mujoco.signals import Constant as Constant
+    from smc_mujoco.signals import Gust as Gust
+    from smc_mujoco.signals import Impulse as Impulse
+    from smc_mujoco.signals import OrnsteinUhlenbeck as OrnsteinUhlenbeck
+    from smc_mujoco.signals import Pulse as Pulse
+    from smc_mujoco.signals import Signal as Signal
+    from smc_mujoco.signals import Sine as Sine
+    from smc_mujoco.signals import Step as Step
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "actuators": ("DCMotor", "Lag", "RateLimit"),
+    "backlash": ("Backlash",),
+    "cli": ("play",),
+    "conditions": ("Jump", "Noise"),
+    "contact": ("Contact",),
     "draw.figure": ("figure",),
     "draw.video": ("clip", "film", "still"),
     "errors": ("ScenarioError",),
     "estimators": ("estimator", "estimator_function", "estimators"),
+    "friction": ("Coulomb", "LuGre", "Viscous"),
     "law": ("Law", "law", "law_function", "laws"),
+    "mechanism": ("deviation",),
     "metrics": ("score",),
-    "plant": ("Plant", "plant", "plants"),
-    "cli": ("play",),
     "paper": ("paper",),
+    "plant": ("Plant", "plant", "plants"),
     "run": ("PlainLoopWarning", "run", "stream"),
-    "conditions": ("Jump", "Noise"),
     "scenario": ("Scenario",),
     "scene": ("Scene",),
-    "signals": ("Constant", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
+    "sensors": ("Encoder",),
+    "series": ("TimeSeries",),
+    "signals": ("BandLimited", "Constant", "Gust", "Impulse", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
     "trace": ("Trace", "load"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -50,7 +50,7 @@ def mark() -> float:
 def harness():
     """The compiled callback void(const mjModel*, mjData*), from numba's cache on disk where there is one."""
     at, ours = layout.offsets(), mark()
-    nuserdata, qpos, qvel, ctrl, xfrc, userdata, sensors = at
+    nuserdata, qpos, qvel, ctrl, xfrc, userdata, sensors, tips, anchors, actuators, constraints = at
 
     def control(model, data):
         if integers(model + nuserdata)[0] < HEADER:
@@ -67,6 +67,10 @@ def harness():
             carray(pointer(integers(data + ctrl)[0]), (1 << 40,)),
             carray(pointer(integers(data + xfrc)[0]), (1 << 40,)),
             carray(pointer(integers(data + sensors)[0]), (1 << 40,)),
+            carray(pointer(integers(data + tips)[0]), (1 << 40,)),
+            carray(pointer(integers(data + anchors)[0]), (1 << 40,)),
+            carray(pointer(integers(data + actuators)[0]), (1 << 40,)),
+            carray(pointer(integers(data + constraints)[0]), (1 << 40,)),
         )
 
     return _compiled(types.void(types.intp, types.intp), control)

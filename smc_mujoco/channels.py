@@ -4,18 +4,24 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.part import PASSIVE, drive_ids, joint_ids
 
-# Columns of the channel table: addresses into qpos, qvel, sensordata (twice), ctrl and xfrc_applied, and the sign with
-# which a generalised force d enters there.
-QPOS, QVEL, X_SENSOR, V_SENSOR, CTRL, XFRC, SIGN = range(7)
+# Columns of the channel table: addresses into qpos, qvel, sensordata (twice), ctrl and actuator_force; address into
+# xfrc_applied of a generalised force d and the sign with which it enters there; the same of a horizontal force on the
+# body, the components of xipos and xanchor between which its lever arm lies (-1 for a slide), and the address into
+# actuator_force of a friction (-1 without one).
+QPOS, QVEL, X_SENSOR, V_SENSOR, CTRL, FORCE, XFRC, SIGN, PUSH, PUSH_SIGN, TIP, ANCHOR, FRICTION = range(13)
+COLUMNS = 13
 _SENSORS = {X_SENSOR: mujoco.mjtSensor.mjSENS_JOINTPOS, V_SENSOR: mujoco.mjtSensor.mjSENS_JOINTVEL}
+# Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis.
+_LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
-    """The channel table, (nu, 7) int64: one row per actuator, in the model's order.
+    """The channel table, (n, 13) int64: one row per actuator that takes commands, in the model's order.
 
     A disturbance d acts on the body that carries the joint, as a force along a slide's axis or a torque about a
-    hinge's, so that its generalised force is d.
+    hinge's, so that its generalised force is d; a horizontal one acts on its centre of mass.
 
     Raises:
       ScenarioError: an actuator that drives no hinge or slide with gear 1, that lacks a position or velocity sensor, or
@@ -23,24 +29,39 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    table = np.empty((model.nu, 7), np.int64)
-    for i in range(model.nu):
-        name, joint = model.actuator(i).name, int(model.actuator_trnid[i, 0])
+    for i in drive_ids(model):
         if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
-            raise ScenarioError(f"actuator {name!r} does not drive a joint with gear 1: give it one")
-        hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
-        if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
-            raise ScenarioError(f"actuator {name!r} drives no hinge or slide joint: give it one")
-        axis = data.xaxis[joint].round(12)
-        if np.count_nonzero(axis) != 1:
-            raise ScenarioError(f"the joint of actuator {name!r} has axis {axis}: align it with a world axis")
-        component = int(np.argmax(np.abs(axis)))
-        table[i, [QPOS, QVEL, CTRL]] = model.jnt_qposadr[joint], model.jnt_dofadr[joint], i
-        table[i, XFRC] = 6 * model.jnt_bodyid[joint] + component + 3 * hinge
-        table[i, SIGN] = np.sign(axis[component])
-        for column, kind in _SENSORS.items():
-            found = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
-            if not len(found):
-                raise ScenarioError(f"the joint of actuator {name!r} has no {kind.name[7:].lower()} sensor: add one")
-            table[i, column] = model.sensor_adr[found[0]]
-    return table
+            raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
+    rows = [
+        _row(model, data, int(drive), int(joint))
+        for drive, joint in zip(drive_ids(model), joint_ids(model), strict=True)
+    ]
+    return np.array(rows, np.int64)
+
+
+def _row(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> list[int]:
+    name, body = model.actuator(drive).name, int(model.jnt_bodyid[joint])
+    hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+    if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
+        raise ScenarioError(f"actuator {name!r} drives no hinge or slide joint: give it one")
+    axis = data.xaxis[joint].round(12)
+    if np.count_nonzero(axis) != 1:
+        raise ScenarioError(f"the joint of actuator {name!r} has axis {axis}: align it with a world axis")
+    component = int(np.argmax(np.abs(axis)))
+    row = [0] * COLUMNS
+    row[QPOS], row[QVEL] = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+    row[CTRL], row[FORCE] = model.actuator_ctrladr[drive], model.actuator_outadr[drive]
+    row[XFRC], row[SIGN] = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
+    row[PUSH], row[PUSH_SIGN], row[TIP], row[ANCHOR] = row[XFRC], row[SIGN], -1, -1
+    if hinge:
+        direction, arm, sign = _LEVERS[component]
+        row[PUSH], row[PUSH_SIGN] = 6 * body + direction, sign * row[SIGN]
+        row[TIP], row[ANCHOR] = 3 * body + arm, 3 * joint + arm
+    friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
+    row[FRICTION] = -1 if friction < 0 else model.actuator_outadr[friction]
+    for column, kind in _SENSORS.items():
+        found = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
+        if not len(found):
+            raise ScenarioError(f"the joint of actuator {name!r} has no {kind.name[7:].lower()} sensor: add one")
+        row[column] = model.sensor_adr[found[0]]
+    return row

@@ -1,22 +1,27 @@
 """Scenarios of one layout in one Batch: from scenarios to rows, through the simulation, to traces."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 
-from smc_mujoco import callback, harness, native, plain, row
-from smc_mujoco.channels import QPOS, QVEL, channels
+from smc_mujoco import assembly, callback, harness, native, plain, row, sensors
+from smc_mujoco.channels import COLUMNS, channels
 from smc_mujoco.component import Component
 from smc_mujoco.plant import array
 from smc_mujoco.scenario import Scenario
+from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
 
 with callback.uninstalled():  # this import compiles a model
     from mujoco.batch import Batch, SimulationError
 
+PERFECT = Encoder(counts=math.inf)
 SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
+FULL = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
+OVERFLOWED = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 
 Report = Callable[[int], None]  # told the number of simulated steps just done
 
@@ -28,6 +33,7 @@ def contents(scenario: Scenario) -> row.Contents:
       NotCompilable: the law, the estimator, a signal or the plant's nominal model is not for numba.
     """
     nominal = scenario.plant.parameters
+    sensor = scenario.sensor or PERFECT
     return row.Contents(
         law=_component(scenario.law),
         estimator=_component(scenario.velocity),
@@ -46,6 +52,12 @@ def contents(scenario: Scenario) -> row.Contents:
         seed=scenario.seed,
         sigma_x=scenario.noise.position,
         sigma_v=scenario.noise.velocity,
+        scale=math.prod(part.scale for part in scenario.actuator),
+        bias=sensor.bias,
+        quantum=sensor.quantum(scenario.plant.unit),
+        lost=sensor.dropout,
+        read_period=sensor.period or 0.0,
+        read_delay=sensor.delay,
     )
 
 
@@ -55,28 +67,30 @@ class Chunk:
     def __init__(self, scenarios: Sequence[Scenario], threads: int):
         first = self.first = scenarios[0]
         self.scenarios = scenarios
-        self.logs = [np.empty((7, first.samples + 1, first.plant.n)) for _ in scenarios]
-        self.table = np.empty((first.plant.n, 7), np.int64)
+        self.logs = [np.empty((row.LOGS, first.samples + 1, first.plant.n)) for _ in scenarios]
+        self.table = np.empty((first.plant.n, COLUMNS), np.int64)
         rows = [
             row.pack(contents(scenario), callback.mark(), self.table, log)
             for scenario, log in zip(scenarios, self.logs, strict=True)
         ]
-        self.model = first.plant.load(nuserdata=max(map(len, rows)))
-        self.model.opt.timestep = first.physics_step
-        self.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
+        self.compiled = assembly.model(scenarios, nuserdata=max(map(len, rows)))
+        self.model = assembly.numbered(self.compiled, first)
         self.table[:] = channels(self.model)
-        self.batch = Batch(self.model, len(scenarios), min(threads, len(scenarios)))
+        # persistent: at a sample, mjData still holds the forces of this simulation's last step
+        self.batch = Batch(self.model, len(scenarios), min(threads, len(scenarios)), persistent=True)
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self.rows = self.batch.bind("userdata")
         qpos, qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         for i, (scenario, packed) in enumerate(zip(scenarios, rows, strict=True)):
             self.rows[i, : len(packed)] = packed
-            qpos[i, self.table[:, QPOS]] = scenario.x0
-            qvel[i, self.table[:, QVEL]] = scenario.v0
+            qpos[i], qvel[i] = assembly.start(self.model, scenario)
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}
+        self.spare = mujoco.MjData(self.model)
         self.retold = False  # whether a failure was run again for its words
         self.set_parameters(0, range(len(scenarios)))
+        if self.model.nhistory:
+            self.fill_histories()
 
     def run(self, report: Report) -> list[Trace]:
         """Simulate all of them to the end."""
@@ -93,15 +107,23 @@ class Chunk:
         """Give simulations the true parameters that hold from a step on."""
         derived = []
         for i in indices:
-            plant = self.scenarios[i].plant
-            for name, at, value in plant.fields(self.model, plant.values(self.scenarios[i].factors(step))):
+            for name, value in assembly.numbers(self.compiled, self.scenarios[i], step).items():
                 held = self.fields[name][i] if name in self.fields else array(self.model, name)
-                if np.any(held[at] != value):
+                if np.any(held != value):
                     self.fields[name] = self.batch.expand(name)
-                    self.fields[name][i][at] = value
+                    self.fields[name][i] = value
                     derived.append(i)
         if derived:
             self.batch.set_const(np.unique(derived).astype(np.int32))
+
+    def fill_histories(self) -> None:
+        """Let late sensors have read the initial state before the run."""
+        history = self.batch.bind("history")
+        data = mujoco.MjData(self.model)
+        for i, scenario in enumerate(self.scenarios):
+            data.qpos[:], data.qvel[:] = assembly.start(self.model, scenario)
+            sensors.remember(assembly.numbered(self.compiled, scenario), data)
+            history[i] = data.history
 
     def advance(self, steps: int, report: Report) -> None:
         """Step the simulations that still run, in slices, so that progress shows and Ctrl-C is heard."""
@@ -119,15 +141,22 @@ class Chunk:
             action(alive)
         except SimulationError as error:
             for i in error.ids:
-                self.errors[int(i)] = self.batch.error(int(i))
+                self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
                 self.rows[i, row.FAILURE] = row.DIVERGED
                 self.rows[i, row.FAILED_STEP] = self.rows[i, row.CALLS] // self.rows[i, row.STAGES]
 
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
-        failure = int(self.rows[i, row.FAILURE])
+        failure, step = int(self.rows[i, row.FAILURE]), int(self.rows[i, row.FAILED_STEP])
         reason = None if failure == row.FINE else self.reason(i, failure)
-        return from_log(self.scenarios[i], self.logs[i], int(self.rows[i, row.FAILED_STEP]), reason)
+        if reason is None and self.model.npair and self.overflowed(i):
+            reason, step = OVERFLOWED, 0
+        return from_log(self.scenarios[i], self.logs[i], step, reason)
+
+    def overflowed(self, i: int) -> bool:
+        """Whether MuJoCo left out contacts of simulation i because its memory for them was full."""
+        warnings = self.batch.get_data(i, self.spare).warning
+        return any(warnings[kind].number for kind in FULL)
 
     def reason(self, i: int, failure: int) -> str:
         """What went wrong in simulation i."""
@@ -154,5 +183,5 @@ def _component(c: Component) -> row.Part:
 
 
 def _signal(s: Signal, stream: int = 0) -> row.Part:
-    values = tuple(s.parameters().values())
-    return row.Part(address=native.of_signal(s).address, values=values, memory=s.memory, stream=stream)
+    values, function = native.values_of(s), native.of_signal(s)
+    return row.Part(address=function.address, values=values, memory=s.memory, stream=stream, cartesian=s.cartesian)

@@ -2,12 +2,13 @@
 
 At the first stage of a control sample, per channel:
 
-    sensors -> noise -> velocity estimator -> law -> saturation -> ring of commands
+    sensors -> noise, encoder -> velocity estimator -> law -> saturation -> ring of commands
 
-and at every stage: the command whose delay has passed -> ctrl, disturbance(t) -> xfrc_applied. Time counts in calls:
-RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again, so the clock
-alone cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is marked in its
-row and gets no more control; the simulations beside it go on.
+and at every stage: the command whose delay has passed -> ctrl, disturbance(t) -> xfrc_applied. The forces that acted
+since the sample before, on average, are logged with each. Time counts in calls: RK4 calls four times a step, at t,
+t + h/2, t + h/2 and t + h, and the next step begins at t + h again, so the clock alone cannot tell a sample from a last
+stage. A run that leaves the finite world, or whose law raises, is marked in its row and gets no more control; the
+simulations beside it go on.
 """
 
 # pyright: reportCallIssue=false
@@ -16,56 +17,10 @@ import math
 
 from numba import carray, njit
 
+from smc_mujoco import channels as column
 from smc_mujoco import noise
-from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC
+from smc_mujoco import row as slot
 from smc_mujoco.compiled import call, integers, pointer
-from smc_mujoco.row import (
-    CALLS,
-    CHANNELS,
-    DELAY,
-    DISTURBANCE_NOT_FINITE,
-    DISTURBANCE_RAISED,
-    DIVERGED,
-    ESTIMATOR,
-    ESTIMATOR_GAINS,
-    ESTIMATOR_MEMORY,
-    ESTIMATOR_RAISED,
-    ESTIMATOR_STRIDE,
-    FAILED_STEP,
-    FAILURE,
-    FINE,
-    GAINS,
-    INPUT,
-    LAW,
-    LAW_MEMORY,
-    LAW_RAISED,
-    LAW_STRIDE,
-    LIMIT,
-    LOG,
-    NOMINAL,
-    NOMINAL_RAISED,
-    NOMINAL_VALUES,
-    NOT_FINITE,
-    OUTPUT,
-    PERIOD,
-    REFERENCE,
-    REFERENCE_RAISED,
-    REFERENCE_VALUES,
-    RING,
-    RINGS,
-    SAMPLES,
-    SEED,
-    SIGMA_V,
-    SIGMA_X,
-    SIGNAL_COUNT,
-    SIGNAL_FIELDS,
-    SIGNALS,
-    STAGES,
-    STATE,
-    STEP,
-    STEPS,
-    TABLE,
-)  # fmt: skip
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
 LEFT = 1.0 - 1e-8  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
@@ -73,75 +28,97 @@ HUGE = 1e10  # MuJoCo drops every control where one is larger
 
 
 @njit(inline="always")
-def _at(base, row, slot):
+def _at(base, row, name):
     """Address of the slice whose offset stands in a header slot."""
-    return base + 8 * int(row[slot])
+    return base + 8 * int(row[name])
 
 
 @njit(error_model="numpy")
 def _escaped(row, table, qpos, qvel):
-    for i in range(int(row[CHANNELS])):
-        if not (abs(qpos[table[i, QPOS]]) < WORLD and abs(qvel[table[i, QVEL]]) < WORLD):
+    for i in range(int(row[slot.CHANNELS])):
+        if not (abs(qpos[table[i, column.QPOS]]) < WORLD and abs(qvel[table[i, column.QVEL]]) < WORLD):
             return True
     return False
 
 
 @njit(error_model="numpy")
+def _read(row, i, x, v, j):
+    """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
+    if row[slot.SIGMA_X] != 0.0 or row[slot.SIGMA_V] != 0.0:
+        z = noise.normals(row[slot.SEED], i, noise.MEASUREMENT, j)
+        x, v = x + row[slot.SIGMA_X] * z[0], v + row[slot.SIGMA_V] * z[1]
+    if row[slot.BIAS] != 0.0:
+        x += row[slot.BIAS]
+    if row[slot.QUANTUM] != 0.0:
+        x = row[slot.QUANTUM] * math.floor(x / row[slot.QUANTUM] + 0.5)
+    held = int(row[slot.HELD]) + 2 * i
+    if row[slot.LOST] != 0.0:
+        if j > 0 and noise.uniform(row[slot.SEED], i, noise.DROPOUT, j) < row[slot.LOST]:
+            return row[held], row[held + 1]
+        row[held], row[held + 1] = x, v
+    return x, v
+
+
+@njit(error_model="numpy")
 def _measure(base, row, table, sensors, k):
-    """Noisy position and estimated velocity of every channel into the row's state; a failure code."""
-    n, at, given, out = int(row[CHANNELS]), int(row[STATE]) + 2, int(row[INPUT]), int(row[OUTPUT])
-    noisy = row[SIGMA_X] != 0.0 or row[SIGMA_V] != 0.0
+    """Measured position and estimated velocity of every channel into the row's state; a failure code."""
+    n, at, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]) + 2, int(row[slot.INPUT]), int(row[slot.OUTPUT])
+    j = k
+    if row[slot.READ_PERIOD] != 0.0:
+        j = max(0, math.floor((k * row[slot.PERIOD] - row[slot.READ_DELAY]) / row[slot.READ_PERIOD] + 1e-6))
     for i in range(n):
-        x, v = sensors[table[i, X_SENSOR]], sensors[table[i, V_SENSOR]]
-        if noisy:
-            z = noise.normals(row[SEED], i, noise.MEASUREMENT, k)
-            x, v = x + row[SIGMA_X] * z[0], v + row[SIGMA_V] * z[1]
-        row[given], row[given + 1], row[given + 2] = row[PERIOD], x, v
-        memory = _at(base, row, ESTIMATOR_MEMORY) + 8 * i * int(row[ESTIMATOR_STRIDE])
-        if call(int(row[ESTIMATOR]), base + 8 * given, _at(base, row, ESTIMATOR_GAINS), memory, base + 8 * out) != 0:
-            return ESTIMATOR_RAISED
+        x, v = _read(row, i, sensors[table[i, column.X_SENSOR]], sensors[table[i, column.V_SENSOR]], j)
+        row[given], row[given + 1], row[given + 2] = row[slot.PERIOD], x, v
+        memory = _at(base, row, slot.ESTIMATOR_MEMORY) + 8 * i * int(row[slot.ESTIMATOR_STRIDE])
+        if (
+            call(
+                int(row[slot.ESTIMATOR]), base + 8 * given, _at(base, row, slot.ESTIMATOR_GAINS), memory, base + 8 * out
+            )
+            != 0
+        ):
+            return slot.ESTIMATOR_RAISED
         row[at + i], row[at + n + i] = x, row[out]
-    return FINE
+    return slot.FINE
 
 
 @njit(error_model="numpy")
 def _decide(base, row, log, k):
     """The law of every channel: its command into the ring, u and s into the log; a failure code."""
-    n, state, given, out = int(row[CHANNELS]), int(row[STATE]), int(row[INPUT]), int(row[OUTPUT])
-    ring = int(row[RING]) + (k % int(row[RINGS])) * n
+    n, state, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
+    ring = int(row[slot.RING]) + (k % int(row[slot.RINGS])) * n
     y = row[given : given + 11]
-    t = k * row[PERIOD]
+    t = k * row[slot.PERIOD]
     y[0], y[1], y[2] = t, 0.0, 0.0
-    if call(int(row[REFERENCE]), base + 8 * given, _at(base, row, REFERENCE_VALUES), 0, base + 8 * out) != 0:
-        return REFERENCE_RAISED
-    y[1], y[6], y[7], y[8] = row[PERIOD], row[out], row[out + 1], row[out + 2]
+    if call(int(row[slot.REFERENCE]), base + 8 * given, _at(base, row, slot.REFERENCE_VALUES), 0, base + 8 * out) != 0:
+        return slot.REFERENCE_RAISED
+    y[1], y[6], y[7], y[8] = row[slot.PERIOD], row[out], row[out + 1], row[out + 2]
     row[state + 1] = n
     for i in range(n):
         row[state] = i
-        if call(int(row[NOMINAL]), base + 8 * state, _at(base, row, NOMINAL_VALUES), 0, base + 8 * out) != 0:
-            return NOMINAL_RAISED
+        if call(int(row[slot.NOMINAL]), base + 8 * state, _at(base, row, slot.NOMINAL_VALUES), 0, base + 8 * out) != 0:
+            return slot.NOMINAL_RAISED
         y[9], y[10] = row[out], row[out + 1]
         y[2], y[3] = row[state + 2 + i], row[state + 2 + n + i]
         y[4], y[5] = y[2] - y[6], y[3] - y[7]
-        memory = _at(base, row, LAW_MEMORY) + 8 * i * int(row[LAW_STRIDE])
-        if call(int(row[LAW]), base + 8 * given, _at(base, row, GAINS), memory, base + 8 * out) != 0:
-            return LAW_RAISED
-        u = min(max(row[out], -row[LIMIT]), row[LIMIT])
+        memory = _at(base, row, slot.LAW_MEMORY) + 8 * i * int(row[slot.LAW_STRIDE])
+        if call(int(row[slot.LAW]), base + 8 * given, _at(base, row, slot.GAINS), memory, base + 8 * out) != 0:
+            return slot.LAW_RAISED
+        u = min(max(row[out], -row[slot.LIMIT]), row[slot.LIMIT])
         if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) < HUGE):
-            return NOT_FINITE
+            return slot.NOT_FINITE
         row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
-    return FINE
+    return slot.FINE
 
 
 @njit(error_model="numpy")
 def _disturb(base, row, table, xfrc, t):
     """The sum of the disturbances of every channel at time t, onto its body."""
-    n, given, out, first = int(row[CHANNELS]), int(row[INPUT]), int(row[OUTPUT]), int(row[SIGNALS])
-    row[given], row[given + 1] = t, row[SEED]
+    n, given, out, first = int(row[slot.CHANNELS]), int(row[slot.INPUT]), int(row[slot.OUTPUT]), int(row[slot.SIGNALS])
+    row[given], row[given + 1] = t, row[slot.SEED]
     for i in range(n):
-        xfrc[table[i, XFRC]] = 0.0
-    for j in range(int(row[SIGNAL_COUNT])):
-        at = first + SIGNAL_FIELDS * j
+        xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0
+    for j in range(int(row[slot.SIGNAL_COUNT])):
+        at = first + slot.SIGNAL_FIELDS * j
         address, values, stream = int(row[at]), base + 8 * int(row[at + 1]), row[at + 2]
         row[given + 3] = stream
         for i in range(n):
@@ -149,46 +126,79 @@ def _disturb(base, row, table, xfrc, t):
                 row[given + 2] = i
                 memory = base + 8 * (int(row[at + 3]) + i * int(row[at + 4]))
                 if call(address, base + 8 * given, values, memory, base + 8 * out) != 0:
-                    return DISTURBANCE_RAISED
-            xfrc[table[i, XFRC]] += table[i, SIGN] * row[out]
+                    return slot.DISTURBANCE_RAISED
+            if row[at + 5] != 0.0:  # a horizontal force
+                xfrc[table[i, column.PUSH]] += row[out]
+            else:
+                xfrc[table[i, column.XFRC]] += table[i, column.SIGN] * row[out]
     for i in range(n):
-        if not math.isfinite(xfrc[table[i, XFRC]]):
-            return DISTURBANCE_NOT_FINITE
-    return FINE
+        if not (math.isfinite(xfrc[table[i, column.XFRC]]) and math.isfinite(xfrc[table[i, column.PUSH]])):
+            return slot.DISTURBANCE_NOT_FINITE
+    return slot.FINE
 
 
 @njit(error_model="numpy")
-def control(base, row, qpos, qvel, ctrl, xfrc, sensors):
+def _disturbance(table, i, xfrc, tips, anchors):
+    """The generalised force that xfrc_applied exerts on channel i."""
+    d = table[i, column.SIGN] * xfrc[table[i, column.XFRC]]
+    if table[i, column.TIP] >= 0:
+        d += (
+            table[i, column.PUSH_SIGN]
+            * (tips[table[i, column.TIP]] - anchors[table[i, column.ANCHOR]])
+            * xfrc[table[i, column.PUSH]]
+        )
+    return d
+
+
+@njit(error_model="numpy")
+def _weigh(row, table, actuators, constraints):
+    """Add up what drives, and what friction and contacts, exerted on each joint in the last physics step."""
+    for i in range(int(row[slot.CHANNELS])):
+        at = int(row[slot.FORCES]) + 2 * i
+        row[at] += actuators[table[i, column.FORCE]]
+        row[at + 1] += constraints[table[i, column.QVEL]]
+        if table[i, column.FRICTION] >= 0:
+            row[at + 1] += actuators[table[i, column.FRICTION]]
+
+
+@njit(error_model="numpy")
+def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators, constraints):
     """One callback of one simulation."""
-    calls, n = int(row[CALLS]), int(row[CHANNELS])
-    row[CALLS] = calls + 1
-    if row[FAILURE] != FINE:
+    calls, n = int(row[slot.CALLS]), int(row[slot.CHANNELS])
+    row[slot.CALLS] = calls + 1
+    if row[slot.FAILURE] != slot.FINE:
         return
-    step, stage = calls // int(row[STAGES]), calls % int(row[STAGES])
-    table = carray(integers(int(row[TABLE])), (n, 7))
-    k, within = step // int(row[STEPS]), step % int(row[STEPS])
-    log = carray(pointer(int(row[LOG])), (7, int(row[SAMPLES]), n))
+    step, stage = calls // int(row[slot.STAGES]), calls % int(row[slot.STAGES])
+    table = carray(integers(int(row[slot.TABLE])), (n, column.COLUMNS))
+    k, within = step // int(row[slot.STEPS]), step % int(row[slot.STEPS])
+    log = carray(pointer(int(row[slot.LOG])), (slot.LOGS, int(row[slot.SAMPLES]), n))
     sampling = stage == 0 and within == 0
-    failure = FINE
+    failure = slot.FINE
+    if stage == 0:
+        _weigh(row, table, actuators, constraints)
     if stage == 0 and _escaped(row, table, qpos, qvel):
-        failure = DIVERGED
+        failure = slot.DIVERGED
     elif sampling:
         failure = _measure(base, row, table, sensors, k)
-        if failure == FINE:
+        if failure == slot.FINE:
             failure = _decide(base, row, log, k)
-    past = step - int(row[DELAY])
-    if stage == 0 and past >= 0 and past % int(row[STEPS]) == 0:
-        ring = int(row[RING]) + (past // int(row[STEPS]) % int(row[RINGS])) * n
+    past = step - int(row[slot.DELAY])
+    if stage == 0 and past >= 0 and past % int(row[slot.STEPS]) == 0:
+        ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
         for i in range(n):
-            ctrl[table[i, CTRL]] = row[ring + i]
-    if row[SIGNAL_COUNT] != 0.0 and failure == FINE:
+            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
+    if row[slot.SIGNAL_COUNT] != 0.0 and failure == slot.FINE:
         fraction = 0.0 if stage == 0 else (LEFT if stage == 3 else 0.5)
-        failure = _disturb(base, row, table, xfrc, k * row[PERIOD] + (within + fraction) * row[STEP])
-    if failure != FINE:
-        row[FAILURE], row[FAILED_STEP] = failure, step
+        failure = _disturb(base, row, table, xfrc, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
+    if failure != slot.FINE:
+        row[slot.FAILURE], row[slot.FAILED_STEP] = failure, step
         for i in range(n):
-            ctrl[table[i, CTRL]], xfrc[table[i, XFRC]] = 0.0, 0.0
+            ctrl[table[i, column.CTRL]], xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0, 0.0
     elif sampling:
         for i in range(n):
-            log[0, k, i], log[1, k, i] = qpos[table[i, QPOS]], qvel[table[i, QVEL]]
-            log[3, k, i], log[5, k, i] = ctrl[table[i, CTRL]], table[i, SIGN] * xfrc[table[i, XFRC]]
+            log[0, k, i], log[1, k, i] = qpos[table[i, column.QPOS]], qvel[table[i, column.QVEL]]
+            log[3, k, i] = ctrl[table[i, column.CTRL]] / row[slot.SCALE]
+            log[5, k, i] = _disturbance(table, i, xfrc, tips, anchors)
+            at = int(row[slot.FORCES]) + 2 * i
+            log[7, k, i], log[8, k, i] = row[at] / row[slot.STEPS], row[at + 1] / row[slot.STEPS]
+            row[at], row[at + 1] = 0.0, 0.0

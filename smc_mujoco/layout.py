@@ -7,6 +7,7 @@ layout differs is refused with a sentence instead of read wrongly.
 
 import ctypes
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import mujoco
@@ -41,6 +42,10 @@ class Offsets(NamedTuple):
     xfrc_applied: int
     userdata: int
     sensordata: int
+    xipos: int
+    xanchor: int
+    actuator_force: int
+    qfrc_constraint: int
 
 
 def _ctype(node: object) -> type:
@@ -62,11 +67,12 @@ def _ctype(node: object) -> type:
     raise LayoutError(f"mujoco {mujoco.__version__} has a field of unknown C type {node}: install mujoco 3.17")
 
 
-def _struct(name: str, last: str | None = None) -> type[ctypes.Structure]:
-    """The ctypes twin of a C struct, up to its field `last`: what comes after does not move what comes before."""
+def _struct(name: str, wanted: Sequence[str] = ()) -> type[ctypes.Structure]:
+    """The ctypes twin of a C struct, up to the last wanted field: what comes after does not move what comes before."""
     fields = [(f.name, f.type) for f in structs.STRUCTS[name].fields]
-    if last is not None:
-        fields = fields[: 1 + [field for field, _ in fields].index(last)]
+    if wanted:
+        names = [field for field, _ in fields]
+        fields = fields[: 1 + max(names.index(field) for field in wanted)]
     return type(name, (ctypes.Structure,), {"_fields_": [(field, _ctype(kind)) for field, kind in fields]})
 
 
@@ -90,8 +96,8 @@ def offsets() -> Offsets:
 def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     """The introspected offsets after comparing each with what the live model and data show."""
     try:
-        struct = _struct("mjData", last=Offsets._fields[-1])
-        nuserdata = _struct("mjModel", last="nuserdata").nuserdata.offset
+        struct = _struct("mjData", Offsets._fields[1:])
+        nuserdata = _struct("mjModel", ["nuserdata"]).nuserdata.offset
         arrays = [getattr(struct, name).offset for name in Offsets._fields[1:]]
     except (AttributeError, ValueError) as error:
         raise LayoutError(

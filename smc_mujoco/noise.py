@@ -14,6 +14,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 MEASUREMENT, PROCESS = 0, 1  # streams: sensor noise; the first process noise, others follow
+DROPOUT = 1 << 32  # the stream that says which readings get lost
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
 _W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
@@ -56,3 +57,9 @@ def normals(seed, channel, stream, k):
     radius = math.sqrt(-2.0 * math.log(((a >> _SHIFT) + _ONE) * 2.0**-53))  # argument in (0, 1]
     angle = 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
     return radius * math.cos(angle), radius * math.sin(angle)
+
+
+@njit(error_model="numpy")
+def uniform(seed, channel, stream, k):
+    """A number uniform in [0, 1) from block k."""
+    return (block(seed, channel, stream, k)[0] >> _SHIFT) * 2.0**-53

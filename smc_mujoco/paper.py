@@ -9,17 +9,22 @@ whatever the results. The plants' parameters stand in their files.
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
 """
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from smc_mujoco.conditions import Jump, Noise
-from smc_mujoco.errors import find
+from smc_mujoco.errors import find, unknown
 from smc_mujoco.estimators import estimator
+from smc_mujoco.frozen import frozen
 from smc_mujoco.law import law
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Pulse, Sine, Step
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
+FIELDS = [field.name for field in dataclasses.fields(Scenario)]
+NOTHING: Mapping[str, Any] = frozen({})
 DURATION, CONTROL_PERIOD, U_MAX = 10.0, 1e-3, 6.0  # s, s, N or N m
 
 # Plant -> law -> gains.
@@ -112,25 +117,38 @@ CONDITIONS: dict[str, dict | Callable[[str], dict]] = {
 
 
 def scenario(
-    plant: str, law_name: str, condition: str = "nominal", seed: int = 0, duration: float = DURATION
+    plant: str,
+    law_name: str,
+    condition: str = "nominal",
+    seed: int = 0,
+    duration: float = DURATION,
+    changes: Mapping[str, Any] = NOTHING,
 ) -> Scenario:
     """The scenario of one plant under one law in one condition.
 
+    Args:
+      changes: Scenario field -> value, over what the study and the condition have, such as {"friction": Coulomb(0.1)}.
+
     Raises:
-      ScenarioError: a name that the study does not have.
+      ScenarioError: a name that the study does not have, or that is no field of a Scenario.
     """
+    for name in changes:
+        if name not in FIELDS:
+            raise unknown("field of a Scenario", name, FIELDS)
     gains = find("law of the paper's study", law_name, find("plant of the paper's study", plant, GAINS) | {"none": {}})
     fields = find("condition of the paper's study", condition, CONDITIONS)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
-    return Scenario(
-        plant=plant,
-        law=law(law_name, **gains),
-        **(common | (fields(plant) if callable(fields) else fields)),
-    )
+    conditioned = fields(plant) if callable(fields) else fields
+    return Scenario(**({"plant": plant, "law": law(law_name, **gains)} | common | conditioned | dict(changes)))
 
 
 def comparison(
-    plant: str, condition: str = "nominal", laws: Sequence[str] = LAWS, seed: int = 0, duration: float = DURATION
+    plant: str,
+    condition: str = "nominal",
+    laws: Sequence[str] = LAWS,
+    seed: int = 0,
+    duration: float = DURATION,
+    changes: Mapping[str, Any] = NOTHING,
 ) -> dict[str, Scenario]:
-    """Law name -> scenario: one plant in one condition under several laws."""
-    return {name: scenario(plant, name, condition, seed, duration) for name in laws}
+    """Law name -> scenario: one plant in one condition under several laws; arguments as of `scenario`."""
+    return {name: scenario(plant, name, condition, seed, duration, changes) for name in laws}

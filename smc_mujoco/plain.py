@@ -6,32 +6,40 @@ microseconds.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from smc_mujoco import noise
+from smc_mujoco import assembly, noise, sensors
 from smc_mujoco.callback import installed
-from smc_mujoco.channels import CTRL, QPOS, QVEL, SIGN, V_SENSOR, X_SENSOR, XFRC, channels
-from smc_mujoco.compiled import named as record_type
-from smc_mujoco.component import Component
-from smc_mujoco.errors import shown
+from smc_mujoco.channels import (
+    ANCHOR,
+    CTRL,
+    FORCE,
+    FRICTION,
+    PUSH,
+    PUSH_SIGN,
+    QPOS,
+    QVEL,
+    SIGN,
+    TIP,
+    V_SENSOR,
+    X_SENSOR,
+    XFRC,
+    channels,
+)  # fmt: skip
 from smc_mujoco.estimators import Reading
+from smc_mujoco.guarded import Failure, guarded, named, numbers, signalled
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
-from smc_mujoco.plant import Values, write
+from smc_mujoco.plant import Values, array
 from smc_mujoco.remade import remade
+from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
-from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
 
 LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {WORLD:g}, or NaN)"
-
-
-class Failure(Exception):
-    """Why a run ended early."""
 
 
 def run(scenario: Scenario) -> Trace:
@@ -42,7 +50,7 @@ def run(scenario: Scenario) -> Trace:
     with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named
         for step in range(total + 1):
             if step == scenario.jump_step:
-                loop.set_parameters(scenario.factors(step))
+                loop.set_parameters(step)
             if step < total:
                 mujoco.mj_step(loop.model, loop.data)
             else:
@@ -62,13 +70,13 @@ class Loop:
 
     def __init__(self, scenario: Scenario):
         self.scenario, n = scenario, scenario.plant.n
-        self.model = scenario.plant.load(scenario.factors(0))
-        self.model.opt.timestep = scenario.physics_step
-        self.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
+        self.compiled = assembly.model([scenario])
+        self.model = assembly.numbered(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
         self.table = channels(self.model)
-        self.data.qpos[self.table[:, QPOS]] = scenario.x0
-        self.data.qvel[self.table[:, QVEL]] = scenario.v0
+        self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
+        if self.model.nhistory:
+            sensors.remember(self.model, self.data)
         self.calls = 0
         self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
         self.nominal = Values(**scenario.plant.parameters)
@@ -77,14 +85,17 @@ class Loop:
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
         self.s, self.r = np.zeros(n), np.zeros(n)
-        self.log = np.full((7, scenario.samples + 1, n), np.nan)
+        self.held = np.zeros((n, 2))  # the last readings that arrived
+        self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
+        self.scale = math.prod(part.scale for part in scenario.actuator)
+        self.log = np.full((LOGS, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
 
-    def set_parameters(self, factors: Mapping[str, float]) -> None:
-        """Give the mechanism other true parameters."""
-        plant = self.scenario.plant
-        write(self.model, plant.fields(self.model, plant.values(factors)))
+    def set_parameters(self, step: int) -> None:
+        """Give the mechanism the true parameters that hold from a step on."""
+        for name, value in assembly.numbers(self.compiled, self.scenario, step).items():
+            array(self.model, name)[:] = value
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -98,17 +109,28 @@ class Loop:
                 self.begin(data, step)
             fraction = (0.0, 0.5, 0.5, LEFT)[stage]
             k, within = divmod(step, self.scenario.steps)
-            d = self.disturbance(k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step)
-            data.xfrc_applied.ravel()[self.table[:, XFRC]] = self.table[:, SIGN] * d
+            t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
+            d = self.disturb(data, t)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
-                applied = data.ctrl[self.table[:, CTRL]]
-                self.log[:, k] = x, v, self.commands[-1], applied, self.s, d, self.r
+                applied = data.ctrl[self.table[:, CTRL]] / self.scale
+                self.log[:, k] = (
+                    x,
+                    v,
+                    self.commands[-1],
+                    applied,
+                    self.s,
+                    d,
+                    self.r,
+                    *(self.acted / self.scenario.steps),
+                )
+                self.acted[:] = 0.0
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
     def begin(self, data: mujoco.MjData, step: int) -> None:
         """The first stage of a physics step: at a sample the law; the command whose delay has passed."""
+        self.weigh(data)
         if not (np.all(np.abs(data.qpos) < WORLD) and np.all(np.abs(data.qvel) < WORLD)):
             raise Failure(LEFT_THE_WORLD)
         k, within = divmod(step, self.scenario.steps)
@@ -117,19 +139,35 @@ class Loop:
             self.commands.append(u)
         past = step - self.scenario.delay_steps
         if past >= 0:
-            data.ctrl[self.table[:, CTRL]] = self.commands[past // self.scenario.steps]
+            data.ctrl[self.table[:, CTRL]] = self.scale * self.commands[past // self.scenario.steps]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""
         x, v = data.sensordata[self.table[:, X_SENSOR]], data.sensordata[self.table[:, V_SENSOR]]
-        sigma, estimator = self.scenario.noise, self.scenario.velocity
+        estimator, j, sensor = self.scenario.velocity, k, self.scenario.sensor
+        if sensor is not None and sensor.period is not None:
+            j = max(0, math.floor((k * self.scenario.control_period - sensor.delay) / sensor.period + 1e-6))
         for i in range(len(x)):
-            if sigma.position or sigma.velocity:
-                z = normals(self.scenario.seed, i, noise.MEASUREMENT, k)
-                x[i], v[i] = x[i] + sigma.position * z[0], v[i] + sigma.velocity * z[1]
+            x[i], v[i] = self.read(i, x[i], v[i], j)
             reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
             out = guarded(estimator, self.estimator, i, reading, named(estimator), self.estimator_memory[i])
             v[i] = numbers(f"estimator {estimator.name!r}", (out,), "a velocity")[0]
+        return x, v
+
+    def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
+        """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
+        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
+        if sigma.position or sigma.velocity:
+            z = normals(seed, i, noise.MEASUREMENT, j)
+            x, v = x + sigma.position * z[0], v + sigma.velocity * z[1]
+        if sensor is None:
+            return x, v
+        x += sensor.bias
+        if q := sensor.quantum(self.scenario.plant.unit):
+            x = q * math.floor(x / q + 0.5)
+        if j > 0 and words(seed, i, noise.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
+            return self.held[i, 0], self.held[i, 1]
+        self.held[i] = x, v
         return x, v
 
     def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -155,56 +193,40 @@ class Loop:
         except Exception as error:
             raise Failure(f"the nominal model of {plant.name} raised {type(error).__name__} ({error})") from error
 
-    def disturbance(self, t: float) -> np.ndarray:
-        """The sum of the disturbances, (n,)."""
-        d = np.zeros(self.scenario.plant.n)
+    def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
+        """Put the disturbances of time t on the bodies; their generalised forces, (n,)."""
+        xfrc, table = data.xfrc_applied.ravel(), self.table
+        xfrc[table[:, XFRC]] = xfrc[table[:, PUSH]] = 0.0
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
             stream = self.scenario.stream(j)
-            d += [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(d))]
+            d = [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
+            xfrc[table[:, PUSH if signal.cartesian else XFRC]] += d if signal.cartesian else table[:, SIGN] * d
+        d = table[:, SIGN] * xfrc[table[:, XFRC]]
+        if np.all(table[:, TIP] >= 0):
+            arm = data.xipos.ravel()[table[:, TIP]] - data.xanchor.ravel()[table[:, ANCHOR]]
+            d += table[:, PUSH_SIGN] * arm * xfrc[table[:, PUSH]]
         if not np.all(np.isfinite(d)):
             raise Failure("the disturbance became NaN or inf")
         return d
 
-
-def signalled(signal: Signal, t: float, *state: Any) -> list[float]:
-    """A signal and its two derivatives at time t; `state` is what random ones also take."""
-    name, function = type(signal).__name__, type(signal).value
-    try:
-        out = function(t, signal, *state) if signal.random else function(t, signal)
-    except Exception as error:
-        raise Failure(f"{name} raised {type(error).__name__} ({error})") from error
-    return numbers(name, out, "a value and two derivatives", 3)
-
-
-def numbers(who: str, out: Any, what: str, count: int = 1) -> list[float]:
-    """What a user's function returned, as floats."""
-    try:
-        values = [float(value) for value in out]
-    except (TypeError, ValueError, OverflowError):
-        values = []
-    if len(values) != count:
-        raise Failure(f"{who} returned {shown(out)} instead of {what}")
-    return values
-
-
-def named(component: Component) -> tuple:
-    """A component's gains as the record its function reads."""
-    return record_type(tuple(component.gains))(*(component.gains.values() or [0.0]))
-
-
-def guarded(component: Component, function: Any, channel: int, y: tuple, gains: tuple, memory: np.ndarray) -> Any:
-    """What a law or an estimator returns; its exception as a Failure that names it."""
-    try:
-        return function(y, gains, memory)
-    except Exception as error:
-        what = f"{component.kind} {component.name!r} raised {type(error).__name__} ({error})"
-        raise Failure(f"{what} in channel {channel}") from error
+    def weigh(self, data: mujoco.MjData) -> None:
+        """Add up what drives, and what friction and contacts, exerted on the joints in the last physics step."""
+        rubs = self.table[:, FRICTION] >= 0
+        self.acted[0] += data.actuator_force[self.table[:, FORCE]]
+        self.acted[1] += data.qfrc_constraint[self.table[:, QVEL]]
+        self.acted[1, rubs] += data.actuator_force[self.table[rubs, FRICTION]]
 
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:
     """What noise.normals gives, from numpy's own generator."""
-    before = (k - 1 + (stream << 64)) % 2**256
-    words = np.random.Philox(key=seed + (channel << 64), counter=before).random_raw(2)
-    radius = math.sqrt(-2.0 * math.log(((int(words[0]) >> 11) + 1) * 2.0**-53))
-    angle = 2.0 * math.pi * (int(words[1]) >> 11) * 2.0**-53
+    first, second = words(seed, channel, stream, k)
+    radius = math.sqrt(-2.0 * math.log((first + 1) * 2.0**-53))
+    angle = 2.0 * math.pi * second * 2.0**-53
     return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
+    """Two whole numbers of 53 random bits, from numpy's own generator."""
+    before = (k - 1 + (stream << 64)) % 2**256
+    first, second = np.random.Philox(key=seed + (channel << 64), counter=before).random_raw(2)
+    return int(first) >> 11, int(second) >> 11

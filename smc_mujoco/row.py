@@ -16,15 +16,22 @@ import numpy as np
 (
     IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
     CHANNELS, TABLE, STEPS, STAGES, STEP, PERIOD,  # clock and channel table
-    DELAY, RING, RINGS, LIMIT, SEED, SIGMA_X, SIGMA_V,  # delay in steps, ring, its samples, u_max, noise
+    DELAY, RING, RINGS, LIMIT, SCALE, FORCES,  # delay in steps, ring, its samples, u_max, drive, sums of forces
+    SEED, SIGMA_X, SIGMA_V, BIAS, QUANTUM, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
     LAW, GAINS, ESTIMATOR, ESTIMATOR_GAINS, NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
     SIGNALS, SIGNAL_COUNT, LOG, SAMPLES,
     INPUT, OUTPUT, STATE, LAW_MEMORY, LAW_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
     HEADER,
-) = range(37)  # fmt: skip
+) = range(45)  # fmt: skip
 
-# Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory.
-SIGNAL_FIELDS = 5
+# Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
+# whether it is a Cartesian force.
+SIGNAL_FIELDS = 6
+
+# What a log holds of every sample: position, velocity, command, command after its delay, sliding variable, disturbance,
+# reference, the drive's force, what friction and contacts exert.
+LOGGED = ("x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
+LOGS = len(LOGGED)
 
 # What FAILURE says.
 FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE = range(4)
@@ -39,6 +46,7 @@ class Part:
     values: Sequence[float]
     memory: int = 0
     stream: int = 0  # of random numbers; 0: it takes none, and is the same in every channel
+    cartesian: bool = False  # a disturbance that is a horizontal force on the body, not a force on the joint
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -60,6 +68,12 @@ class Contents:
     seed: int
     sigma_x: float
     sigma_v: float
+    scale: float = 1.0  # what a drive takes per unit of u: V / (N m) of a motor's amplifier
+    bias: float = 0.0  # of the encoder, in the unit of x
+    quantum: float = 0.0  # of position; 0: none
+    lost: float = 0.0  # probability that a reading gets lost
+    read_period: float = 0.0  # s between readings; 0: every control sample
+    read_delay: float = 0.0  # s until a reading arrives
 
 
 def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.ndarray:
@@ -69,7 +83,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
       c: its contents.
       mark: what tells it from any other userdata, `callback.mark()`.
       table: the channel table, (n, 7) int64, which must outlive the run.
-      log: (7, K + 1, n) float64 for x, v, u, applied, s, d, r, written at samples, which must outlive the run.
+      log: (LOGS, K + 1, n) float64, written at samples, which must outlive the run.
     """
     row = [0.0] * HEADER
     n, rings = c.n, c.delay // c.steps + 1
@@ -84,7 +98,10 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     row[IS_ROW] = mark
     row[CHANNELS], row[TABLE], row[STEPS], row[STAGES] = n, address(table), c.steps, c.stages
     row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.period, c.delay, rings
-    row[LIMIT], row[SEED], row[SIGMA_X], row[SIGMA_V] = c.limit, c.seed, c.sigma_x, c.sigma_v
+    row[LIMIT], row[SCALE] = c.limit, c.scale
+    row[SEED], row[SIGMA_X], row[SIGMA_V] = c.seed, c.sigma_x, c.sigma_v
+    row[BIAS], row[QUANTUM], row[LOST] = c.bias, c.quantum, c.lost
+    row[READ_PERIOD], row[READ_DELAY] = c.read_period, c.read_delay
     row[LAW], row[ESTIMATOR], row[NOMINAL] = c.law.address, c.estimator.address, c.nominal.address
     row[REFERENCE], row[SIGNAL_COUNT] = c.reference.address, len(c.disturbances)
     row[LOG], row[SAMPLES] = address(log), log.shape[1]
@@ -97,9 +114,12 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     reserve(INPUT, 16)
     reserve(OUTPUT, 4)
     reserve(STATE, 2 + 2 * n)  # the nominal model's input: i, n, measured x, estimated v
+    reserve(HELD, 2 * n)
+    reserve(FORCES, 2 * n)
     for i, d in enumerate(c.disturbances):
         at = int(row[SIGNALS]) + SIGNAL_FIELDS * i
-        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.stream, len(row) + len(d.values), d.memory]
+        memory = len(row) + len(d.values)
+        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.stream, memory, d.memory, d.cartesian]
         row.extend([*d.values, *[0.0] * (d.memory * n)])
     reserve(LAW_MEMORY, c.law.memory * n)
     reserve(ESTIMATOR_MEMORY, c.estimator.memory * n)

@@ -1,8 +1,9 @@
 """Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
 
-A group shares the plant (but not its parameters), its size, the integrator, the physics step and the number of
-steps; laws, gains, signals, delays and seeds mix freely within it. What does not compile takes the plain loop. The
-results do not depend on the number of threads, on the grouping, or on what else runs.
+A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
+and the number of steps; parameters, friction levels, laws, gains, signals, delays and seeds mix freely within it. What
+does not compile takes the plain loop. The results do not depend on the number of threads, on the grouping, or on what
+else runs.
 """
 
 import contextlib
@@ -11,15 +12,17 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
 
-from smc_mujoco import callback, plain
+from smc_mujoco import assembly, callback, plain
 from smc_mujoco.chunk import Chunk, Report, contents
 from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError, shown, whole
+from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Recorded
 from smc_mujoco.trace import Trace
 
 CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
+DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
 
 
 class PlainLoopWarning(UserWarning):
@@ -75,6 +78,8 @@ def stream(
             warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
             slow.append(index)
     for indices in groups.values():
+        assembly.check_starts([scenarios[i] for i in indices])
+    for indices in groups.values():
         for chunk in _chunks(scenarios, indices, threads):
             with callback.installed():
                 traces = Chunk([scenarios[i] for i in chunk], threads).run(report)
@@ -98,7 +103,7 @@ def _check(scenario: object) -> None:
 
 def _layout(s: Scenario) -> tuple:
     """What the simulations of a Batch must have in common."""
-    return s.plant.build, s.plant.fields, s.plant.n, s.integrator, s.physics_step, s.control_period, s.samples
+    return assembly.structure(s), s.integrator, s.physics_step, s.control_period, s.samples
 
 
 def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int) -> Iterator[list[int]]:
@@ -117,10 +122,10 @@ def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int)
 
 
 def _bytes(s: Scenario) -> int:
-    """What a simulation takes: its log, and twice its row (packed, and in the Batch) with the state beside it."""
+    """What a simulation takes: its log, its mjData, and twice its row (packed, and in the Batch) with the state."""
     memories = s.law.memory + s.velocity.memory + sum(d.memory for d in s.disturbance)
     row = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 40)
-    return int(8 * (7 * (s.samples + 1) * s.plant.n + 2 * row))
+    return int(8 * (LOGS * (s.samples + 1) * s.plant.n + 2 * row) + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
 
 
 def _steps(scenario: Scenario) -> int:

@@ -1,34 +1,34 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-What the true mechanism is (`plant`, `mismatch`, `jump`) and what the law may believe (the plant's nominal parameters)
-are kept apart. Two scenarios that are equal give the same trace to the last bit.
+What the true mechanism is (`plant`, `mismatch`, `jump`, and friction, contact, actuator and sensor) and what the law
+may believe (the plant's nominal parameters) are kept apart. Two scenarios that are equal give the same trace to the
+last bit.
 """
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from smc_mujoco.component import Component, Template
+from smc_mujoco import given
+from smc_mujoco.component import Template
 from smc_mujoco.conditions import Jump, Noise, parameter_factors
-from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.contact import Contact
+from smc_mujoco.errors import ScenarioError, number, shown, whole
 from smc_mujoco.estimators import Estimator, estimator
-from smc_mujoco.law import Law, law
+from smc_mujoco.law import Law
 from smc_mujoco.noise import PROCESS
+from smc_mujoco.part import Actuator, Friction
 from smc_mujoco.plant import Plant, plant
-from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Signal
+from smc_mujoco.sensors import Encoder
+from smc_mujoco.signals import Constant, Impulse, OrnsteinUhlenbeck, Signal
 
-INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
-LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
 MOST_STEPS = 100_000_000  # per run: minutes of computing
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
-FAR = 1e6  # initial states beyond this have already diverged
 
-
-REST, QUIET = Constant(0.0), Noise()
+REST, QUIET, FREE, SEEN = Constant(0.0), Noise(), Contact("none"), estimator("measured")
+DIFFERENCED = estimator("filtered_difference")
 MISSING: Any = None  # a field left out, filled in when the scenario is made
 
 
@@ -41,18 +41,25 @@ class Scenario:
       law: a Law (`smc.law(name, **gains)` or your own), or the name of one.
       duration: s. The run lasts the whole control periods that fit into it.
       control_period: s; the law runs this often and its command is held in between.
-      physics_step: s; must divide the control period. Default: the largest such step up to 1 ms.
+      physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
+        equation, up to 0.25 ms with friction, contact, a mechanism or an actuator.
       u_max: bound on the command, N or N m; may be infinite.
       x0, v0: initial state, one number or n of them. Default: the plant's x0, and 0.
       reference: r(t), the same for every channel.
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
-      velocity: the velocity the law sees: an Estimator or the name of one.
+      velocity: the velocity the law sees: an Estimator or the name of one. Default: "measured", and with an encoder,
+        which measures none, "filtered_difference".
       mismatch: parameter name -> factor on the true plant's parameter. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
-      integrator: RK4, Euler, implicitfast or implicit.
+      integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, else implicitfast.
+      friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, or several of them.
+      contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
+      mechanism: "equation", or another build of the mechanism that the plant offers.
+      actuator: between command and joint: Lag, RateLimit or DCMotor, and Backlash; None: the command is the force.
+      sensor: an Encoder, or None: position and velocity as they are, with `noise`.
 
     Raises:
       ScenarioError: for anything out of its range, in one sentence.
@@ -74,7 +81,12 @@ class Scenario:
     mismatch: Mapping[str, float] = MISSING
     jump: Jump | None = None
     seed: int = 0
-    integrator: str = "RK4"
+    integrator: str = MISSING
+    friction: tuple[Friction, ...] = ()
+    contact: Contact = FREE
+    mechanism: str = "equation"
+    actuator: tuple[Actuator, ...] = ()
+    sensor: Encoder | None = None
 
     if TYPE_CHECKING:  # what the fields are made from; what they are stands above
 
@@ -93,11 +105,16 @@ class Scenario:
             disturbance: Signal | Sequence[Signal] | None = None,
             noise: Noise | None = None,
             input_delay: float = 0.0,
-            velocity: Estimator | Template | str = "measured",
+            velocity: Estimator | Template | str | None = None,
             mismatch: Mapping[str, float] | None = None,
             jump: Jump | None = None,
             seed: int = 0,
-            integrator: str = "RK4",
+            integrator: str | None = None,
+            friction: Friction | Sequence[Friction] | None = None,
+            contact: Contact | str | None = None,
+            mechanism: str = "equation",
+            actuator: Actuator | Sequence[Actuator] | None = None,
+            sensor: Encoder | None = None,
         ) -> None: ...
 
     def __post_init__(self):
@@ -109,25 +126,33 @@ class Scenario:
             raise ScenarioError(
                 f"plant is {shown(self.plant)}: give smc.plant(...) or one of the names smc.plants() lists"
             )
-        put("law", _component(self.law, "law", law))
-        put("velocity", _component("measured" if self.velocity is None else self.velocity, "estimator", estimator))
+        put("friction", given.parts("friction", self.friction, Friction, "smc.Coulomb(0.05)"))
+        put("contact", given.contact(self.contact, self.plant))
+        put("mechanism", given.mechanism(self.mechanism, self.plant))
+        put("actuator", given.parts("actuator", self.actuator, Actuator, "smc.Lag(0.01)"))
+        if not isinstance(self.sensor, Encoder | None):
+            raise ScenarioError(f"sensor is {shown(self.sensor)}: give smc.Encoder(counts=...) or None")
+        put("law", given.component(self.law, "law"))
+        velocity = self.velocity
+        if velocity is None or velocity is SEEN or velocity is DIFFERENCED:
+            velocity = SEEN if self.sensor is None else DIFFERENCED
+        put("velocity", given.component(velocity, "estimator"))
         put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
         put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
         put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
-        put("physics_step", _physics_step(self.physics_step, self.control_period))
-        put("x0", _state("x0", self.plant.x0 if self.x0 is None else self.x0, self.plant.n))
-        put("v0", _state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
-        put("reference", _signals("reference", self.reference)[0])
-        put("disturbance", _signals("disturbance", self.disturbance))
+        put("physics_step", given.physics_step(self.physics_step, self.control_period, self.realistic, SHORTEST))
+        put("x0", given.state("x0", self.plant.x0 if self.x0 is None else self.x0, self.plant.n))
+        put("v0", given.state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
+        put("reference", given.signals("reference", self.reference)[0])
+        put("disturbance", given.signals("disturbance", self.disturbance))
         put("noise", QUIET if self.noise is None else self.noise)
         if not isinstance(self.noise, Noise):
             raise ScenarioError(f"noise is {shown(self.noise)}: give smc.Noise(position=..., velocity=...) or None")
         put("mismatch", parameter_factors("mismatch", {} if self.mismatch is None else self.mismatch))
         if not isinstance(self.jump, Jump | None):
             raise ScenarioError(f"jump is {shown(self.jump)}: give smc.Jump(time=..., factors=...) or None")
-        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
-            raise unknown("integrator", self.integrator, INTEGRATORS)
+        put("integrator", given.integrator(self.integrator, self.realistic))
         put("seed", whole("seed", self.seed, 0, 2**53 - 1))
         self._check()
 
@@ -154,12 +179,29 @@ class Scenario:
                 raise ScenarioError(
                     f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more"
                 )
+        if self.sensor is not None:
+            self.sensor.check(self.physics_step)
+        if self.integrator == "RK4" and (states := [p for p in (*self.friction, *self.actuator) if p.stateful]):
+            raise ScenarioError(
+                f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
+            )
+        if short := [d for d in self.disturbance if isinstance(d, Impulse) and d.width < self.physics_step]:
+            raise ScenarioError(
+                f"{shown(short[0])} is shorter than a physics step of {self.physics_step:g} s: widen it"
+            )
+        if self.reference.cartesian:
+            raise ScenarioError(f"reference is a {type(self.reference).__name__}, which is a force: give a signal")
         if self.reference.random:
             raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
         if self.jump is not None and self.jump.time >= self.duration:
             raise ScenarioError(f"jump at {self.jump.time:g} s comes after the end of the run at {self.duration:g} s")
         for step in (0, self.samples * self.steps):
             self.plant.values(self.factors(step))
+
+    @property
+    def realistic(self) -> bool:
+        """Whether the mechanism is more than the plant's equation."""
+        return bool(self.friction or self.actuator or self.contact.kind != "none" or self.mechanism != "equation")
 
     @property
     def steps(self) -> int:
@@ -198,45 +240,3 @@ class Scenario:
             for name, factor in self.jump.factors.items():
                 factors[name] = factors.get(name, 1.0) * factor
         return factors
-
-
-def _component(value: object, kind: str, find) -> Component:
-    if isinstance(value, str):
-        return find(value)
-    if isinstance(value, Template):
-        value = value()
-    if isinstance(value, Component) and value.kind == kind:
-        return value
-    field = {"law": "law", "estimator": "velocity"}[kind]
-    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
-
-
-def _physics_step(step: object, period: float) -> float:
-    if step is None:
-        return period / math.ceil(period / LARGEST_STEP - 1e-9)
-    h = number("physics_step", step, above=0.0, least=SHORTEST)
-    count = period / h
-    if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
-        raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
-    return period / round(count)
-
-
-def _state(name: str, value: object, n: int) -> tuple[float, ...]:
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else (value,)
-    if len(items) == 1:
-        items *= n
-    if len(items) != n:
-        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
-    return tuple(number(name, item, least=-FAR, most=FAR) for item in items)
-
-
-def _signals(name: str, value: object) -> tuple[Signal, ...]:
-    items: tuple[Any, ...] = () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
-    for item in items:
-        if not isinstance(item, Signal):
-            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
-    if name == "reference" and len(items) != 1:
-        raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
-    return items

@@ -13,10 +13,10 @@ import numpy as np
 from smc_mujoco import record
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.files import replacing
+from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
 
-LOGGED = ("x", "v", "u", "applied", "s", "d", "r")  # what the callback writes, in its order
-ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+ARRAYS = ("t", *LOGGED)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,8 +29,11 @@ class Trace:
       u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
-      d: disturbance, (K + 1, n), N or N m.
+      d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
       r: reference, (K + 1, n).
+      force: what the actuator delivers at the joint, (K + 1, n), N or N m.
+      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
+        over the control period that ends at t_k, so that no blow is missed; at t = 0 they are 0.
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
@@ -44,6 +47,8 @@ class Trace:
     s: np.ndarray
     d: np.ndarray
     r: np.ndarray
+    force: np.ndarray
+    reaction: np.ndarray
     scenario: Scenario
     diverged_at: float | None = None
     failure: str | None = None
@@ -101,7 +106,7 @@ def _trace(fields: dict) -> Trace:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """The Trace of a log (7, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure."""
+    """The Trace of a log (LOGS, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure."""
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
     if failure is not None:

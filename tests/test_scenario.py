@@ -241,8 +241,8 @@ ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), 
 @pytest.mark.parametrize("field", ["plant", "law", "velocity", "integrator"])
 @pytest.mark.parametrize("value", ODD, ids=lambda v: type(v).__name__)
 def test_what_is_no_name_at_all_is_refused(field, value):
-    if field == "velocity" and value is None:
-        pytest.skip("None means measured")
+    if field in ("velocity", "integrator") and value is None:
+        pytest.skip("None means the default")
     refused(lambda: scenario(**{field: value}), field)
 
 
@@ -290,6 +290,9 @@ SIGNALS = [
     smc.Step(1.0, 2.0),
     smc.Pulse(1.0, 2.0, 3.0),
     smc.OrnsteinUhlenbeck(1.0, 2.0, 3.0),
+    smc.Impulse(1.0, 2.0, 3.0),
+    smc.Gust(1.0, 2.0, 3.0),
+    smc.BandLimited(1.0, 2.0, 3.0),
 ]
 
 
@@ -304,6 +307,8 @@ def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, value):
     ("make", "name"),
     [
         (lambda value: smc.Pulse(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.Impulse(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.Gust(1.0, 0.0, width=value), "width"),
         (lambda value: smc.OrnsteinUhlenbeck(1.0, tau=value), "tau"),
         (lambda value: smc.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
     ],

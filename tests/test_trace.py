@@ -19,7 +19,7 @@ from scipy.io import loadmat
 
 import smc_mujoco as smc
 
-ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
 
 
 @dataclasses.dataclass(frozen=True)

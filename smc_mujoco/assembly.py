@@ -1,0 +1,115 @@
+"""Assembly: a scenario's plant and parts as one compiled model, and the fields that its numbers set in it.
+
+What scenarios must have in common to share a model is its `structure`; everything else about their mechanisms is a
+number in some field of the model, which a Batch holds for every simulation on its own.
+"""
+
+import copy
+from collections.abc import Hashable, Iterator, Sequence
+
+import mujoco
+import numpy as np
+
+from smc_mujoco import sensors
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.part import ROTOR, Part, joint_ids
+from smc_mujoco.plant import Field, array, ready
+from smc_mujoco.scenario import Scenario
+
+INSIDE = 1e-3  # m: chosen, as a run that starts deeper than a contact gives way begins with a blow from nowhere
+
+
+def parts(scenario: Scenario) -> tuple[Part, ...]:
+    """The scenario's parts, in the order in which they are built in and their numbers written."""
+    contact = () if scenario.contact.kind == "none" else (scenario.contact,)
+    sensor = () if scenario.sensor is None else (scenario.sensor,)
+    return (*contact, *scenario.friction, *scenario.actuator, *sensor)
+
+
+def structure(scenario: Scenario) -> Hashable:
+    """Equal for scenarios whose mechanisms differ in numbers only."""
+    plant = scenario.plant
+    built = tuple(part.structure() for part in parts(scenario))
+    return plant.build, plant.fields, plant.n, scenario.mechanism, built
+
+
+def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
+    """The mechanism that scenarios of one structure share, as an editable MjSpec."""
+    first = scenarios[0]
+    made = first.plant.spec()
+    if first.mechanism != "equation":
+        first.plant.mechanisms[first.mechanism].edit(made)
+    first.contact.edit_on(first.plant, made)
+    for part in parts(first):
+        part.edit(made)
+    readings = [s.sensor.readings(s.physics_step) for s in scenarios if s.sensor is not None]
+    sensors.buffer(made, max(readings, default=0))
+    return made
+
+
+def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
+    """The model that scenarios of one structure share, as it was compiled: without their numbers."""
+    made = ready(spec(scenarios), nuserdata)
+    made.opt.timestep = scenarios[0].physics_step
+    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenarios[0].integrator.upper()}")
+    return made
+
+
+def numbered(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
+    """A copy of the compiled model with the scenario's numbers in it."""
+    made = copy.copy(compiled)
+    for name, value in numbers(compiled, scenario, step).items():
+        array(made, name)[:] = value
+    mujoco.mj_setConst(made, mujoco.MjData(made))
+    return made
+
+
+def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
+    """Model field -> its values from a physics step on, of every field that the scenario's numbers set."""
+    found: dict[str, np.ndarray] = {}
+    for name, at, value, adds in fields(compiled, scenario, step):
+        held = found.setdefault(name, array(compiled, name).copy())
+        held[at] = held[at] + value if adds else value
+    return found
+
+
+def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """qpos and qvel at t = 0: every channel at x0 and v0, its rotor with it, the rest where the model has it."""
+    qpos, qvel = compiled.qpos0.copy(), np.zeros(compiled.nv)
+    for joint, x, v in zip(joint_ids(compiled), scenario.x0, scenario.v0, strict=True):
+        rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
+        for moved in (joint, rotor) if rotor >= 0 else (joint,):
+            qpos[compiled.jnt_qposadr[moved]], qvel[compiled.jnt_dofadr[moved]] = x, v
+    return qpos, qvel
+
+
+def check_starts(scenarios: Sequence[Scenario]) -> None:
+    """Whether scenarios of one structure start free of their obstacles.
+
+    Raises:
+      ScenarioError: one starts inside.
+    """
+    if scenarios[0].contact.kind == "none":
+        return
+    compiled = model(scenarios)
+    data = mujoco.MjData(compiled)
+    for scenario in scenarios:
+        made = numbered(compiled, scenario)
+        data.qpos[:], _ = start(made, scenario)
+        mujoco.mj_fwdPosition(made, data)
+        for touching in data.contact:
+            if touching.dist < -INSIDE:
+                first, second = (made.geom(int(geom)).name for geom in touching.geom)
+                raise ScenarioError(
+                    f"x0 {', '.join(f'{x:g}' for x in scenario.x0)} puts {scenario.plant.name}'s {first} "
+                    f"{-touching.dist:.2g} m inside {second} of contact {scenario.contact.kind!r}: give another x0"
+                )
+
+
+def fields(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> Iterator[Field]:
+    """What the plant's parameters and the parts' numbers write into the compiled model, in this order."""
+    plant = scenario.plant
+    by = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
+    yield from by(compiled, plant.values(scenario.factors(step)))
+    for part in parts(scenario):
+        yield from part.fields(compiled)

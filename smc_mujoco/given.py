@@ -1,0 +1,125 @@
+"""What users give for a scenario's fields, made into what the fields hold, or refused in one sentence."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from smc_mujoco.backlash import Backlash
+from smc_mujoco.component import Component, Template
+from smc_mujoco.contact import Contact
+from smc_mujoco.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.estimators import estimator
+from smc_mujoco.law import law
+from smc_mujoco.part import Part
+from smc_mujoco.plant import Plant
+from smc_mujoco.signals import Signal
+
+P = TypeVar("P", bound=Part)
+
+INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
+LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
+REALISTIC_STEP = 2.5e-4  # s; halving it changes no score of a realistic plant by 3 %, see tests/test_convergence.py
+FAR = 1e6  # initial states beyond this have already diverged
+
+
+class FilledStep(float):
+    """A physics step that was left out; dataclasses.replace finds it anew."""
+
+
+class FilledName(str):
+    """An integrator that was left out; dataclasses.replace finds it anew."""
+
+
+def component(value: object, kind: str) -> Component:
+    """A law or an estimator, from one, its template or its name."""
+    if isinstance(value, str):
+        return {"law": law, "estimator": estimator}[kind](value)
+    if isinstance(value, Template):
+        value = value()
+    if isinstance(value, Component) and value.kind == kind:
+        return value
+    field = {"law": "law", "estimator": "velocity"}[kind]
+    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
+
+
+def physics_step(step: object, period: float, realistic: bool, least: float) -> float:
+    """A step that divides the control period; the default one where none is given."""
+    if step is None or isinstance(step, FilledStep):
+        largest = REALISTIC_STEP if realistic else LARGEST_STEP
+        return FilledStep(period / math.ceil(period / largest - 1e-9))
+    h = number("physics_step", step, above=0.0, least=least)
+    count = period / h
+    if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
+        raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
+    return period / round(count)
+
+
+def integrator(name: object, realistic: bool) -> str:
+    """The name of one of MuJoCo's integrators; the default one where none is given."""
+    if name is None or isinstance(name, FilledName):
+        return FilledName("implicitfast" if realistic else "RK4")
+    if not isinstance(name, str) or name not in INTEGRATORS:
+        raise unknown("integrator", name, INTEGRATORS)
+    return name
+
+
+def state(name: str, value: object, n: int) -> tuple[float, ...]:
+    """n numbers, from one or n of them."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else (value,)
+    if len(items) == 1:
+        items *= n
+    if len(items) != n:
+        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
+    return tuple(number(name, item, least=-FAR, most=FAR) for item in items)
+
+
+def signals(name: str, value: object) -> tuple[Signal, ...]:
+    """Signals, from one, several or None; of references exactly one."""
+    items: tuple[Any, ...] = several(value)
+    for item in items:
+        if not isinstance(item, Signal):
+            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
+    if name == "reference" and len(items) != 1:
+        raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
+    return items
+
+
+def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
+    """Parts of one kind, from one, several or None; no two that would take each other's place."""
+    items = several(value)
+    for item in items:
+        if not isinstance(item, kind):
+            raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
+    places = ["a Backlash" if isinstance(p, Backlash) else "a drive" for p in items]
+    if name == "friction":
+        places = [f"a {type(p).__name__}" for p in items]
+    if twice := [place for place in places if places.count(place) > 1]:
+        raise ScenarioError(f"{name} has {twice[0]} twice, {shown(items)}: give one")
+    return tuple(sorted(items, key=lambda part: isinstance(part, Backlash)))  # which comes after the drive
+
+
+def contact(value: object, plant: Plant) -> Contact:
+    """A contact that the plant offers, from one, its kind or None."""
+    if value is None or isinstance(value, str):
+        value = Contact("none" if value is None else value)
+    if not isinstance(value, Contact):
+        raise ScenarioError(f"contact is {shown(value)}: give smc.Contact(...) or one of {', '.join(plant.contacts)}")
+    value.check(plant)
+    return value
+
+
+def mechanism(value: object, plant: Plant) -> str:
+    """The name of a mechanism that the plant offers."""
+    names = ["equation", *plant.mechanisms]
+    if not isinstance(value, str) or value not in names:
+        raise unknown(f"mechanism of {plant.name}", value, names)
+    return value
+
+
+def several(value: object) -> tuple[Any, ...]:
+    """One, several or None as a tuple."""
+    return () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
