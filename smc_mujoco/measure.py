@@ -11,6 +11,8 @@ sliding variable; h the time between samples. The conventions, all chosen, one f
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
   sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
+- at rest: |v| <= 0.1 % of the run's largest |v|, or 1e-5 rad/s or m/s where that is larger. Coulomb friction and
+  contacts creep by 1e-6 or less while they hold; LuGre friction bends its bristles meanwhile.
 - channels: errors and efforts that are integrals over time are summed over the channels; every other
   metric takes the worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 BAND = 0.02  # of the scale
 LAST = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that rounding put this much before the last part is in it
+REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above what stuck joints creep, see friction.py
 EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
@@ -50,6 +53,7 @@ class Metric:
       unit: may contain {x} and {u}, see `unit_for`.
       summary: first line of the docstring.
       network: True if it compares channels and so needs n > 1.
+      realistic: True if it says something of a mechanism that is more than its plant's equation.
       formula: Trace -> float, without the checks.
     """
 
@@ -57,6 +61,7 @@ class Metric:
     unit: str
     summary: str
     network: bool
+    realistic: bool
     formula: Callable[[Trace], float]
 
     def unit_for(self, x: str) -> str:
@@ -64,12 +69,15 @@ class Metric:
         return self.unit.format(x=x, u=EFFORT[x])
 
 
-def metric(unit: str, *, network: bool = False) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
+def metric(
+    unit: str, *, network: bool = False, realistic: bool = False
+) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
 
     Args:
       unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
       network: True if the metric compares channels.
+      realistic: True if it is told only of realistic mechanisms.
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
@@ -82,7 +90,14 @@ def metric(unit: str, *, network: bool = False) -> Callable[[Callable[[Trace], f
                 raise ScenarioError(f"{name} compares channels and {label(trace)} has one: give n >= 2")
             return float(formula(trace))
 
-        CATALOGUE[name] = Metric(name=name, unit=unit, summary=doc.partition("\n")[0], network=network, formula=formula)
+        CATALOGUE[name] = Metric(
+            name=name,
+            unit=unit,
+            summary=doc.partition("\n")[0],
+            network=network,
+            realistic=realistic,
+            formula=formula,
+        )
         return checked
 
     return enter
@@ -97,7 +112,7 @@ def refuse(trace: Trace) -> None:
     """Raise ScenarioError if it is no trace, or the run diverged, failed, or holds a NaN or an infinity."""
     if not hasattr(trace, "scenario"):
         raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
-    signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r)
+    signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r, trace.reaction)
     finite = np.isfinite(trace.t)
     for signal in signals:
         finite = finite & np.isfinite(signal).all(axis=1)
@@ -121,6 +136,11 @@ def scale(trace: Trace) -> float:
     """The run's yardstick in x's unit, never zero; see the module's conventions."""
     start, travel = np.abs(trace.x[0] - trace.r[0]).max(), np.ptp(trace.r, axis=0).max()
     return float(max(start, travel)) or 1.0
+
+
+def at_rest(trace: Trace) -> np.ndarray:
+    """Where each channel is at rest, (K+1, n); see the module's conventions."""
+    return np.abs(trace.v) <= max(REST * float(np.abs(trace.v).max()), STILL)
 
 
 def last(trace: Trace) -> slice:
@@ -148,3 +168,16 @@ def approaches(trace: Trace) -> list[list[slice]]:
         jumps = np.flatnonzero(np.abs(np.diff(r)) > band) + 1
         channels.append([slice(*ends) for ends in itertools.pairwise([0, *jumps.tolist(), r.size])])
     return channels
+
+
+def turns(y: np.ndarray, least: float) -> int:
+    """How often y (K,) turns back, each time by half its range from its last extreme; 0 for a range up to `least`."""
+    count, going, low, high = 0, 0, y[0], y[0]
+    swing = float(np.ptp(y)) / 2
+    for value in y.tolist() if 2 * swing > least else ():
+        low, high = min(low, value), max(high, value)
+        if going >= 0 and value <= high - swing:
+            count, going, low, high = count + (going > 0), -1, value, value
+        elif going <= 0 and value >= low + swing:
+            count, going, low, high = count + (going < 0), 1, value, value
+    return count

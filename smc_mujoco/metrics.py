@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smc_mujoco import measure
 from smc_mujoco.measure import (
     BAND,
     CATALOGUE,
@@ -205,6 +206,29 @@ def hf_share(trace: Trace) -> float:
     power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
     frequency = np.arange(power.size) / (t[-1] - t[0])
     return power[frequency > HIGH * (1 + CONSTANT)].sum() / power[1:].sum()
+
+
+@metric("s", realistic=True)
+def stick_time(trace: Trace) -> float:
+    """Time for which a channel is at rest, with a reaction of friction or contact; longest channel."""
+    rest = measure.at_rest(trace)  # and a reaction is that of the step which ends at its sample
+    return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
+
+
+@metric("{u}", realistic=True)
+def peak_reaction(trace: Trace) -> float:
+    """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the samples."""
+    return np.abs(trace.reaction).max()
+
+
+@metric("1/s", realistic=True)
+def reversal_rate(trace: Trace) -> float:
+    """How often e turns back in the last part, per second, worst channel: twice the frequency of a limit cycle.
+
+    After swings of at least half the ripple; 0 for a ripple up to 1e-6 of the scale. It sees no cycle beyond that part.
+    """
+    part = last(trace)
+    return max(measure.turns(e, 1e-6 * scale(trace)) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
 
 
 @metric("s", network=True)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from smc_mujoco.errors import ScenarioError, shown, unknown
 from smc_mujoco.errors import find as lookup
+from smc_mujoco.metrics import metrics
 from smc_mujoco.plant import shipped
 from smc_mujoco.scenario import Scenario
 
@@ -29,12 +30,16 @@ class Scene:
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
       film: the condition that is filmed; by default the first.
       figure: "overview" (x, u, s and phase portrait, a figure a condition) or "signals" (u of all conditions in one).
+      answers: metrics that answer the scene's question, printed on their own after the scores.
+      facts: label -> sentence, printed under the answers: what else was measured.
     """
 
     title: str
     conditions: Mapping[str, Mapping[str, Scenario]]
     film: str = ""
     figure: str = "overview"
+    answers: tuple[str, ...] = ()
+    facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         if not isinstance(self.conditions, Mapping) or not self.conditions:
@@ -59,6 +64,12 @@ class Scene:
             raise unknown(f"condition to film in scene {self.title!r}", self.film, self.conditions)
         if self.figure not in ("overview", "signals"):
             raise unknown("kind of figure", self.figure, ("overview", "signals"))
+        answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
+        object.__setattr__(self, "answers", answers)
+        for name in answers:
+            lookup(f"metric that answers scene {self.title!r}", name, {m.name: m for m in metrics()})
+        if not isinstance(self.facts, Mapping) or not all(isinstance(text, str) for text in self.facts.values()):
+            raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
 
     def seeded(self, seed: int) -> "Scene":
         """The same scene with another seed in every run."""

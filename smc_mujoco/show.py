@@ -23,7 +23,7 @@ Timer = Callable[[str], AbstractContextManager[None]]
 
 
 def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Timer, console: Console) -> None:
-    """Run a scene: print its scores, write its traces, figures and film to the folder `out`."""
+    """Run a scene: print its scores and answers, write its traces, figures and film to the folder `out`."""
     _writable(out)
     with clock("compiling"):
         compile_laws(scene)
@@ -35,6 +35,7 @@ def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Ti
             if trace.failure:
                 console.print(f"{label}: {trace.failure}", style="red", highlight=False, markup=False)
         console.print()
+    tell(scene, traces, console)
     with clock("traces"):
         written = save(traces, out)
     with clock("figures"):
@@ -45,6 +46,16 @@ def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Ti
     console.print("wrote", style="dim")
     for file in written:
         console.print(f"  {file}", soft_wrap=True, highlight=False, markup=False)
+
+
+def tell(scene: Scene, traces: Traces, console: Console) -> None:
+    """What answers the scene's question: its metrics, run by run, and its facts."""
+    for table in tables.answers(scene.answers, traces) if scene.answers else ():
+        console.print(table, "")
+    for label, sentence in scene.facts.items():
+        console.print(f"{label}: {sentence}", highlight=False, markup=False)
+    if scene.facts:
+        console.print()
 
 
 def _writable(out: Path) -> None:
@@ -124,7 +135,7 @@ def summary(trace: Trace, console: Console) -> None:
     console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
     if s.plant.n > 1:
         console.print(f"channel 1 of {s.plant.n}:")
-    for name in ("x", "v", "u", "s"):
+    for name in ("x", "v", "u", "s", *(["reaction"] if trace.reaction.any() else [])):
         column = getattr(trace, name)[:, 0]
         line = f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
         console.print(line, highlight=False, soft_wrap=True)

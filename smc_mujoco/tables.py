@@ -1,4 +1,4 @@
-"""What the command line prints: score tables, catalogues, one trace."""
+"""What the command line prints: score tables, answers to a scene's question, catalogues, one trace."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from smc_mujoco.draw import style
+from smc_mujoco.measure import Metric
 from smc_mujoco.metrics import metrics, score
 from smc_mujoco.trace import Trace
 
@@ -23,6 +24,7 @@ SHOWN = {
     "spread\nsettles": "spread_settling_time",
 }
 LEAN = {"padding": 0, "show_edge": False, "pad_edge": False}
+FAILED = Text("failed", style="red")
 SPARKS = "▁▂▃▄▅▆▇█"
 
 
@@ -32,18 +34,61 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     units = {m.name: m.unit_for(first.scenario.plant.unit) for m in metrics()}
     networks = {m.name for m in metrics() if m.network}
     shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks}
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, **LEAN)
-    table.add_column("law", no_wrap=True, vertical="bottom", max_width=16, overflow="ellipsis")
+    table = _table(title)
     for head, name in shown.items():
         table.add_column(f"{head}\n[dim]{units[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
     for label, trace in traces.items():
-        name = Text(label, style=style.law_colour(trace.scenario.law.name))
         if trace.diverged_at is not None:
-            table.add_row(name, Text("failed", style="red"))
+            table.add_row(_label(label, trace), FAILED)
             continue
         values = score(trace)
-        table.add_row(name, *(number(values[metric]) for metric in shown.values()))
+        table.add_row(_label(label, trace), *(number(values[metric]) for metric in shown.values()))
     return table
+
+
+def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
+    """The named metrics of condition -> label -> trace: a table a metric, a line a label, a column a condition.
+
+    Of a single condition: one table, a column a metric.
+    """
+    known = {m.name: m for m in metrics()}
+    plants = {trace.scenario.plant.unit: None for runs in traces.values() for trace in runs.values()}
+    units = {name: dict.fromkeys(known[name].unit_for(x) for x in plants) for name in names}
+    heads = {name: f"{name} ({' or '.join(units[name])})" for name in names}
+    if len(traces) == 1:
+        (runs,) = traces.values()
+        return [_grid("", [heads[name] for name in names], [(known[name], runs) for name in names])]
+    return [_grid(heads[name], list(traces), [(known[name], runs) for runs in traces.values()]) for name in names]
+
+
+def _grid(title: str, heads: Sequence[str], columns: Sequence[tuple[Metric, Mapping[str, Trace]]]) -> Table:
+    """A table whose columns are each a metric of labelled runs, with a line for every label."""
+    table = _table(title, width=30)
+    table.min_width = len(title)  # which would be broken over a narrower table
+    for head in heads:
+        table.add_column(Text(head), justify="right", vertical="bottom")
+    lines = {label: trace for _, runs in reversed(columns) for label, trace in runs.items()}
+    for label in dict.fromkeys(label for _, runs in columns for label in runs):
+        table.add_row(_label(label, lines[label]), *(_cell(metric, runs.get(label)) for metric, runs in columns))
+    return table
+
+
+def _cell(metric: Metric, trace: Trace | None) -> Text | str:
+    """A metric of a run as a table has it; nothing where there is no such run, or the metric is for networks."""
+    if trace is None or (metric.network and trace.scenario.plant.n < 2):
+        return ""
+    return FAILED if trace.diverged_at is not None else number(metric.formula(trace))
+
+
+def _table(title: str, width: int = 16) -> Table:
+    """An empty table whose lines begin with a label, shown up to a width."""
+    table = Table(title=title or None, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, **LEAN)
+    table.add_column("law", no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
+    return table
+
+
+def _label(label: str, trace: Trace) -> Text:
+    return Text(label, style=style.law_colour(trace.scenario.law.name))
 
 
 def number(value: float) -> str:
@@ -69,13 +114,13 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
 
 
 def trace_summary(trace: Trace) -> Table:
-    """Every metric of one trace, with its unit and what it means."""
+    """Every metric of one trace, with its unit and what it means; what only realism brings where there is some."""
     values = score(trace)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("metric", "value", "unit", ""):
         table.add_column(head, justify="right" if head == "value" else "left")
     for m in metrics():
-        if m.name in values:
+        if m.name in values and (trace.scenario.realistic or not m.realistic):
             table.add_row(m.name, number(values[m.name]), m.unit_for(trace.scenario.plant.unit), Text(m.summary))
     return table
 

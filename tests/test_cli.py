@@ -13,6 +13,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import cli, gl, show, tables
+from smc_mujoco.friction import Coulomb
 from smc_mujoco.metrics import metrics, score
 
 LABEL = "a label that is forty characters in all."
@@ -259,9 +260,69 @@ def test_show_prints_every_metric_with_its_value(call, trace):
     code, out, err = call("show", trace)
     assert (code, err) == (0, "")
     rows = {line.split()[0]: line.split()[1] for line in out.splitlines() if line and not line.startswith(" ")}
-    values = score(smc.load(trace))
-    assert set(values) == {m.name for m in metrics() if not m.network}
+    everything, realistic = score(smc.load(trace)), {m.name for m in metrics() if m.realistic}
+    assert set(everything) == {m.name for m in metrics() if not m.network}
+    values = {name: value for name, value in everything.items() if name not in realistic}
+    assert set(rows) & realistic == set()
     assert {name: rows[name] for name in values} == {name: tables.number(value) for name, value in values.items()}
+
+
+def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
+    stuck = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.3, friction=Coulomb(5.0)))
+    stuck.save(folder / "stuck.npz")
+    code, out, err = call("show", "stuck.npz")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line and not line.startswith(" ")}
+    assert rows["stick_time"][:2] == ["0.300", "s"]
+    assert rows["peak_reaction"][:2] == [tables.number(score(stuck)["peak_reaction"]), "N"]
+    assert rows["reaction"][-1] == f"{stuck.reaction[-1, 0]:.3g}"
+
+
+ANSWERS = """
+import smc_mujoco as smc
+from smc_mujoco.friction import Coulomb
+
+def block(level):
+    return smc.Scenario(plant="duffing", law="none", x0=0.1, duration=0.3, friction=Coulomb(level))
+
+scene = smc.Scene(
+    title="Blocks",
+    conditions={"dry": {"light": block(0.05), "heavy": block(5.0)}, "wet": {"light": block(0.0)}},
+    answers=("stick_time", "peak_reaction"),
+    facts={"springs": "they deviate by 3 % [at most]."},
+)
+"""
+
+
+def test_answers_are_a_table_a_metric_with_a_line_a_label_and_a_column_a_condition(call, undrawn, folder):
+    (folder / "blocks.py").write_text(ANSWERS)
+    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    after = out[out.index("stick_time (s)") :]
+    assert re.search(r"law +dry +wet *\n", after)
+    stick, reaction = (re.findall(r"^(light|heavy) +(.*?) *$", part, re.M) for part in after.split("peak_reaction (N)"))
+    assert [label for label, _ in stick] == ["light", "heavy"]
+    assert stick[0][1].split()[1] == "0"  # nothing holds it in the wet
+    assert stick[1][1] == "0.300"
+    assert reaction[0][1].split() == ["0.0500", "0"]
+    assert len(reaction[1][1].split()) == 1  # no heavy one in the wet
+    assert "springs: they deviate by 3 % [at most]." in after
+    assert max(map(len, after.partition("wrote")[0].splitlines())) <= 80
+
+
+def test_answers_of_one_condition_are_one_table(call, undrawn, folder):
+    (folder / "blocks.py").write_text(ANSWERS.replace(', "wet": {"light": block(0.0)}', ""))
+    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    assert re.search(r"law +stick_time \(s\) +peak_reaction \(N\)", out)
+    assert re.search(r"heavy +0\.300 +\d", out)
+
+
+def test_a_run_that_failed_has_no_answer():
+    wild = smc.plant("duffing", alpha=-1e6, beta=0.0)
+    runs = {"wild": smc.run(smc.Scenario(plant=wild, law="none", duration=0.1))}
+    (table,) = tables.answers(("peak", "spread_bound"), {"nominal": runs})
+    assert [[str(cell) for cell in column.cells] for column in table.columns] == [["wild"], ["failed"], [""]]
 
 
 def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace, folder):
@@ -317,6 +378,8 @@ SCENES = {
     "labels alike": ("smc.Scene(title='T', conditions={'a': {'B c': ok(), 'b_c': ok()}})", "B c, b_c"),
     "conditions alike": ("smc.Scene(title='T', conditions={'A': {'b': ok()}, 'a': {'b': ok()}})", "A, a"),
     "no such film": ("smc.Scene(title='T', film='c', conditions={'a': {'b': ok()}})", "'c'"),
+    "no such metric": ("smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})", "'ripple'"),
+    "facts without labels": ("smc.Scene(title='T', facts=['so'], conditions={'a': {'b': ok()}})", "facts"),
     "no such figure": ("smc.Scene(title='T', figure='pie', conditions={'a': {'b': ok()}})", "'pie'"),
     "a scene of runs": ("{'a': {'b': ok()}}[0]", "KeyError"),
 }

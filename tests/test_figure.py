@@ -12,6 +12,8 @@ import smc_mujoco as smc
 from smc_mujoco import plain
 from smc_mujoco.draw import envelope, panels, style
 from smc_mujoco.draw.figure import figure, signals
+from smc_mujoco.friction import Coulomb
+from smc_mujoco.trace import ARRAYS
 
 LAWS = ("observer_free", "classical")
 
@@ -27,7 +29,7 @@ def pair() -> list[smc.Trace]:
 
 def broken(trace: smc.Trace, at: int, failure: str = plain.LEFT_THE_WORLD) -> smc.Trace:
     """The trace as if it had diverged at sample `at`, on its way to 1e5."""
-    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d", "r")}
+    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
     arrays["x"][max(at - 5, 0) : at] = 1e5
     for array in arrays.values():
         array[at:] = np.nan
@@ -205,3 +207,56 @@ def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
     assert "band: range of u, s, line: mean over 40 ms" in words(figure(chattering, tmp_path / "a")[0])
     assert "band: range of u, line: mean over 40 ms" in words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
     assert "band:" not in words(figure(pair, tmp_path / "c")[0])
+
+
+# realistic mechanisms
+
+
+def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
+    given = smc.paper.scenario(plant, law).law
+    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 3.0} | parts)))
+
+
+def test_an_overview_of_friction_has_a_panel_of_the_reaction_and_marks_where_it_holds(pair, tmp_path):
+    rubbed = realistic(friction=Coulomb(0.5))
+    text = words(figure([pair[0], rubbed], tmp_path / "a")[0])
+    assert "reaction (N)" in text
+    assert "held by friction for 0.15 s or longer" in text
+    assert "range of u, reaction, s" in text or "band" not in text
+    ideal = words(figure(pair, tmp_path / "b")[0])
+    assert "reaction" not in ideal
+    assert "held by friction" not in ideal
+
+
+def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
+    late = realistic(actuator=smc.Lag(0.05), duration=1.0)
+    text = words(figure([late], tmp_path / "a")[0])
+    assert "delivered (N)" in text
+    assert "reaction" not in text  # nothing rubs or touches
+
+
+def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can_hold_it():
+    rubbed = realistic(friction=Coulomb(0.5))
+    (place,) = panels.rests(rubbed)
+    assert place == pytest.approx(rubbed.x[-1, 0], abs=1e-9)
+    assert abs(place) > 1e-3  # friction stopped it before the goal
+    assert panels.rests(realistic(friction=smc.Viscous(5.0))) == []
+    assert panels.rests(realistic(friction=Coulomb(0.0))) == []
+
+
+def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
+    hit = realistic(contact="stops", v0=3.0)
+    text = words(figure([hit], tmp_path / "a")[0])
+    assert f"blows up to {np.abs(hit.reaction).max():.3g} N" in text
+    assert "blows" not in words(figure([realistic(friction=Coulomb(0.5))], tmp_path / "b")[0])
+
+
+def test_a_realistic_network_has_the_mean_of_its_reactions(tmp_path):
+    rubbed = realistic(plant="pendulum_network", friction=Coulomb(0.2), duration=1.0)
+    assert "mean reaction (N·m)" in words(figure([rubbed], tmp_path / "a")[0])
+
+
+def test_a_realistic_run_that_fails_at_once_is_drawn(tmp_path):
+    rubbed = realistic(friction=Coulomb(0.5), duration=1.0)
+    for at in (0, 1, 400):
+        figure([broken(rubbed, at)], tmp_path / "a")

@@ -30,21 +30,22 @@ class Run:
     s: np.ndarray
     d: np.ndarray
     r: np.ndarray
+    reaction: np.ndarray
     scenario: SimpleNamespace
     diverged_at: float | None = None
     failure: str | None = None
 
 
-def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, **fields):
+def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, **fields):
     """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n)."""
     t = np.asarray(t, float)
-    columns = [np.asarray(a, float) for a in (x, r, u, s)]
+    columns = [np.asarray(a, float) for a in (x, r, u, s, v, reaction)]
     columns = [a[:, None] if a.ndim == 1 else a for a in columns]
     n = max(a.shape[1] if a.ndim else 1 for a in columns)
-    x, r, u, s = (np.broadcast_to(a, (t.size, n)) for a in columns)
+    x, r, u, s, v, reaction = (np.broadcast_to(a, (t.size, n)) for a in columns)
     zero = np.zeros((t.size, n))
     scenario = SimpleNamespace(plant=SimpleNamespace(name="duffing", unit="m"), law=SimpleNamespace(name="classical"))
-    return Run(t=t, x=x, v=zero, u=u, applied=u, s=s, d=zero, r=r, scenario=scenario, **fields)
+    return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, reaction=reaction, scenario=scenario, **fields)
 
 
 def clock(duration, h):
@@ -369,6 +370,79 @@ def test_sync_metrics_refuse_a_single_channel():
             getattr(m, name)(run(np.arange(3.0)))
 
 
+# Friction and contact
+
+
+def test_a_sliding_block_sticks_from_the_time_at_which_coulomb_friction_has_stopped_it():
+    v0, deceleration, h = 2.0, 0.8, 1e-4  # stops at 2.5 s
+    t = clock(10, h)
+    v = np.maximum(v0 - deceleration * t, 0.0)
+    trace = run(t, v=v, reaction=np.where(v > 0, -deceleration, -0.1))
+    slow = 1e-3 * v0 / deceleration  # from 0.1 % of the largest speed on it is at rest
+    assert 7.5 <= m.stick_time(trace) <= 7.5 + slow + h
+
+
+def test_a_stuck_joint_may_creep_and_bristles_may_bend():
+    t = clock(10, 1e-2)
+    assert m.stick_time(run(t, v=1e-7, reaction=1.0)) == pytest.approx(10.0)  # it never moved: |v| <= 1e-5
+    v = np.where(t < 2, 1.0, 1e-3)  # a hundredth of a millimetre in a hundredth of a second is rest after 1 m/s
+    assert m.stick_time(run(t, v=v, reaction=1.0)) == pytest.approx(8.0)
+    assert m.stick_time(run(t, v=1.01 * v, reaction=1.0)) == pytest.approx(8.0)  # relative to the run's largest
+    assert m.stick_time(run(t, v=np.where(t < 2, 1.0, 1.01e-3), reaction=1.0)) == 0.0
+
+
+def test_what_nothing_holds_does_not_stick():
+    t = clock(10, 1e-2)
+    assert m.stick_time(run(t, v=np.exp(-5 * t))) == 0.0
+    assert m.stick_time(run(t)) == 0.0
+
+
+def test_an_instant_of_rest_is_no_time_and_stretches_add_up():
+    t = np.arange(8.0)
+    v = np.array([1, 0, 1, 0, 0, 1, 0, 0.0])
+    assert m.stick_time(run(t, v=v, reaction=1.0)) == 2.0
+    both = np.column_stack([v, np.ones(8)])
+    assert m.stick_time(run(t, v=both, reaction=1.0)) == 2.0  # the channel that sticks longest
+    assert m.stick_time(run(t, v=both, reaction=np.column_stack([0 * v, v]))) == 0.0  # and its own reaction
+    late = np.array([0, 0, 0, 0, 0, 0, 0, 5.0])  # that of the step which ends at the sample
+    assert m.stick_time(run(t, v=v, reaction=late)) == 1.0
+
+
+def test_peak_reaction_is_the_largest_of_either_sign_and_any_channel():
+    t = np.arange(3.0)
+    assert m.peak_reaction(run(t, reaction=np.array([[1, 0], [0, -7], [2, 2]]))) == 7.0
+    assert m.peak_reaction(run(t)) == 0.0
+
+
+@pytest.mark.parametrize("frequency", [1.0, 2.5, 20.0])
+def test_a_limit_cycle_reverses_twice_a_period(frequency):
+    t = clock(10, 1e-3)
+    wave = np.sin(2 * np.pi * frequency * t + 0.3)
+    # the last part, 2 s, may cut off a turn at either end
+    assert m.reversal_rate(run(t, 0.3 + 0.01 * wave)) == pytest.approx(2 * frequency, abs=1.0)
+    slips = np.clip(3 * wave, -1, 1)  # rests at its ends, as in stick-slip
+    assert m.reversal_rate(run(t, slips)) == pytest.approx(2 * frequency, abs=1.0)
+
+
+def test_small_teeth_on_a_cycle_are_no_reversals_and_large_ones_are():
+    t = clock(10, 1e-3)
+    slow, teeth = np.cos(2 * np.pi * t), np.where(np.arange(t.size) % 2, 1.0, -1.0)
+    assert m.reversal_rate(run(t, slow + 0.2 * teeth)) == m.reversal_rate(run(t, slow))
+    assert m.reversal_rate(run(t, teeth)) == pytest.approx(1000.0, abs=1.0)
+
+
+def test_what_creeps_or_decays_does_not_hunt():
+    t = clock(10, 1e-3)
+    for x in (np.exp(-t), 1e-7 * np.sin(20 * t) + (t < 1), 0.2 + 0.01 * t, np.ones(t.size)):
+        assert m.reversal_rate(run(t, x)) == 0.0
+
+
+def test_reversals_are_those_of_the_channel_that_hunts_fastest():
+    t = clock(10, 1e-3)
+    x = np.column_stack([np.sin(2 * np.pi * t), 1e-3 * np.sin(2 * np.pi * 7 * t), 0 * t])
+    assert m.reversal_rate(run(t, x)) == pytest.approx(14.0, abs=1.0)
+
+
 # Against python-control
 
 
@@ -458,9 +532,9 @@ def broken():
     yield "law raised, at t = 0.3 s", run(t, diverged_at=0.3, failure="law raised, at t = 0.3 s")
     yield "law raised, at t = 0.3 s", run(t, failure="law raised, at t = 0.3 s")
     yield "not finite from t = 0.51 s", run(t, np.where(t > 0.5, np.inf, 0.0))
-    for name in ("x", "r", "u", "s"):
+    for name in ("x", "r", "u", "s", "v", "reaction"):
         yield "not finite from t = 0.51 s", run(t, **{name: late})
-    for name in ("v", "d", "applied"):
+    for name in ("d", "applied"):
         yield "not finite from t = 0.51 s", dataclasses.replace(run(t), **{name: late[:, None]})
 
 
@@ -502,6 +576,9 @@ def test_a_run_of_one_step_by_hand():
         "tv_rate": 0.0,
         "energy": 4.5,
         "hf_share": 0.0,
+        "stick_time": 0.0,
+        "peak_reaction": 0.0,
+        "reversal_rate": 0.0,
     }
 
 
@@ -519,7 +596,8 @@ def random_runs(draw):
     r = np.where(np.arange(samples)[:, None] < draw(st.integers(0, samples)), 0, draw(WHOLE))
     if draw(st.booleans()):
         x[-max(1, samples // 2) :] = r[-1]  # settles
-    return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s)
+    more = {"v": draw(block), "reaction": draw(block)}
+    return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s, **more)
 
 
 @settings(max_examples=200, deadline=None)
@@ -540,7 +618,7 @@ def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, 
 def test_permuting_channels_changes_nothing(trace, random):
     order = list(range(trace.x.shape[1]))
     random.shuffle(order)
-    shuffled = {name: getattr(trace, name)[:, order] for name in ("x", "v", "u", "applied", "s", "d", "r")}
+    shuffled = {name: getattr(trace, name)[:, order] for name in ("x", "v", "u", "applied", "s", "d", "r", "reaction")}
     assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(m.score(trace), rel=1e-12)
 
 

@@ -101,9 +101,9 @@ def test_a_scene_runs_from_its_declaration_to_its_files(path, tmp_path):
     assert set(tmp_path.iterdir()) == {*saved, *drawn}
 
 
-@EVERY
-def test_a_scene_compares_all_laws_of_the_paper_under_the_same_conditions(path):
-    for runs in scenes.read(path).conditions.values():
+@pytest.mark.parametrize("name", sorted(TEN))
+def test_a_scene_of_the_study_compares_all_laws_of_the_paper_under_the_same_conditions(name):
+    for runs in scenes.read(FOLDER / f"{name}.py").conditions.values():
         assert [scenario.law.name for scenario in runs.values()] == LAWS
         first, *others = runs.values()
         for scenario in others:

@@ -1,6 +1,7 @@
 """Films: the right frames, moving machines in their laws' colours, arrows that push, failures that show."""
 
 import dataclasses
+import itertools
 import os
 import signal
 import subprocess
@@ -13,11 +14,14 @@ import pytest
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco import gl
-from smc_mujoco.draw import camera, style, video
-from smc_mujoco.draw.arrows import Longest, acts, arrows
-from smc_mujoco.draw.caption import Caption
+from smc_mujoco import assembly, gl
+from smc_mujoco.draw import camera, stage, state, style, video
+from smc_mujoco.draw.arrows import Longest, acts, arrows, longest
+from smc_mujoco.draw.caption import Caption, key
 from smc_mujoco.draw.stage import Stage
+from smc_mujoco.friction import Coulomb, LuGre
+from smc_mujoco.plant import Variant
+from smc_mujoco.trace import ARRAYS
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 SIZE = (480, 270)
@@ -30,7 +34,7 @@ def runs(plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration
 
 def broken(trace: smc.Trace, at: int) -> smc.Trace:
     """The trace as if it had diverged at sample `at`."""
-    arrays = {name: getattr(trace, name).copy() for name in ("x", "v", "u", "applied", "s", "d", "r")}
+    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
     for array in arrays.values():
         array[at:] = np.nan
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
@@ -221,3 +225,220 @@ def test_without_opengl_one_sentence_says_what_to_do(monkeypatch, tmp_path):
     monkeypatch.setattr(gl, "missing", lambda: "no film: install a renderer")
     with pytest.raises(smc.ScenarioError, match="install a renderer"):
         video.film(runs(laws=LAWS[:1]), tmp_path / "a.mp4")
+
+
+# realistic mechanisms
+
+ROOM = camera.Room(10, 10, 470, 160)
+VARIANTS = [
+    (plant, field, name)
+    for plant in smc.plants()
+    for field, offered in (("contact", "contacts"), ("mechanism", "mechanisms"))
+    for name in getattr(smc.plant(plant), offered)
+]
+
+
+def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
+    given = smc.paper.scenario(plant, law).law
+    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 2.0} | parts)))
+
+
+def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
+    """What a film tells of a trace, and for how many frames."""
+    told = state.told(trace, video.clock([trace], fps))
+    return [(now.words if now else None, len(list(run))) for now, run in itertools.groupby(told)]
+
+
+@pytest.fixture(scope="module")
+def hit() -> smc.Trace:
+    """A cart that hits its stop once, at about 0.07 s."""
+    return realistic(contact="stops", v0=3.0)
+
+
+@pytest.fixture(scope="module")
+def stuck() -> smc.Trace:
+    return realistic(friction=Coulomb(0.5))
+
+
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
+def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
+    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    model = stage.compose([scenario] * 2, SIZE)
+    shown = {model.geom(i).name for i in range(model.ngeom)}
+    wanted = [geom.name for geom in assembly.spec([scenario]).geoms if geom.name not in ("", "floor")]
+    assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
+    assert model.nskin == 2 * len(assembly.spec([scenario]).skins)
+
+
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
+def test_machines_side_by_side_keep_apart(plant, field, name):
+    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    corners = stage.still(assembly.model([scenario]))[..., :2]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    step = stage.lane([scenario] * 3)[:2]
+    for by in (step, 2 * step):
+        apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(axis=2)
+        assert apart.min() >= 0.0
+
+
+def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
+    (trace,) = runs(laws=LAWS[:1])
+    assert np.linalg.norm(stage.lane([trace.scenario])) == pytest.approx(np.linalg.norm(trace.scenario.plant.lane))
+    assert moods(trace) == [(None, 10)]
+    assert longest([trace]).reaction == 0.0
+    assert not any("violet" in words for words in key([trace], longest([trace])))
+
+
+def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
+    (first, slides), (second, _) = moods(stuck)
+    assert (first, second) == ("slides", "sticks")
+    moving = np.flatnonzero(np.abs(stuck.v) > 1e-3 * np.abs(stuck.v).max())[-1]
+    assert slides / 30 == pytest.approx(stuck.t[moving] + state.HOLD, abs=0.04)  # it has rested for HOLD
+
+
+def test_only_dry_friction_sticks():
+    assert moods(realistic(friction=smc.Viscous(1.0))) == [(None, 61)]
+    assert moods(realistic(friction=Coulomb(0.0))) == [(None, 61)]
+    assert moods(realistic(friction=LuGre(0.5, 0.8, 0.05)))[-1][0] == "sticks"
+    assert moods(realistic("none", contact="floor", x0=0.9, duration=1.0))[-1][0] == "sticks"
+
+
+def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
+    touching = hit.t[state.touching(hit)[:, 0]]
+    assert 0.0 < np.ptp(touching) < 0.05
+    (before, _), (blow, frames), (after, _) = moods(hit)
+    assert (before, blow, after) == (None, "contact", None)
+    assert frames / 30 >= state.HOLD
+    words = [now.words if now else None for now in state.told(hit, video.clock([hit], 30.0))]
+    assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
+
+
+def test_touch_is_where_the_stop_pushes_and_there_only(hit):
+    pushed = np.abs(hit.reaction[:, 0]) > 1e-6
+    touch = state.touching(hit)[:, 0]
+    assert touch.any()
+    # the reaction is that of the step before, and a dashpot lets go before the buffers part
+    assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
+
+
+def test_flanks_are_told_by_where_they_push():
+    slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.15), duration=1.0)
+    names = {-1: "left flank", 1: "right flank", 0: "in play"}
+    flank = np.sign(slack.reaction[:, 0]).astype(int)
+    told = state.told(slack, slack.t)
+    for now, k in zip(told, range(len(slack.t)), strict=True):
+        near = slice(max(k - 300, 0), k + 300)
+        assert now is not None
+        assert now.words == "rattles" or now.words in {names[f] for f in flank[near].tolist()}
+    rattling = np.where(np.arange(1001) // 20 % 2, 1.0, -1.0)
+    assert (state.lying(rattling, slack.t, state.HOLD)[200:] == 2).all()
+    assert (state.lying(np.ones(1001), slack.t, state.HOLD) == 1).all()
+
+
+def test_what_is_held_lasts_and_has_no_short_gaps():
+    t = np.arange(100) * 0.01
+    on = np.zeros(100, bool)
+    on[[10, 40, 70]] = True
+    assert np.flatnonzero(np.diff(state.held(on, t, 0.16).astype(int))).tolist() == [9, 85]
+    assert np.flatnonzero(np.diff(state.held(on, t, 0.1).astype(int))).tolist() == [9, 19, 39, 49, 69, 79]
+    assert not state.held(on & False, t, 0.15).any()
+
+
+def test_words_never_flicker():
+    rng, times = np.random.default_rng(0), np.arange(300) / 30
+    names = [state.State("a", state.CALM), state.State("b", state.HELD), state.State("hit", state.STRUCK)]
+    found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
+    shown = state.steady(found, times, state.HOLD)
+    runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
+    assert all(frames >= 5 or now == names[2] for now, frames in runs[1:-1])
+    assert all(after == now for after, now in zip(shown, found, strict=True) if now == names[2])
+    assert shown.index(names[2]) == found.index(names[2])  # nothing is told to hit before it does
+
+
+def test_several_channels_are_told_in_one():
+    assert state.stick_words(np.array([True, True, False])) == "2 of 3 stick"
+    assert state.stick_words(np.ones(3, bool)) == "sticks"
+    assert state.stick_words(np.zeros(3, bool)) == "slides"
+    assert state.play_words([0, 0, 1]) == "2 of 3 in play"
+    assert state.play_words([-1, -1]) == "left flank"
+
+
+def test_a_failed_machine_has_no_state(stuck):
+    told = state.told(broken(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
+    assert [now is None for now in told] == [False, False, True, True]
+    assert state.told(video.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
+
+
+@renders
+def test_a_tendon_that_a_mechanism_shows_is_drawn_where_it_is():
+    def add(spec):
+        spec.body("machine").add_site(name="post", pos=(0, -0.5, 0.8))
+        spec.body("cart").add_site(name="hook", pos=(0, 0, 0.2))
+        line = spec.add_tendon(name="line", width=0.03, rgba=(0.5, 0.0, 1.0, 1.0))
+        line.wrap_site("post")
+        line.wrap_site("hook")
+
+    base = smc.plant("duffing")
+    tied = dataclasses.replace(base, mechanisms={"tied": Variant(add, base.fields)})
+    trace = smc.run(smc.Scenario(plant=tied, law="none", mechanism="tied", duration=0.1))
+    (with_line,), (without,) = pictures([trace], [0.1]), pictures(runs(laws=LAWS[:1]), [0.1])
+    assert share(with_line, style.REACTION) > share(without, style.REACTION) + 3e-3
+
+
+@renders
+def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
+    slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
+    with Stage([slack], ["#0072B2"], (480, 170), ROOM) as shown:
+        rotor, joint = (shown.data.joint(f"m0/{name}") for name in ("rotor:hinge", "hinge"))
+        for flank in (-1.0, 0.0, 1.0):
+            shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
+            assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
+    pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
+    ahead = video.rotors(slack, slack.t, 1e-3)
+    assert ahead[pushed + 1, 0] == pytest.approx(0.1)
+    assert np.abs(ahead).max() <= 0.1
+    resting = realistic(contact="floor", duration=0.2)
+    with Stage([resting], ["#0072B2"], (480, 170), ROOM) as shown:
+        shown.pose(0, np.array([0.4]))
+        assert shown.data.joint("m0/lift").qpos[0] == 0.0
+
+
+@renders
+@pytest.mark.parametrize("at", [0, 1, 100])
+def test_a_realistic_machine_that_fails_is_filmed(at):
+    for parts in ({"actuator": smc.Backlash(0.2)}, {"friction": Coulomb(0.3), "contact": "stops"}):
+        pictures([broken(realistic(duration=0.2, **parts), at)], [0.0, 0.2])
+
+
+@renders
+def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
+    bare = dataclasses.replace(stuck, reaction=np.zeros_like(stuck.reaction))
+    (rubbed,), (smooth,) = pictures([stuck], [0.5]), pictures([bare], [0.5])
+    assert share(rubbed, style.REACTION) > share(smooth, style.REACTION) + 3e-4
+    assert "violet arrow: friction, longest 0.5 N" in key([stuck], longest([stuck]))
+
+
+def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
+    scale = longest([hit])
+    assert scale.reaction == scale.control < np.abs(hit.reaction).max()
+    assert f"violet arrow: contact, longest {scale.control:.2g} N or more" in key([hit], scale)
+
+
+@renders
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
+def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
+    traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
+    told = [state.told(trace, video.clock(traces, 30.0)) for trace in traces]
+    names = style.labels(traces, None)
+    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, longest(traces), told)
+    with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:
+        caption.put(shown.boxes)
+    boxes = np.concatenate([caption.pills, caption.badges])
+    assert (boxes[:, :2] >= 0).all()
+    assert (boxes[:, 2:] <= (1280, 460)).all()
+    for i, j in itertools.combinations(range(8), 2):
+        assert np.maximum(boxes[i, :2] - boxes[j, 2:], boxes[j, :2] - boxes[i, 2:]).max() >= -1e-9
+    (early,), (late,) = pictures(traces, [0.1], size=(1280, 720)), pictures(traces, [1.9], size=(1280, 720))
+    left, top, right, bottom = caption.badges[0].round().astype(int)
+    assert early[top + 4 : bottom - 4, left + 4 : right - 4].mean() > 170  # pale: it slides
+    assert late[top + 4 : bottom - 4, left + 4 : right - 4].mean() < 120  # dark: it is held

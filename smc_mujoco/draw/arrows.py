@@ -1,4 +1,4 @@
-"""Arrows in the scene: what the control and the disturbance do to each moving body.
+"""Arrows in the scene: what the control, the disturbance, and friction and contact do to each moving body.
 
 The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which
 switches faster than the film still shows how far it swings. Arrows lie along a pendulum's arc, beyond the bob, and
@@ -34,33 +34,43 @@ class Arrow(NamedTuple):
 
 
 class Acts(NamedTuple):
-    """What acts on one machine, frame by frame: as the actuator gives it, and as the world does."""
+    """What acts on one machine, frame by frame: as it is commanded, as the world does, and as what it touches does."""
 
     control: Envelope
     disturbance: Envelope
+    reaction: Envelope
 
 
 def acts(trace: Trace, times: np.ndarray, gap: float) -> Acts:
     """Ranges and means over the `gap` seconds before each time."""
     edges = np.concatenate([[times[0] - gap], times])
-    return Acts(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d)))
+    return Acts(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction)))
 
 
 class Longest(NamedTuple):
-    """What the longest arrows stand for, N or N m: the largest control and disturbance of the runs that lasted."""
+    """What the longest arrows stand for, N or N m: the largest control and disturbance of the runs that lasted.
+
+    A blow is far larger than what drives the machine: the reaction's arrow is as long for all that exceeds the control.
+    """
 
     control: float
     disturbance: float
+    reaction: float = 0.0
+    blows: bool = False  # whether a reaction is larger than its longest arrow
 
 
 def longest(traces: Sequence[Trace]) -> Longest:
     """The scale of the arrows of these traces."""
-    return Longest(*(max(map(abs, panels.span(traces, name))) for name in ("applied", "d")))
+    control, disturbance, reaction = (max(map(abs, panels.span(traces, y))) for y in ("applied", "d", "reaction"))
+    shown = min(reaction, control) if control else reaction
+    return Longest(control, disturbance, shown, reaction > 1.01 * shown)
 
 
 def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) -> list[Arrow]:
     """The arrows of one channel in one frame."""
-    law, grey = (tuple(c / 255 for c in style.rgb(name)) for name in (colour, style.DISTURBANCE))
+    law, grey, violet = (
+        tuple(c / 255 for c in style.rgb(name)) for name in (colour, style.DISTURBANCE, style.REACTION)
+    )
     drawn = []
     if scale.control:
         low, mean, high = (float(part[frame, channel]) / scale.control for part in acts.control[1:])
@@ -70,6 +80,9 @@ def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) ->
     if scale.disturbance:
         mean = float(acts.disturbance.mean[frame, channel]) / scale.disturbance
         drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=1, size=0.65))
+    if scale.reaction:
+        mean = float(acts.reaction.mean[frame, channel]) / scale.reaction
+        drawn.append(Arrow(0.0, mean, (*violet, 1.0), layer=2 if scale.disturbance else 1, size=0.8))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > LEAST]
 
 

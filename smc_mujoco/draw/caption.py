@@ -1,4 +1,4 @@
-"""Words on a film's frames: title, key to the arrows, a label a machine, the clock. Drawn with Pillow."""
+"""Words on a film's frames: title, key to the arrows, a label a machine and its state, the clock. Drawn with Pillow."""
 
 import functools
 from collections.abc import Sequence
@@ -10,9 +10,10 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.arrows import Longest
 from smc_mujoco.draw.camera import Room
 from smc_mujoco.draw.stage import SHOWN
+from smc_mujoco.draw.state import CALM, HELD, STRUCK, State, play, rubs, touches
 from smc_mujoco.trace import Trace
 
-LABEL, TITLE, KEY = 15, 24, 13  # px, height of letters in a film of full size
+LABEL, TITLE, KEY, BADGE = 15, 24, 13, 13  # px, height of letters in a film of full size
 EDGE = 24  # px, from the picture's edge to words
 MOST = 0.3  # of the picture's width, for a label beside its machine
 NEWS = 1.5  # s for which a change of the plant is told loudly
@@ -34,6 +35,7 @@ class Caption:
         size: tuple[int, int],
         scale: float,
         longest: Longest,
+        told: Sequence[Sequence[State | None]] = (),
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
         self.jumps = style.jumps(traces, names)
@@ -45,11 +47,17 @@ class Caption:
         self.key = wrapped(key(traces, longest), inside - self.note_room, KEY * scale)
         x, y, _ = traces[0].scenario.plant.lane
         self.beside = abs(y) > abs(x)  # machines behind each other have their labels at the left
+        words = [{state.words for state in each if state} for each in told] or [set()] * len(traces)
+        badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]
+        self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
         side, below = 40 * scale, 52 * scale
         self.most = (size[0] - side) / len(traces) - 0.8 * LABEL * scale  # width of a label
         if self.beside:
             self.most = MOST * size[0]
-            side, below = max(self.width(text) for text in self.texts()) + 30 * scale, 20 * scale
+            widths = [self.width(text) for text in self.texts()] + self.badge[:, 0]
+            side, below = max(widths) + 30 * scale, 20 * scale
+        else:
+            below += self.badge[:, 1].max()
         top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
         self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
         self.sheet = functools.lru_cache(maxsize=1)(self._sheet)
@@ -69,33 +77,46 @@ class Caption:
         """Width of a label, px."""
         return style.width(text, LABEL * self.scale, bold=True) + 1.4 * LABEL * self.scale
 
+    def badge_width(self, text: str) -> float:
+        """Width of a badge, which tells a machine's state, px."""
+        return style.width(text, BADGE * self.scale, bold=True) + 1.2 * BADGE * self.scale
+
     def put(self, boxes: np.ndarray) -> None:
         """Place the labels under machines that stand in a row, else at the left of each. They never touch.
+
+        A badge is below its label, or at its right.
 
         Args:
           boxes: of the machines, (machines, 4) px: left, top, right, bottom.
         """
         widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL * self.scale
-        gap, middle = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2
+        gap, middle, (wide, high) = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2, self.badge.T
         if not self.beside:
-            x = spread(middle[:, 0], widths + gap, self.size[0])
-            y = np.full(len(x), min(boxes[:, 3].max() + 0.9 * height, self.size[1] - 0.7 * height))
+            x = spread(middle[:, 0], np.maximum(widths, wide) + gap, self.size[0])
+            y = np.full(len(x), min(boxes[:, 3].max() + 0.9 * height, self.size[1] - 0.7 * height - high.max()))
+            across, down = x, y + (height + high) / 2 + 0.1 * height * (high > 0)
         else:
-            x = np.maximum(boxes[:, 0] - gap, widths + gap) - widths / 2
+            x = np.maximum(boxes[:, 0] - gap, widths + wide + gap) - wide - widths / 2
             y = spread(middle[:, 1], np.full(len(x), 1.15 * height), self.size[1])
+            across, down = x + (widths + wide) / 2 + 0.1 * height, y
         self.pills = np.stack([x - widths / 2, y - height / 2, x + widths / 2, y + height / 2], axis=1)
+        self.badges = np.stack([across - wide / 2, down - high / 2, across + wide / 2, down + high / 2], axis=1)
 
-    def over(self, picture: np.ndarray, time: float, failed: tuple[bool, ...]) -> np.ndarray:
-        """The picture with the words on it."""
+    def over(
+        self, picture: np.ndarray, time: float, failed: tuple[bool, ...], told: tuple[State | None, ...] = ()
+    ) -> np.ndarray:
+        """The picture with the words on it: of each machine whether it has failed, and its state."""
         past = max((start for start in self.jumps if start <= time), default=None)
         image = Image.fromarray(picture)
-        sheet, s = self.sheet(failed, past, past is not None and time < past + NEWS), self.scale
+        sheet, s = self.sheet(failed, told, past, past is not None and time < past + NEWS), self.scale
         image.paste(sheet, mask=sheet)
         place = self.size[0] - EDGE * s, 16 * s
         ImageDraw.Draw(image).text(place, f"{time:.2f} s", style.INK, style.font(TITLE * s, bold=True), anchor="ra")
         return np.asarray(image)
 
-    def _sheet(self, failed: tuple[bool, ...], change: float | None, loud: bool) -> Image.Image:
+    def _sheet(
+        self, failed: tuple[bool, ...], told: tuple[State | None, ...], change: float | None, loud: bool
+    ) -> Image.Image:
         """Everything but the clock; `change` is the time of the plant's last change."""
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
         draw, s = ImageDraw.Draw(sheet), self.scale
@@ -109,7 +130,21 @@ class Caption:
             draw.rounded_rectangle(tuple(box), radius=(box[3] - box[1]) / 2, fill=fill)
             middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
             draw.text(middle, text, style.letters_on(fill), style.font(LABEL * s, bold=True), anchor="mm")
+        for state, box in zip(told, self.badges, strict=False):
+            if state:
+                self._badge(draw, state, box)
         return sheet
+
+    def _badge(self, draw: ImageDraw.ImageDraw, state: State, box: np.ndarray) -> None:
+        """What a machine does now: pale while it moves, dark while friction holds it, bright while it hits."""
+        fill, rim = {CALM: (style.PAPER, style.MUTED), HELD: (style.INK,) * 2, STRUCK: (style.REACTION,) * 2}[
+            state.mood
+        ]
+        size, middle = BADGE * self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+        draw.rounded_rectangle(
+            tuple(box), radius=5 * self.scale, fill=fill, outline=rim, width=max(1, round(self.scale))
+        )
+        draw.text(middle, state.words, style.letters_on(fill), style.font(size, bold=True), anchor="mm")
 
     def _note(self, draw: ImageDraw.ImageDraw, text: str, loud: bool) -> None:
         """What has changed, under the clock; in a dark box while it is news."""
@@ -132,10 +167,25 @@ def key(traces: Sequence[Trace], longest: Longest) -> list[str]:
         words.append("bar: the range over which it switches")
     if longest.disturbance:
         words.append(f"dark arrow: disturbance, longest {longest.disturbance:.2g} {unit}")
+    if longest.reaction:
+        words.append(
+            f"violet arrow: {reacting(traces)}, longest {longest.reaction:.2g} {unit}{' or more' * longest.blows}"
+        )
     most = max(trace.scenario.plant.n for trace in traces)
     if most > SHOWN:
         words.append(f"machines: the first {SHOWN} of {most} pendulums")
     return words
+
+
+def reacting(traces: Sequence[Trace]) -> str:
+    """What the reaction of these traces is made of."""
+    runs = [trace.scenario for trace in traces if trace.scenario.realistic]
+    kinds = {
+        "friction": any(rubs(scenario) for scenario in runs),
+        "contact": any(touches(scenario) for scenario in runs),
+        "backlash": any(play(scenario) for scenario in runs),
+    }
+    return " and ".join(kind for kind, there in kinds.items() if there)
 
 
 def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:

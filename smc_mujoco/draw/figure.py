@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 from smc_mujoco import metrics
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.envelope import end, finite
+from smc_mujoco.draw.state import HOLD
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.trace import Trace
@@ -34,7 +35,8 @@ def figure(
 ) -> list[Path]:
     """Draw traces of one plant: x, u and s over time, the phase portrait, the last samples of u.
 
-    Of a network: the mean of the channels, single channels light, and the spread max x - min x. A run that failed is
+    Of a network: the mean of the channels, single channels light, and the spread max x - min x. Of realistic mechanisms
+    also what an actuator delivers, what friction and contacts exert, and where friction holds it. A run that failed is
     drawn to its end, which is marked; the instant at which a plant changes is marked too.
 
     Args:
@@ -53,7 +55,7 @@ def figure(
     traces = [finite(trace) for trace in traces]
     network = any(trace.x.shape[1] > 1 for trace in traces)
     with style.page():
-        page = _page(7.2)
+        page = _page(7.2 + 1.3 * len(_realism(traces)))
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
         _overview(page, left, traces, names, colours)
         portrait, close = (page.add_subplot(cell) for cell in right.subgridspec(2, 1, height_ratios=(1.5, 1.0)))
@@ -117,7 +119,7 @@ def _overview(
 ) -> None:
     """The quantities over time, one below the other."""
     network = traces[0].x.shape[1] > 1
-    rows = ["x", "spread", "u", "s"] if network else ["x", "u", "s"]
+    rows = [*(["x", "spread", "u"] if network else ["x", "u"]), *_realism(traces), "s"]
     column, axes = place.subgridspec(len(rows), 1), {}
     for i, name in enumerate(rows):
         ax = axes[name] = page.add_subplot(column[i], sharex=axes.get("x"))
@@ -130,6 +132,13 @@ def _overview(
     axes["s"].set_xlabel("time (s)")
     axes["s"].set_xlim(0.0, end(traces))
     page.align_ylabels(list(axes.values()))
+
+
+def _realism(traces: Sequence[Trace]) -> list[str]:
+    """What realism adds to an overview: what actuators deliver, what friction and contacts exert."""
+    drives = any(trace.scenario.actuator for trace in traces)
+    reacts = any(np.nan_to_num(trace.reaction).any() for trace in traces)
+    return ["force"] * drives + ["reaction"] * reacts
 
 
 def _page(height: float) -> Figure:
@@ -164,9 +173,10 @@ def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
 
 def _name(trace: Trace, name: str, network: bool) -> str:
     """An axis' name with its unit."""
-    unit = style.units(trace)["x" if name == "spread" else name]
-    if name == "spread":
-        return f"max − min x ({unit})"
+    unit = style.units(trace)[{"spread": "x", "force": "u", "reaction": "u"}.get(name, name)]
+    if name in ("spread", "force", "reaction"):
+        words = {"spread": "max − min x", "force": "delivered", "reaction": "reaction"}
+        return f"{'mean ' * (network and name != 'spread')}{words[name]} ({unit})"
     words = {"x": style.quantity(trace), "v": "velocity", "u": "control", "s": "sliding variable"}
     return f"{'mean' if network else words[name]} {name} ({unit})"
 
@@ -178,7 +188,11 @@ def _key(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) 
         how = style.ending(trace)
         words = style.cropped(name, 0.3 * 72 * WIDTH, LETTERS) + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=3, label=words))
-    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(traces, "u, s")]
+    banded = ["u", *("delivered" if name == "force" else name for name in _realism(traces)), "s"]
+    if any(panels.rests(trace) for trace in traces):
+        diamond = {"marker": "D", "ms": 5, "lw": 0, "color": style.MUTED, "mec": style.PAPER}
+        handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
+    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(traces, ", ".join(banded))]
 
 
 def _meaning(traces: Sequence[Trace], names: str) -> list[Line2D | Patch]:

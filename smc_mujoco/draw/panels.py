@@ -13,12 +13,15 @@ from matplotlib.axes import Axes
 
 from smc_mujoco.draw import style
 from smc_mujoco.draw.envelope import columns, end, line, stretches, window
-from smc_mujoco.measure import BAND, scale
+from smc_mujoco.draw.state import HOLD, rubs
+from smc_mujoco.measure import BAND, at_rest, scale
 from smc_mujoco.trace import Trace
 
 COLUMNS = 360  # of a panel
 LAST = 60  # control samples in the close-up of u
 LIGHT = 9  # channels of a network drawn one by one
+BRIEF = 0.98  # of a run: a reaction that is larger for the rest of it is blows; chosen
+MARKED = 12  # rests in a phase portrait
 FINE = 1 / 200  # of a phase portrait's diagonal: how far apart its points are
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
@@ -28,6 +31,8 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "applied": lambda trace: trace.applied,
     "d": lambda trace: trace.d,
     "s": lambda trace: trace.s,
+    "force": lambda trace: trace.force,
+    "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
 }
 
@@ -64,6 +69,8 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
     """Draw a quantity of every trace and set the vertical range."""
     drawn: list[Artist] = []
     ax.set_ylim(limits(traces, name))
+    if name == "reaction":
+        blows(ax, traces)
     for trace, colour, wider in layers(traces, colours):
         y, held = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         mean = y.mean(axis=1)
@@ -77,6 +84,27 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
             last = np.clip(mean[-1], *ax.get_ylim())
             drawn += ax.plot(trace.t[-1], last, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
     return drawn
+
+
+def blows(ax: Axes, traces: Sequence[Trace]) -> None:
+    """Show what lasts of a reaction, and tell of the blows beyond it, which are short and would squash the rest."""
+    sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in traces]
+    peak = max(size.max(initial=0.0) for size in sizes)
+    usual = max(*(float(np.quantile(size, BRIEF)) for size in sizes if size.size), *map(abs, span(traces, "u")))
+    if peak > 2.0 * usual > 0.0:
+        ax.set_ylim(-1.16 * usual, 1.16 * usual)
+        words = f"blows up to {peak:.3g} {style.units(traces[0])['u']}"
+        ax.set_title(words, loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
+
+
+def rests(trace: Trace) -> list[float]:
+    """Where dry friction holds all channels of a machine for HOLD s or longer: its mean x, of the latest times."""
+    if not trace.scenario.realistic or not rubs(trace.scenario):
+        return []
+    still = at_rest(trace).all(axis=1)
+    edges = np.flatnonzero(np.diff(still.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    long = [last for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= HOLD]
+    return [float(trace.x[last].mean()) for last in long[-MARKED:]]
 
 
 def target(ax: Axes, traces: Sequence[Trace]) -> None:
@@ -117,6 +145,8 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
         x, v = x.mean(axis=1), v.mean(axis=1)
         ax.plot(*thinned(x, v), color=colour, lw=1.4 + wider)
         ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=6, zorder=4)
+        for x_rest in rests(trace):
+            ax.plot(x_rest, 0.0, "D", color=colour, ms=5.5, mec=style.PAPER, zorder=4)
         if trace.diverged_at is not None:
             ax.plot(x[-1], v[-1], "X", color=colour, ms=9, mec="white", zorder=5)
     ax.axhline(0.0, color=style.RULE, lw=0.9, zorder=1)

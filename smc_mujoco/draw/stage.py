@@ -1,7 +1,8 @@
 """The scene of a film: one machine a trace, side by side, under one camera that sees them all.
 
-Machines come from `plant.spec()` and stand `plant.lane` apart. The camera looks as the plant's own camera `look` does,
-from the nearest place that keeps every machine, wherever its trace takes it, inside the room that the page leaves.
+Machines are the scenarios' own mechanisms, with all that they touch, and stand `plant.lane` apart, or further where
+they are wider. The camera looks as the plant's own camera `look` does, from the nearest place that keeps every machine,
+wherever its trace takes it, inside the room that the page leaves.
 """
 
 import dataclasses
@@ -11,12 +12,17 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco import assembly
 from smc_mujoco.draw import arrows, camera, style
-from smc_mujoco.plant import Plant, model_path
+from smc_mujoco.draw.state import shapes
+from smc_mujoco.part import ROTOR, joints
+from smc_mujoco.plant import model_path
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
 SHOWN = 6  # channels of a network that a film shows: more would hide behind the next machine
+AISLE = 0.05  # m between machines, chosen
+SEEN = 2  # the last group of tendons that MuJoCo draws by default
 POSES = 24  # poses of each trace that must be in the picture
 QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 24, "numstacks": 14, "numquads": 1}  # looks and speed
 
@@ -30,18 +36,17 @@ class Stage:
     """
 
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], room: camera.Room):
-        plants = [small(trace.scenario.plant) for trace in traces]
-        self.shown = [plant.n for plant in plants]
-        self.model = compose(plants, size)
+        scenarios = [small(trace.scenario) for trace in traces]
+        self.shown = [scenario.plant.n for scenario in scenarios]
+        self.model = compose(scenarios, size)
         self.data = mujoco.MjData(self.model)
-        self.rail = rail(plants[0])
-        self.joints = [
-            [self.model.actuator(f"m{k}/{u.name}").trnid[0] for u in plant.spec().actuators]
-            for k, plant in enumerate(plants)
-        ]
-        self.units = [self.rail if np.isfinite(self.rail) else arrows.CHAIN if plant.n > 1 else 1.0 for plant in plants]
-        self.shapes = [shapes(plant, trace.scenario) for plant, trace in zip(plants, traces, strict=True)]
-        self.dressed = [-1] * len(plants)
+        self.shapes = [shapes(scenario) for scenario in scenarios]
+        self.rails = [rail(scenario, parts[0].model) for scenario, parts in zip(scenarios, self.shapes, strict=True)]
+        names = [[joint.name for joint in joints(assembly.spec([scenario]))] for scenario in scenarios]
+        self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
+        self.rotors = [[self.place(f"m{k}/{ROTOR}{name}") for name in each] for k, each in enumerate(names)]
+        self.units = [arrow_unit(scenario, length) for scenario, length in zip(scenarios, self.rails, strict=True)]
+        self.dressed = [-1] * len(scenarios)
         for k, colour in enumerate(colours):
             self.dress(k, 0.0)
             self.paint(k, colour)
@@ -63,10 +68,10 @@ class Stage:
 
     def dress(self, k: int, time: float) -> None:
         """Give machine k the shape that it has at a time, s: its rod may be longer than the plant's, and may change."""
-        now = sum(time >= start for start, _ in self.shapes[k]) - 1
+        now = sum(time >= shape.time for shape in self.shapes[k]) - 1
         if now == self.dressed[k]:
             return
-        self.dressed[k], (_, single) = now, self.shapes[k][now]
+        self.dressed[k], single = now, self.shapes[k][now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
             if name and name != "floor":
@@ -77,10 +82,22 @@ class Stage:
         """Colour the accent of machine k."""
         self.model.mat(f"m{k}/accent").rgba[:3] = np.array(style.rgb(colour)) / 255
 
-    def pose(self, k: int, x: np.ndarray) -> None:
-        """Put machine k's channels at x, (shown,) rad or m; a cart stays on its rail."""
-        for joint, value in zip(self.joints[k], np.clip(x, -self.rail / 2, self.rail / 2), strict=True):
-            self.data.qpos[self.model.jnt_qposadr[joint]] = value
+    def place(self, name: str) -> int | None:
+        """Where a joint of that name lies in qpos; None if there is none."""
+        joint = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name)
+        return None if joint < 0 else int(self.model.jnt_qposadr[joint])
+
+    def pose(self, k: int, x: np.ndarray, ahead: np.ndarray | None = None) -> None:
+        """Put machine k's channels at x, (shown,) rad or m; a cart stays on its rail.
+
+        Args:
+          ahead: how far their rotors are ahead of them, (shown,) rad or m; default: not at all.
+        """
+        x = np.clip(x, -self.rails[k] / 2, self.rails[k] / 2)
+        self.data.qpos[self.model.jnt_qposadr[self.joints[k]]] = x
+        for rotor, value in zip(self.rotors[k], x if ahead is None else x + ahead, strict=True):
+            if rotor is not None:
+                self.data.qpos[rotor] = value
 
     def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
         """The picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow)."""
@@ -94,7 +111,8 @@ class Stage:
         """For each machine, the corners of its geoms' boxes over the poses of its trace, (points, 3) m."""
         model = self.model
         owner = [model.body(model.body_rootid[body]).name.partition("/")[0] for body in model.geom_bodyid]
-        mine = [np.array([name == f"m{k}" for name in owner]) for k in range(len(traces))]
+        solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+        mine = [np.array([name == f"m{k}" for name in owner]) & solid for k in range(len(traces))]
         found = []
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             for k, trace in enumerate(traces):
@@ -111,6 +129,9 @@ def settle(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Work out where everything is at data.qpos."""
     mujoco.mj_kinematics(model, data)
     mujoco.mj_camlight(model, data)
+    if (model.tendon_group <= SEEN).any():
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
 
 
 def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
@@ -120,58 +141,89 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return np.einsum("gij,gcj->gci", data.geom_xmat.reshape(-1, 3, 3), local) + data.geom_xpos[:, None]
 
 
-def shapes(plant: Plant, scenario: Scenario) -> list[tuple[float, mujoco.MjModel]]:
-    """The plant as it is from each time on, s: as the run starts, and after its jump."""
-    steps = [0] if scenario.jump is None else [0, scenario.jump_step]
-    return [(step * scenario.physics_step, plant.load(scenario.factors(step))) for step in steps]
+def small(scenario: Scenario) -> Scenario:
+    """The scenario with the channels that are shown."""
+    plant = scenario.plant
+    if plant.n <= SHOWN:
+        return scenario
+    cut = dataclasses.replace(plant, n=SHOWN, x0=plant.x0[:SHOWN])
+    return dataclasses.replace(scenario, plant=cut, x0=scenario.x0[:SHOWN], v0=scenario.v0[:SHOWN])
 
 
-def small(plant: Plant) -> Plant:
-    """The plant with the channels that are shown."""
-    n = min(plant.n, SHOWN)
-    return dataclasses.replace(plant, n=n, x0=plant.x0[:n])
-
-
-def rail(plant: Plant) -> float:
+def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
     """Length of the rail, m: of what does not move, along x. A pendulum has none: inf."""
-    if plant.unit == "rad":
-        return np.inf
-    model = plant.load()
+    return np.inf if scenario.plant.unit == "rad" else float(2 * np.abs(still(model)[..., 0]).max())
+
+
+def arrow_unit(scenario: Scenario, length: float) -> float:
+    """What arrows.draw scales the arrows of a machine by."""
+    return length if np.isfinite(length) else arrows.CHAIN if scenario.plant.n > 1 else 1.0
+
+
+def still(model: mujoco.MjModel) -> np.ndarray:
+    """The corners of each thing that does not move, but for planes, (things, 8, 3) m."""
     data = mujoco.MjData(model)
     settle(model, data)
-    still = (model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
-    return float(2 * np.abs(boxes(model, data)[still][..., 0]).max())
+    shown = (model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    return boxes(model, data)[shown]
 
 
-def lane(plant: Plant) -> np.ndarray:
-    """From one machine to the next, m: the plant's lane, laid across the picture where it nearly lies so."""
-    step, across = np.array(plant.lane), np.array(plant.spec().camera("look").alt.xyaxes[:3])
+def lane(scenarios: Sequence[Scenario]) -> np.ndarray:
+    """From one machine to the next, m: the plant's lane, laid across the picture where it nearly lies so.
+
+    Longer where machines that are more than their plant's equation would stand in each other's way.
+    """
+    plant = scenarios[0].plant
+    look = assembly.spec(scenarios[:1]).camera("look")
+    step, across = np.array(plant.lane), np.array(look.alt.xyaxes[:3])
     length, across = np.linalg.norm(step), across / np.linalg.norm(across)
-    return length * across if abs(step @ across) > 0.7 * length else step
+    step = length * across if abs(step @ across) > 0.5 * length else step
+    if not any(scenario.realistic for scenario in scenarios):
+        return step
+    things = [still(assembly.model([scenario])) for scenario in scenarios]
+    low, high = [corners.min(axis=1)[:, :2] for corners in things], [corners.max(axis=1)[:, :2] for corners in things]
+    for stretch in np.arange(1.0, 20.0, 0.05):
+        gaps = []
+        for j, k in itertools.combinations(range(len(things)), 2):
+            by = (k - j) * stretch * step[:2]
+            apart = np.maximum(low[k][:, None] + by - high[j], low[j] - high[k][:, None] - by)
+            gaps.append(apart.max(axis=2).min())
+        if min(gaps, default=AISLE) >= AISLE:
+            return stretch * step
+    return step
 
 
-def compose(plants: Sequence[Plant], size: tuple[int, int]) -> mujoco.MjModel:
+def compose(scenarios: Sequence[Scenario], size: tuple[int, int]) -> mujoco.MjModel:
     """One scene with machine k's names prefixed m<k>/, and a camera named film for pictures of `size` px."""
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     for name, value in QUALITY.items():
         setattr(spec.visual.quality, name, value)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    for k, plant in enumerate(plants):
-        machine = plant.spec()
-        for item in [
-            machine.geom("floor"),
-            machine.material("floor"),
-            *machine.lights,
-            *machine.keys,
-            *machine.textures,
-        ]:
-            machine.delete(item)
+    step = lane(scenarios)
+    for k, scenario in enumerate(scenarios):
+        machine = bare(assembly.spec([scenario]))
         if k == 0:
             spec.option, spec.compiler = machine.option, machine.compiler
-        place = spec.worldbody.add_frame(pos=lane(plant) * (k - (len(plants) - 1) / 2))
+        place = spec.worldbody.add_frame(pos=step * (k - (len(scenarios) - 1) / 2))
         place.attach_body(machine.body("machine"), f"m{k}/", "")
     spec.material("floor").emission = 0.13  # nearly the white of the page below
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)
-    width = np.linalg.norm(plants[0].lane) * len(plants)
+    width = np.linalg.norm(step) * len(scenarios)
     spec.stat.center, spec.stat.extent, spec.stat.meansize = (0.0, 0.0, 0.5), 0.6 * width + 1.5, 0.1
     return spec.compile()
+
+
+def bare(machine: mujoco.MjSpec) -> mujoco.MjSpec:
+    """The mechanism without its surroundings, and without what only acts: pictures are posed, not simulated."""
+    for item in [
+        *machine.pairs,
+        *machine.sensors,
+        *machine.actuators,
+        machine.geom("floor"),
+        machine.material("floor"),
+        *machine.lights,
+        *machine.keys,
+        *machine.textures,
+    ]:
+        machine.delete(item)
+    return machine

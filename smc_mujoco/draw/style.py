@@ -35,6 +35,9 @@ NAMES = {  # a law of your own is called as you call it
 }
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
+# Friction and contact: of a grid of colours one of the farthest in CIELAB from the laws', the disturbance's and
+# paper, as seen with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
+REACTION = "#9018F0"
 
 RC = {
     "font.family": "DejaVu Sans",

@@ -1,6 +1,7 @@
 """Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
 
-stage.py has the scene, arrows.py what acts on it, caption.py the words, charts.py the charts. Pictures are made and
+stage.py has the scene, arrows.py what acts on it, state.py what holds or hits it, caption.py the words, charts.py the
+charts. Pictures are made and
 written one by one: a film's length costs time but no memory.
 """
 
@@ -14,10 +15,10 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco import gl
-from smc_mujoco.draw import arrows, style
+from smc_mujoco.draw import arrows, state, style
 from smc_mujoco.draw.caption import Caption
 from smc_mujoco.draw.charts import Charts
-from smc_mujoco.draw.envelope import end, finite
+from smc_mujoco.draw.envelope import end, finite, windows
 from smc_mujoco.draw.stage import Stage
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
@@ -189,28 +190,38 @@ def frames(
     traces = [finite(trace) for trace in traces]
     longest = arrows.longest(traces)
     acts = [arrows.acts(trace, times, gap) for trace in traces]
-    caption = Caption(traces, names, colours, title, above, scale, longest)
+    told = [state.told(trace, times, max(state.HOLD, gap)) for trace in traces]
+    caption = Caption(traces, names, colours, title, above, scale, longest, told)
     charts = Charts(traces, names, colours, (size[0], below), scale)
     with Stage(traces, colours, above, caption.room) as stage:
         caption.put(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        ahead = [rotors(trace, times, gap)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         shown, picture = np.empty(0), np.empty(0)
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
             for k, colour in enumerate(colours):
                 stage.dress(k, time)
-                stage.pose(k, places[k][frame])
+                stage.pose(k, places[k][frame], ahead[k][frame])
                 stage.paint(k, style.FAILED if failed[k] else colour)
                 for i in range(0 if failed[k] else stage.shown[k]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
             ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
-            state = np.concatenate([*(place[frame] for place in places), failed, stage.dressed, ends])
-            if len(state) != len(shown) or np.abs(state - shown).max() > SEEN:
-                shown, picture = state, stage.render(drawn)
-            yield np.concatenate([caption.over(picture, time, failed), charts.at(time)])
+            moved = [part[frame] for part in (*places, *ahead)]
+            now = np.concatenate([*moved, failed, stage.dressed, ends])
+            if len(now) != len(shown) or np.abs(now - shown).max() > SEEN:
+                shown, picture = now, stage.render(drawn)
+            words = tuple(each[frame] for each in told)
+            yield np.concatenate([caption.over(picture, time, failed, words), charts.at(time)])
 
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
     """x at the times, (times, n), between samples on a straight line; after a failure the last finite one."""
     return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)
+
+
+def rotors(trace: Trace, times: np.ndarray, gap: float) -> np.ndarray:
+    """How far the rotors are ahead of their joints, (times, n): on the flank that pushes, on the mean over a frame."""
+    edges = np.concatenate([[times[0] - gap], times])
+    return 0.5 * state.play(trace.scenario) * windows(trace.t, state.flanks(trace), edges).mean
