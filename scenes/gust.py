@@ -1,0 +1,26 @@
+"""How strong a gust on the bob does each law bear before the pendulum falls?
+
+A gust pushes the bob sideways for 0.4 s. It is a force in space, so its torque F l cos x is less the further the
+pendulum leans. Who loses it falls to the floor.
+
+Look for: the gust that is one too many for each law, and how long the others need to settle.
+"""
+
+import smc_mujoco as smc
+
+scene = smc.Scene(
+    title="Inverted pendulum in a gust",
+    conditions={
+        f"{force} N": smc.paper.comparison(
+            "inverted_pendulum",
+            duration=4.0,
+            changes={"contact": "floor", "disturbance": smc.Gust(force, time=1.0, width=0.4)},
+        )
+        for force in (4, 8, 16, 32)
+    },
+    film="8 N",
+    answers=("settling_time", "peak", "max_u"),
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)

@@ -1,0 +1,26 @@
+"""Does a double well built of two springs behave as Duffing's equation says?
+
+Two preloaded springs pull the cart to either side of a hump: they snap through. Wells and their stiffness are matched
+to alpha and beta; the shape between them is the springs' own.
+
+Look for: how little the laws' scores change from the equation to the mechanism.
+"""
+
+import smc_mujoco as smc
+
+scene = smc.Scene(
+    title="Duffing as a snap-through of two springs",
+    conditions={
+        name: smc.paper.comparison("duffing", duration=5.0, changes={"mechanism": name})
+        for name in ("equation", "springs")
+    },
+    film="springs",
+    answers=("settling_time", "overshoot", "ultimate_bound"),
+    facts={
+        "springs": "depart from the equation by "
+        f"{100 * smc.deviation(smc.plant('duffing'), 'springs'):.0f} % of the largest acceleration",
+    },
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
