@@ -11,7 +11,9 @@ import smc_mujoco as smc
 scene = smc.Scene(
     title="Duffing as a snap-through of two springs",
     conditions={
-        name: smc.paper.comparison("duffing", duration=5.0, changes={"mechanism": name})
+        name: smc.paper.comparison(
+            "duffing", laws=("observer_free", "super_twisting"), duration=5.0, changes={"mechanism": name}
+        )
         for name in ("equation", "springs")
     },
     film="springs",
