@@ -5,6 +5,7 @@ number in some field of the model, which a Batch holds for every simulation on i
 """
 
 import copy
+import dataclasses
 from collections.abc import Hashable, Iterator, Sequence
 
 import mujoco
@@ -16,6 +17,7 @@ from smc_mujoco.part import ROTOR, Part, joint_ids
 from smc_mujoco.plant import Field, array, ready
 from smc_mujoco.scenario import Scenario
 
+WAY = 400  # places on the way to a start that must be free: 1 cm apart on the longest rail
 INSIDE = 1e-3  # m: chosen, as a run that starts deeper than a contact gives way begins with a blow from nowhere
 
 
@@ -84,10 +86,13 @@ def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.
 
 
 def check_starts(scenarios: Sequence[Scenario]) -> None:
-    """Whether scenarios of one structure start free of their obstacles.
+    """Whether scenarios of one structure start on the free side of their obstacles.
+
+    The way there from the plant's own start, or from 0 where that is not free, must cross none: what begins beyond a
+    stop, or half-way through, would be no run of this mechanism.
 
     Raises:
-      ScenarioError: one starts inside.
+      ScenarioError: one starts inside an obstacle or beyond it.
     """
     if scenarios[0].contact.kind == "none":
         return
@@ -95,15 +100,29 @@ def check_starts(scenarios: Sequence[Scenario]) -> None:
     data = mujoco.MjData(compiled)
     for scenario in scenarios:
         made = numbered(compiled, scenario)
-        data.qpos[:], _ = start(made, scenario)
-        mujoco.mj_fwdPosition(made, data)
-        for touching in data.contact:
-            if touching.dist < -INSIDE:
-                first, second = (made.geom(int(geom)).name for geom in touching.geom)
-                raise ScenarioError(
-                    f"x0 {', '.join(f'{x:g}' for x in scenario.x0)} puts {scenario.plant.name}'s {first} "
-                    f"{-touching.dist:.2g} m inside {second} of contact {scenario.contact.kind!r}: give another x0"
-                )
+        there = start(made, scenario)[0]
+        home = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
+        if _deepest(made, data, home) is not None:
+            home = made.qpos0
+        inside = _deepest(made, data, there)
+        way = (_deepest(made, data, (1.0 - part) * home + part * there) for part in np.linspace(0.0, 1.0, WAY))
+        if hit := inside or next(filter(None, way), None):
+            place = "inside" if inside else "beyond"
+            raise ScenarioError(
+                f"x0 {', '.join(f'{x:g}' for x in scenario.x0)} puts {scenario.plant.name}'s {hit[0]} {place} "
+                f"{hit[1]} of contact {scenario.contact.kind!r}: give another x0"
+            )
+
+
+def _deepest(made: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
+    """The two geoms that overlap at qpos by more than INSIDE, if any do."""
+    data.qpos[:] = qpos
+    mujoco.mj_fwdPosition(made, data)
+    for touching in data.contact:
+        if touching.dist < -INSIDE:
+            first, second = (made.geom(int(geom)).name for geom in touching.geom)
+            return first, second
+    return None
 
 
 def fields(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> Iterator[Field]:

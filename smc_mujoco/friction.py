@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Iterator
 
 import mujoco
+import numpy as np
 
 from smc_mujoco.errors import ScenarioError, number
 from smc_mujoco.part import PASSIVE, Friction, dof_ids, joint_ids, joints
@@ -20,6 +21,7 @@ SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # d at and away from zero; the width
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
 COULOMB, STATIC, STRIBECK = 3, 4, 5  # of actuator_biasprm
+DAMPED = 0.2  # of bristles, their damping over sqrt(stiffness inertia)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,9 +86,9 @@ class LuGre(Friction):
       stiffness: N m/rad (N/m). The default is chosen: a hundredth of the paper's 1e5, as its bristles would ring at up
         to 900 rad/s on the plants here, and these, at up to 89 rad/s, are stable and resolved also at h = 1 ms. They
         bend 0.1 mrad under 0.1 N m.
-      damping: N m s/rad (N s/m), more than stiffness h, or bristles that MuJoCo bends a step late ring on. The
-        default is chosen: less than the paper's sqrt(stiffness inertia), 11 for the pendulum, as implicitfast counts
-        damping h as inertia: 0.8 % of the pendulum's 0.125 kg m^2 at h = 0.25 ms.
+      damping: N m s/rad (N s/m), more than stiffness h, or bristles that MuJoCo bends a step late ring on. None: 0.2
+        sqrt(stiffness inertia) of each joint, 2.2 for the pendulum. That is a fifth of the paper's rule, chosen, as
+        implicitfast counts damping h as inertia: 0.4 % of the pendulum's at h = 0.25 ms. Half as much rings too long.
     """
 
     stateful = True
@@ -95,13 +97,14 @@ class LuGre(Friction):
     static: float
     stribeck: float
     stiffness: float = 1e3
-    damping: float = 4.0
+    damping: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("coulomb", "static", "stribeck", "stiffness"):
             value = number(f"LuGre's {name}", getattr(self, name), above=0.0, most=LARGEST)
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "damping", number("LuGre's damping", self.damping, least=0.0, most=LARGEST))
+        if self.damping is not None:
+            object.__setattr__(self, "damping", number("LuGre's damping", self.damping, least=0.0, most=LARGEST))
         if self.static < self.coulomb:
             raise ScenarioError(
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"
@@ -115,14 +118,15 @@ class LuGre(Friction):
             friction.set_to_dcmotor(
                 motorconst=(1e-9, 1e-9),  # MuJoCo wants a motor: one too weak to notice
                 resistance=1.0,
-                lugre=(self.stiffness, self.damping, self.coulomb, self.static, self.stribeck),
+                lugre=(self.stiffness, self.damping or 1.0, self.coulomb, self.static, self.stribeck),
                 ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),
             )
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         bristles = [model.actuator(PASSIVE + model.joint(joint).name).id for joint in joint_ids(model)]
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
-        yield Field("actuator_dynprm", (bristles, DAMPING), self.damping)
+        damping = DAMPED * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)])
+        yield Field("actuator_dynprm", (bristles, DAMPING), damping if self.damping is None else self.damping)
         yield Field("actuator_biasprm", (bristles, COULOMB), self.coulomb)
         yield Field("actuator_biasprm", (bristles, STATIC), self.static)
         yield Field("actuator_biasprm", (bristles, STRIBECK), self.stribeck)

@@ -1,9 +1,11 @@
 """What users give for a scenario's fields, made into what the fields hold, or refused in one sentence."""
 
+import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
+import mujoco
 import numpy as np
 
 from smc_mujoco.backlash import Backlash
@@ -14,6 +16,7 @@ from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law
 from smc_mujoco.part import Part
 from smc_mujoco.plant import Plant
+from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
 
 P = TypeVar("P", bound=Part)
@@ -22,6 +25,8 @@ INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; halving it changes no score of a realistic plant by 3 %, see tests/test_convergence.py
 FAR = 1e6  # initial states beyond this have already diverged
+
+SEEN, DIFFERENCED = estimator("measured"), estimator("filtered_difference")  # these very objects stand for left out
 
 
 class FilledStep(float):
@@ -42,6 +47,18 @@ def component(value: object, kind: str) -> Component:
         return value
     field = {"law": "law", "estimator": "velocity"}[kind]
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
+
+
+def velocity(value: object, sensor: Encoder | None) -> Component:
+    """An estimator; the default one for the sensor where none is given."""
+    if value is None or left_out(value):
+        return SEEN if sensor is None else DIFFERENCED
+    return component(value, "estimator")
+
+
+def left_out(value: object) -> bool:
+    """Whether a default was filled in that depends on other fields."""
+    return isinstance(value, FilledStep | FilledName) or value is SEEN or value is DIFFERENCED
 
 
 def physics_step(step: object, period: float, realistic: bool, least: float) -> float:
@@ -118,6 +135,21 @@ def mechanism(value: object, plant: Plant) -> str:
     if not isinstance(value, str) or value not in names:
         raise unknown(f"mechanism of {plant.name}", value, names)
     return value
+
+
+def check_numbers(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
+    """Raise ScenarioError for parameter factors that a plant's mechanism cannot have."""
+    values = plant.values(factors)
+    if name != "equation":
+        list(plant.mechanisms[name].fields(built(plant, name), values))
+
+
+@functools.lru_cache(maxsize=16)
+def built(plant: Plant, name: str) -> mujoco.MjModel:
+    """A plant's other mechanism, compiled."""
+    spec = plant.spec()
+    plant.mechanisms[name].edit(spec)
+    return spec.compile()
 
 
 def several(value: object) -> tuple[Any, ...]:

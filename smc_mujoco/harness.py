@@ -104,7 +104,7 @@ def _decide(base, row, log, k):
         if call(int(row[slot.LAW]), base + 8 * given, _at(base, row, slot.GAINS), memory, base + 8 * out) != 0:
             return slot.LAW_RAISED
         u = min(max(row[out], -row[slot.LIMIT]), row[slot.LIMIT])
-        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) < HUGE):
+        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) * max(1.0, row[slot.SCALE]) < HUGE):
             return slot.NOT_FINITE
         row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
     return slot.FINE

@@ -181,7 +181,8 @@ class Loop:
             y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
             out = guarded(law, self.law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
-            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and min(abs(u[i]), scenario.u_max) < HUGE):
+            asked = min(abs(u[i]), scenario.u_max) * max(1.0, self.scale)
+            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
         return np.clip(u, -scenario.u_max, scenario.u_max), s
 

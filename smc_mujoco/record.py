@@ -38,6 +38,7 @@ def describe(scenario: Scenario) -> dict:
             "mismatch": dict(scenario.mismatch),
             "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
             "mechanism": scenario.mechanism,
+            "left_out": scenario.left_out,
         }
         | {name: _parts(getattr(scenario, name)) for name in PARTS}
     )
@@ -51,7 +52,7 @@ def restore(data: dict) -> Scenario:
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {"mechanism": data["mechanism"]} if "mechanism" in data else {}
-    return Scenario(
+    scenario = Scenario(
         **fields,
         plant=find_plant(plant.pop("name"), **plant),
         law=_find(data["law"], "law", laws()),
@@ -62,6 +63,8 @@ def restore(data: dict) -> Scenario:
         mismatch=data["mismatch"],
         jump=data["jump"] and Jump(**data["jump"]),
     )
+    again = dataclasses.replace(scenario, **dict.fromkeys(data.get("left_out", ())))
+    return again if again == scenario else scenario  # the defaults of another version stay what they were
 
 
 def _component(c: Component) -> dict:

@@ -77,7 +77,7 @@ def stream(
         except NotCompilable as error:
             warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
             slow.append(index)
-    for indices in groups.values():
+    for indices in [*groups.values(), *([index] for index in slow)]:
         assembly.check_starts([scenarios[i] for i in indices])
     for indices in groups.values():
         for chunk in _chunks(scenarios, indices, threads):

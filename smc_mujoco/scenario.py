@@ -15,7 +15,8 @@ from smc_mujoco.component import Template
 from smc_mujoco.conditions import Jump, Noise, parameter_factors
 from smc_mujoco.contact import Contact
 from smc_mujoco.errors import ScenarioError, number, shown, whole
-from smc_mujoco.estimators import Estimator, estimator
+from smc_mujoco.estimators import Estimator
+from smc_mujoco.frozen import frozen
 from smc_mujoco.law import Law
 from smc_mujoco.noise import PROCESS
 from smc_mujoco.part import Actuator, Friction
@@ -27,8 +28,7 @@ SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
 MOST_STEPS = 100_000_000  # per run: minutes of computing
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
-REST, QUIET, FREE, SEEN = Constant(0.0), Noise(), Contact("none"), estimator("measured")
-DIFFERENCED = estimator("filtered_difference")
+REST, QUIET, FREE = Constant(0.0), Noise(), Contact("none")
 MISSING: Any = None  # a field left out, filled in when the scenario is made
 
 
@@ -133,10 +133,7 @@ class Scenario:
         if not isinstance(self.sensor, Encoder | None):
             raise ScenarioError(f"sensor is {shown(self.sensor)}: give smc.Encoder(counts=...) or None")
         put("law", given.component(self.law, "law"))
-        velocity = self.velocity
-        if velocity is None or velocity is SEEN or velocity is DIFFERENCED:
-            velocity = SEEN if self.sensor is None else DIFFERENCED
-        put("velocity", given.component(velocity, "estimator"))
+        put("velocity", given.velocity(self.velocity, self.sensor))
         put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
         put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
@@ -196,12 +193,17 @@ class Scenario:
         if self.jump is not None and self.jump.time >= self.duration:
             raise ScenarioError(f"jump at {self.jump.time:g} s comes after the end of the run at {self.duration:g} s")
         for step in (0, self.samples * self.steps):
-            self.plant.values(self.factors(step))
+            given.check_numbers(self.plant, self.mechanism, frozen(self.factors(step)))
 
     @property
     def realistic(self) -> bool:
         """Whether the mechanism is more than the plant's equation."""
         return bool(self.friction or self.actuator or self.contact.kind != "none" or self.mechanism != "equation")
+
+    @property
+    def left_out(self) -> list[str]:
+        """Fields whose defaults depend on others: dataclasses.replace finds them anew."""
+        return [name for name in ("physics_step", "integrator", "velocity") if given.left_out(getattr(self, name))]
 
     @property
     def steps(self) -> int:

@@ -19,6 +19,10 @@ from smc_mujoco.errors import ScenarioError, number, whole
 from smc_mujoco.part import Part, joint_ids
 from smc_mujoco.plant import Field
 
+# Of a physics step, by which readings are due and taken early: MuJoCo compares sums of steps, which drift by rounding.
+EARLY = 0.5
+MOST_READINGS = 100_000  # under way at once: chosen, 1 MB a channel
+
 
 @dataclasses.dataclass(frozen=True)
 class Encoder(Part):
@@ -67,7 +71,11 @@ class Encoder(Part):
         return math.ceil(self.delay / (self.period or step) - 1e-9) + 2 if self.late else 0
 
     def check(self, step: float) -> None:
-        """Raise ScenarioError for times that are no whole number of physics steps."""
+        """Raise ScenarioError for times that are no whole number of physics steps, or too many to remember."""
+        if self.delay / (self.period or step) > MOST_READINGS:
+            raise ScenarioError(
+                f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"
+            )
         for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
             if abs(time / step - round(time / step)) > 1e-6:
                 raise ScenarioError(
@@ -79,7 +87,7 @@ class Encoder(Part):
         """Delay and period of every channel's two sensors."""
         if self.late:
             at = sensor_ids(model)
-            yield Field("sensor_delay", at, self.delay)
+            yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
             yield Field("sensor_interval", (at, 0), self.period or 0.0)
 
 
@@ -104,4 +112,5 @@ def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         value = data.qpos[model.jnt_qposadr[joint]]
         if model.sensor_type[sensor] != position:
             value = data.qvel[model.jnt_dofadr[joint]]
-        mujoco.mj_initSensorHistory(model, data, sensor, gap * np.arange(-count, 0.0), np.full((count, 1), value), -gap)
+        times, values = gap * np.arange(-count, 0.0), np.full((count, 1), value)
+        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -gap - EARLY * model.opt.timestep)

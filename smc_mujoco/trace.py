@@ -31,7 +31,7 @@ class Trace:
       s: sliding variable as the law returns it, (K + 1, n).
       d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
       r: reference, (K + 1, n).
-      force: what the actuator delivers at the joint, (K + 1, n), N or N m.
+      force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
         over the control period that ends at t_k, so that no blow is missed; at t = 0 they are 0.
       scenario: the Scenario of the run.
