@@ -30,6 +30,7 @@ gallery: setup ## the clips that README shows
 bench: ## speed, beside bare MuJoCo and other packages
 	@./setup.sh requirements-bench.lock
 	$(BIN)/python benchmarks/speed.py
+	$(BIN)/python benchmarks/realistic.py
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

@@ -3,7 +3,8 @@
 A gust pushes the bob sideways for 0.4 s. It is a force in space, so its torque F l cos x is less the further the
 pendulum leans. Who loses it falls to the floor.
 
-Look for: the gust that is one too many for each law, and how long the others need to settle.
+Look for: the gust that is one too many for each law, and how long the others need to settle; who is thrown down may
+also bounce off the floor and get up again.
 """
 
 import smc_mujoco as smc

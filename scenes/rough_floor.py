@@ -3,7 +3,7 @@
 The Duffing mass slides on a bed under its own weight: friction is a real contact, mu M grav, between block and lining.
 The springs push it off centre, the floor holds it where it stops.
 
-Look for: the steady error of the smooth law, which grows with mu, beside the switching laws, which crawl on.
+Look for: the steady error of the smooth law, anywhere within what mu holds, beside the switching laws, which crawl on.
 """
 
 import smc_mujoco as smc

@@ -19,8 +19,8 @@ scene = smc.Scene(
     film="springs",
     answers=("settling_time", "overshoot", "ultimate_bound"),
     facts={
-        "springs": "depart from the equation by "
-        f"{100 * smc.deviation(smc.plant('duffing'), 'springs'):.0f} % of the largest acceleration",
+        plant: f"springs miss its equation by {100 * smc.deviation(plant, 'springs'):.0f} % of the largest force"
+        for plant in ("duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
     },
 )
 

@@ -11,7 +11,7 @@ import smc_mujoco as smc
 scene = smc.Scene(
     title="Inverted pendulum, from the floor and back",
     conditions={
-        name: smc.paper.comparison("inverted_pendulum", duration=6.0, changes={"contact": "floor", "x0": 2.43} | more)
+        name: smc.paper.comparison("inverted_pendulum", duration=8.0, changes={"contact": "floor", "x0": 2.43} | more)
         for name, more in {
             "6 N m": {"u_max": 6.0},
             "3 N m": {"u_max": 3.0},

@@ -10,12 +10,14 @@ from collections.abc import Hashable, Iterator
 
 import mujoco
 
-from smc_mujoco.errors import number
+from smc_mujoco.errors import ScenarioError, number
 from smc_mujoco.part import Actuator, drive_ids, drives
 from smc_mujoco.plant import LARGEST, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
 RESISTANCE, CONSTANT = 0, 1  # of actuator_gainprm: ohm, and N m/A at the joint
+SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
+LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COGGING, POLES = 0, 1  # of actuator_biasprm: N m at the joint, and periods a radian of it
 
@@ -98,7 +100,7 @@ class DCMotor(Drive):
     """Motor and gearbox on a voltage amplifier: V = scale u, the voltage whose stall torque is u.
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
-        torque = gear k i + gear cogging sin(gear poles x)        |i| <= current
+        torque = gear k i + gear cogging sin(gear poles x)        |torque| <= gear k current
         inertia at the joint: gear^2 rotor_inertia more
 
     The law is not told: back-EMF takes (gear k)^2/R v, inductance delays by L/R. As gear k goes to 0 without limits
@@ -139,6 +141,11 @@ class DCMotor(Drive):
             _check(self, name, least=0.0)
         for name in ("voltage", "current"):
             _check(self, name, above=0.0, most=math.inf)
+        if not self.constant >= LEAST_CONSTANT or not self.scale <= LARGEST:
+            raise ScenarioError(
+                f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
+                f"resistance of {self.resistance:g} ohm: give a stronger motor"
+            )
 
     @property
     def constant(self) -> float:
@@ -155,7 +162,7 @@ class DCMotor(Drive):
             actuator.set_to_dcmotor(
                 motorconst=(self.constant, self.constant),
                 resistance=self.resistance,
-                inductance=(self.inductance, 0.0),
+                inductance=(self.inductance if self.delay else 0.0, 0.0),
                 ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE),
             )
             actuator.ctrllimited, actuator.ctrlrange = True, (-1.0, 1.0)
@@ -166,7 +173,7 @@ class DCMotor(Drive):
         torque = self.constant * self.current
         yield Field("actuator_gainprm", (ids, RESISTANCE), self.resistance)
         yield Field("actuator_gainprm", (ids, CONSTANT), self.constant)
-        yield Field("actuator_dynprm", (ids, TIME_CONSTANT), self.inductance / self.resistance)
+        yield Field("actuator_dynprm", (ids, TIME_CONSTANT), self.delay)
         yield Field("actuator_biasprm", (ids, COGGING), self.gear * self.cogging)
         yield Field("actuator_biasprm", (ids, POLES), self.gear * self.poles)
         yield Field("actuator_ctrlrange", ids, (-self.voltage, self.voltage))
@@ -175,4 +182,9 @@ class DCMotor(Drive):
         yield Field("dof_armature", driven, self.gear**2 * self.rotor_inertia, adds=True)
 
     def structure(self) -> Hashable:
-        return type(self), self.inductance > 0.0
+        return type(self), self.delay > 0.0
+
+    @property
+    def delay(self) -> float:
+        """L/R in s, the winding's time constant; below SUDDEN it counts as 0."""
+        return self.inductance / self.resistance if self.inductance > SUDDEN * self.resistance else 0.0

@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import sensors
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.frozen import frozen
 from smc_mujoco.part import ROTOR, Part, joint_ids
 from smc_mujoco.plant import Field, array, ready
 from smc_mujoco.scenario import Scenario
@@ -32,7 +33,8 @@ def structure(scenario: Scenario) -> Hashable:
     """Equal for scenarios whose mechanisms differ in numbers only."""
     plant = scenario.plant
     built = tuple(part.structure() for part in parts(scenario))
-    return plant.build, plant.fields, plant.n, scenario.mechanism, built
+    edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
+    return plant.build, plant.fields, plant.n, edits, built
 
 
 def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
@@ -44,8 +46,7 @@ def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
     first.contact.edit_on(first.plant, made)
     for part in parts(first):
         part.edit(made)
-    readings = [s.sensor.readings(s.physics_step) for s in scenarios if s.sensor is not None]
-    sensors.buffer(made, max(readings, default=0))
+    sensors.buffer(made, max(s.readings for s in scenarios))
     return made
 
 
@@ -60,10 +61,15 @@ def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
 def numbered(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
     """A copy of the compiled model with the scenario's numbers in it."""
     made = copy.copy(compiled)
-    for name, value in numbers(compiled, scenario, step).items():
-        array(made, name)[:] = value
+    put_numbers(made, compiled, scenario, step)
     mujoco.mj_setConst(made, mujoco.MjData(made))
     return made
+
+
+def put_numbers(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> None:
+    """Write the scenario's numbers into a copy of the compiled model; mj_setConst is left to the caller."""
+    for name, value in numbers(compiled, scenario, step).items():
+        array(made, name)[:] = value
 
 
 def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
@@ -96,28 +102,37 @@ def check_starts(scenarios: Sequence[Scenario]) -> None:
     """
     if scenarios[0].contact.kind == "none":
         return
-    compiled = model(scenarios)
-    data = mujoco.MjData(compiled)
+    scratch, seen = model(scenarios), set()
+    compiled, data = copy.copy(scratch), mujoco.MjData(scratch)
     for scenario in scenarios:
-        made = numbered(compiled, scenario)
-        there = start(made, scenario)[0]
+        place = scenario.plant, scenario.x0, frozen(scenario.factors(0))  # all on which it depends
+        if place not in seen:
+            seen.add(place)
+            put_numbers(scratch, compiled, scenario, 0)
+            check_start(scratch, data, scenario)
+
+
+def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
+    """Raise ScenarioError where a scenario starts inside an obstacle or beyond it."""
+    there = start(made, scenario)[0]
+    inside, beyond = _overlap(made, data, there), None
+    if not inside and scenario.x0 != scenario.plant.x0:
         home = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
-        if _deepest(made, data, home) is not None:
-            home = made.qpos0
-        inside = _deepest(made, data, there)
-        way = (_deepest(made, data, (1.0 - part) * home + part * there) for part in np.linspace(0.0, 1.0, WAY))
-        if hit := inside or next(filter(None, way), None):
-            place = "inside" if inside else "beyond"
-            raise ScenarioError(
-                f"x0 {', '.join(f'{x:g}' for x in scenario.x0)} puts {scenario.plant.name}'s {hit[0]} {place} "
-                f"{hit[1]} of contact {scenario.contact.kind!r}: give another x0"
-            )
+        home = made.qpos0 if _overlap(made, data, home) else home
+        way = (_overlap(made, data, (1.0 - part) * home + part * there) for part in np.linspace(0.0, 1.0, WAY))
+        beyond = next(filter(None, way), None)
+    if hit := inside or beyond:
+        raise ScenarioError(
+            f"x0 {shown(scenario.x0)} puts {scenario.plant.name}'s {hit[0]} {'inside' if inside else 'beyond'} "
+            f"{hit[1]} of contact {scenario.contact.kind!r}: give another x0"
+        )
 
 
-def _deepest(made: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
+def _overlap(made: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
     """The two geoms that overlap at qpos by more than INSIDE, if any do."""
     data.qpos[:] = qpos
-    mujoco.mj_fwdPosition(made, data)
+    mujoco.mj_kinematics(made, data)
+    mujoco.mj_collision(made, data)
     for touching in data.contact:
         if touching.dist < -INSIDE:
             first, second = (made.geom(int(geom)).name for geom in touching.geom)

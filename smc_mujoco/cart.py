@@ -6,7 +6,7 @@ wheels: its block lies on a lining, pressed by its weight through the joint `lif
 
 import mujoco
 
-from smc_mujoco.contact import SOLREF_RUB, SPRINGY, bar, box, hit, rub
+from smc_mujoco.contact import SOLREF_RUB, SPRINGY, bar, box, hit, rub, solid
 
 STOPPING = 0.5  # restitution of rubber buffers: chosen
 FRICTION = 0.1  # of the block on its bed: chosen, so that 1 N stands against springs of 1 to 3 N and commands of 6 N
@@ -17,6 +17,7 @@ SIDES = {"front": -0.10, "back": 0.10}  # where they lie across
 END = 0.20  # m, half the block's length
 LOW, MIDDLE, HIGH = 0.292, 0.342, 0.392  # m, heights of the block
 BUFFER = 0.030  # m, radius
+DEEP = 1.0  # m, a stop behind its face: holds 100 m/s
 REACH = END + BUFFER  # m, from the cart's middle to where it hits
 PIN = 0.020  # m, radius of the post
 SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, the block in its bed at rest, on the four corners of a box
@@ -34,7 +35,9 @@ def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
             box(machine, f"{name}_pad", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384), "ink")
             near, far = sorted((sign * (face + 0.02), sign * (face + 0.10)))
             box(machine, f"{name}_stop", (near, y - 0.042, 0.224), (far, y + 0.042, 0.390), "graphite")
-            hit(spec, (f"{name}_pad", f"{name}_buffer"), restitution)
+            near, far = sorted((sign * face, sign * (face + DEEP)))
+            solid(machine, f"{name}_solid", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384))
+            hit(spec, (f"{name}_solid", f"{name}_buffer"), restitution)
 
 
 def peg(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:

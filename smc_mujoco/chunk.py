@@ -76,6 +76,8 @@ class Chunk:
         self.compiled = assembly.model(scenarios, nuserdata=max(map(len, rows)))
         self.model = assembly.numbered(self.compiled, first)
         self.table[:] = channels(self.model)
+        for packed in rows:
+            packed[row.POSITIONS], packed[row.VELOCITIES] = self.model.nq, self.model.nv
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, len(scenarios), min(threads, len(scenarios)), persistent=True)
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
@@ -119,10 +121,11 @@ class Chunk:
     def fill_histories(self) -> None:
         """Let late sensors have read the initial state before the run."""
         history = self.batch.bind("history")
-        data = mujoco.MjData(self.model)
+        model, data = assembly.numbered(self.compiled, self.first), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
-            data.qpos[:], data.qvel[:] = assembly.start(self.model, scenario)
-            sensors.remember(assembly.numbered(self.compiled, scenario), data)
+            data.qpos[:], data.qvel[:] = assembly.start(model, scenario)
+            assembly.put_numbers(model, self.compiled, scenario, 0)
+            sensors.remember(model, data)
             history[i] = data.history
 
     def advance(self, steps: int, report: Report) -> None:

@@ -27,7 +27,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco.errors import ScenarioError, number, unknown
+from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.part import Part
 from smc_mujoco.plant import Field, Plant
 
@@ -69,7 +69,7 @@ class Contact(Part):
 
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str):
-            raise ScenarioError(f"contact is {self.kind!r}: give the name of a kind, such as 'floor'")
+            raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
         for name, most in (("friction", MOST_FRICTION), ("restitution", LIVELIEST)):
             value = getattr(self, name)
             if value is not None:
@@ -186,6 +186,12 @@ def _pair(
         solreffriction=SOLREF_SLIDE,
         solimp=(impedance, impedance, *REST_OF_SOLIMP),
     )
+
+
+def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
+    """A box that is felt and not seen: what lies behind a face, deep enough that no blow goes through."""
+    block = box(body, name, low, high, "ink")
+    block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
 
 
 def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:

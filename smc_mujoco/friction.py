@@ -87,8 +87,9 @@ class LuGre(Friction):
         to 900 rad/s on the plants here, and these, at up to 89 rad/s, are stable and resolved also at h = 1 ms. They
         bend 0.1 mrad under 0.1 N m.
       damping: N m s/rad (N s/m), more than stiffness h, or bristles that MuJoCo bends a step late ring on. None: 0.2
-        sqrt(stiffness inertia) of each joint, 2.2 for the pendulum. That is a fifth of the paper's rule, chosen, as
-        implicitfast counts damping h as inertia: 0.4 % of the pendulum's at h = 0.25 ms. Half as much rings too long.
+        sqrt(stiffness inertia), of each joint's inertia with the plant's default parameters: 2.2 for the pendulum. That
+        is a fifth of the paper's rule, chosen, as implicitfast counts damping h as inertia: 0.4 % of the pendulum's at
+        h = 0.25 ms. Half as much rings too long.
     """
 
     stateful = True

@@ -15,7 +15,7 @@ from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law
 from smc_mujoco.part import Part
-from smc_mujoco.plant import Plant
+from smc_mujoco.plant import Plant, catalogue
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
 
@@ -26,7 +26,27 @@ LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1
 REALISTIC_STEP = 2.5e-4  # s; halving it changes no score of a realistic plant by 3 %, see tests/test_convergence.py
 FAR = 1e6  # initial states beyond this have already diverged
 
-SEEN, DIFFERENCED = estimator("measured"), estimator("filtered_difference")  # these very objects stand for left out
+
+class FilledVelocity(Component):
+    """An estimator that was left out; dataclasses.replace finds it anew."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Component) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return Component.__hash__(self)
+
+    def __reduce__(self):
+        return filled_velocity, (self.name,)
+
+
+class FilledStart(tuple):
+    """An x0 that was left out; dataclasses.replace finds it anew."""
+
+
+def filled_velocity(name: str) -> FilledVelocity:
+    """The estimator of that name with its default gains, marked as left out."""
+    return FilledVelocity(**vars(estimator(name)))
 
 
 class FilledStep(float):
@@ -52,13 +72,13 @@ def component(value: object, kind: str) -> Component:
 def velocity(value: object, sensor: Encoder | None) -> Component:
     """An estimator; the default one for the sensor where none is given."""
     if value is None or left_out(value):
-        return SEEN if sensor is None else DIFFERENCED
+        return filled_velocity("measured" if sensor is None else "filtered_difference")
     return component(value, "estimator")
 
 
 def left_out(value: object) -> bool:
     """Whether a default was filled in that depends on other fields."""
-    return isinstance(value, FilledStep | FilledName) or value is SEEN or value is DIFFERENCED
+    return isinstance(value, FilledStep | FilledName | FilledVelocity | FilledStart)
 
 
 def physics_step(step: object, period: float, realistic: bool, least: float) -> float:
@@ -80,6 +100,13 @@ def integrator(name: object, realistic: bool) -> str:
     if not isinstance(name, str) or name not in INTEGRATORS:
         raise unknown("integrator", name, INTEGRATORS)
     return name
+
+
+def start(value: object, plant: Plant, kind: str) -> tuple[float, ...]:
+    """x0; where none is given the plant's own, in order from left to right where the pendulums stand in a row."""
+    if value is None or isinstance(value, FilledStart):
+        return FilledStart(sorted(plant.x0) if kind == "bobs" else plant.x0)
+    return state("x0", value, plant.n)
 
 
 def state(name: str, value: object, n: int) -> tuple[float, ...]:
@@ -116,7 +143,19 @@ def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...
         places = [f"a {type(p).__name__}" for p in items]
     if twice := [place for place in places if places.count(place) > 1]:
         raise ScenarioError(f"{name} has {twice[0]} twice, {shown(items)}: give one")
-    return tuple(sorted(items, key=lambda part: isinstance(part, Backlash)))  # which comes after the drive
+    # in one order, whatever the user's, with a Backlash after the drive
+    return tuple(sorted(items, key=lambda part: (isinstance(part, Backlash), type(part).__name__)))
+
+
+def contact_fits(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
+    """Raise ScenarioError where a rod has not the length for which the obstacles stand."""
+    known = catalogue().get(plant.name)
+    length = None if known is None else known.parameters.get("l")
+    if contact.kind != "none" and length is not None and plant.values(factors).l != length:
+        raise ScenarioError(
+            f"contact {contact.kind!r} of {plant.name} stands where l is {length:g} m, and l is "
+            f"{plant.values(factors).l:g} m: leave l as it is"
+        )
 
 
 def contact(value: object, plant: Plant) -> Contact:

@@ -34,9 +34,12 @@ def _at(base, row, name):
 
 
 @njit(error_model="numpy")
-def _escaped(row, table, qpos, qvel):
-    for i in range(int(row[slot.CHANNELS])):
-        if not (abs(qpos[table[i, column.QPOS]]) < WORLD and abs(qvel[table[i, column.QVEL]]) < WORLD):
+def _escaped(row, qpos, qvel):
+    for i in range(int(row[slot.POSITIONS])):
+        if not abs(qpos[i]) < WORLD:
+            return True
+    for i in range(int(row[slot.VELOCITIES])):  # noqa: SIM110  # numba knows no generator
+        if not abs(qvel[i]) < WORLD:
             return True
     return False
 
@@ -176,7 +179,7 @@ def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators
     failure = slot.FINE
     if stage == 0:
         _weigh(row, table, actuators, constraints)
-    if stage == 0 and _escaped(row, table, qpos, qvel):
+    if stage == 0 and _escaped(row, qpos, qvel):
         failure = slot.DIVERGED
     elif sampling:
         failure = _measure(base, row, table, sensors, k)

@@ -5,23 +5,25 @@ import numpy as np
 
 from smc_mujoco.errors import find, number
 from smc_mujoco.plant import Plant, write
+from smc_mujoco.plant import plant as find_plant
 
 GRID = 41  # positions and velocities of one channel
 STATES = 500  # random states of a network
 SEED = 0
 
 
-def deviation(plant: Plant, mechanism: str, reach: float | None = None) -> float:
+def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) -> float:
     """The largest |x'' - f| over the largest |f|, of states with |x| and |v| up to `reach`, without a command.
 
     x'' is the mechanism's, f the plant's equation with the same parameters. One channel takes a grid of states, a
     network random ones.
 
     Args:
-      plant: the plant with its parameters.
+      plant: the plant with its parameters, or its name.
       mechanism: one of plant.mechanisms.
       reach: m or rad, and the same number a second. Default: the farthest of plant.x0.
     """
+    plant = find_plant(plant) if isinstance(plant, str) else plant
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
     most = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
     spec = plant.spec()

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from smc_mujoco.conditions import Jump, Noise
-from smc_mujoco.errors import find, unknown
+from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.frozen import frozen
 from smc_mujoco.law import law
@@ -132,6 +132,8 @@ def scenario(
     Raises:
       ScenarioError: a name that the study does not have, or that is no field of a Scenario.
     """
+    if not isinstance(changes, Mapping):
+        raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
     for name in changes:
         if name not in FIELDS:
             raise unknown("field of a Scenario", name, FIELDS)

@@ -33,7 +33,7 @@ from smc_mujoco.estimators import Reading
 from smc_mujoco.guarded import Failure, guarded, named, numbers, signalled
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
-from smc_mujoco.plant import Values, array
+from smc_mujoco.plant import Values
 from smc_mujoco.remade import remade
 from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
@@ -94,8 +94,7 @@ class Loop:
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""
-        for name, value in assembly.numbers(self.compiled, self.scenario, step).items():
-            array(self.model, name)[:] = value
+        assembly.put_numbers(self.model, self.compiled, self.scenario, step)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -15,14 +15,14 @@ import numpy as np
 # Header slots.
 (
     IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
-    CHANNELS, TABLE, STEPS, STAGES, STEP, PERIOD,  # clock and channel table
+    CHANNELS, TABLE, POSITIONS, VELOCITIES, STEPS, STAGES, STEP, PERIOD,  # channel table, nq, nv, clock
     DELAY, RING, RINGS, LIMIT, SCALE, FORCES,  # delay in steps, ring, its samples, u_max, drive, sums of forces
     SEED, SIGMA_X, SIGMA_V, BIAS, QUANTUM, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
     LAW, GAINS, ESTIMATOR, ESTIMATOR_GAINS, NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
     SIGNALS, SIGNAL_COUNT, LOG, SAMPLES,
     INPUT, OUTPUT, STATE, LAW_MEMORY, LAW_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
     HEADER,
-) = range(45)  # fmt: skip
+) = range(47)  # fmt: skip
 
 # Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
 # whether it is a Cartesian force.

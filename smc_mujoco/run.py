@@ -23,6 +23,7 @@ from smc_mujoco.trace import Trace
 
 CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
+READING_BYTES = 67  # of a late sensor's history, measured: a channel and reading, in mjData and in the Batch
 
 
 class PlainLoopWarning(UserWarning):
@@ -110,8 +111,9 @@ def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int)
     """Indices in chunks of at most CHUNK_BYTES, though at least one a thread."""
     chunk: list[int] = []
     held = 0
+    late = max(READING_BYTES * s.plant.n * s.readings for s in (scenarios[i] for i in indices))  # all get the longest
     for index in indices:
-        size = _bytes(scenarios[index])
+        size = _bytes(scenarios[index]) + late
         if len(chunk) >= threads and held + size > CHUNK_BYTES:
             yield chunk
             chunk, held = [], 0

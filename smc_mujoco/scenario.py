@@ -10,23 +10,20 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from smc_mujoco import given
+from smc_mujoco import consistency, given
 from smc_mujoco.component import Template
 from smc_mujoco.conditions import Jump, Noise, parameter_factors
 from smc_mujoco.contact import Contact
 from smc_mujoco.errors import ScenarioError, number, shown, whole
 from smc_mujoco.estimators import Estimator
-from smc_mujoco.frozen import frozen
 from smc_mujoco.law import Law
 from smc_mujoco.noise import PROCESS
 from smc_mujoco.part import Actuator, Friction
 from smc_mujoco.plant import Plant, plant
 from smc_mujoco.sensors import Encoder
-from smc_mujoco.signals import Constant, Impulse, OrnsteinUhlenbeck, Signal
+from smc_mujoco.signals import Constant, Signal
 
 SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
-MOST_STEPS = 100_000_000  # per run: minutes of computing
-MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
 REST, QUIET, FREE = Constant(0.0), Noise(), Contact("none")
 MISSING: Any = None  # a field left out, filled in when the scenario is made
@@ -139,7 +136,7 @@ class Scenario:
         put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
         put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
         put("physics_step", given.physics_step(self.physics_step, self.control_period, self.realistic, SHORTEST))
-        put("x0", given.state("x0", self.plant.x0 if self.x0 is None else self.x0, self.plant.n))
+        put("x0", given.start(self.x0, self.plant, self.contact.kind))
         put("v0", given.state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
         put("reference", given.signals("reference", self.reference)[0])
         put("disturbance", given.signals("disturbance", self.disturbance))
@@ -151,49 +148,7 @@ class Scenario:
             raise ScenarioError(f"jump is {shown(self.jump)}: give smc.Jump(time=..., factors=...) or None")
         put("integrator", given.integrator(self.integrator, self.realistic))
         put("seed", whole("seed", self.seed, 0, 2**53 - 1))
-        self._check()
-
-    def _check(self) -> None:
-        """What several fields must satisfy together."""
-        delay = self.input_delay / self.physics_step
-        if abs(delay - round(delay)) > 1e-6:
-            raise ScenarioError(
-                f"input_delay {self.input_delay:g} s is no whole number of physics steps of {self.physics_step:g} s: "
-                "give a physics_step that divides it"
-            )
-        if self.samples < 1:
-            raise ScenarioError(
-                f"duration {self.duration:g} s is shorter than one control period of {self.control_period:g} s"
-            )
-        if self.samples * self.steps > MOST_STEPS or (self.samples + 1) * self.plant.n > MOST_VALUES:
-            raise ScenarioError(
-                f"duration {self.duration:g} s is {self.samples:.3g} control samples of {self.plant.n} channels and "
-                f"{self.samples * self.steps:.3g} physics steps: give a shorter duration or longer periods "
-                f"(at most {MOST_VALUES:.0e} values and {MOST_STEPS:.0e} steps)"
-            )
-        for d in self.disturbance:
-            if isinstance(d, OrnsteinUhlenbeck) and self.duration / d.dt > MOST_STEPS:
-                raise ScenarioError(
-                    f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more"
-                )
-        if self.sensor is not None:
-            self.sensor.check(self.physics_step)
-        if self.integrator == "RK4" and (states := [p for p in (*self.friction, *self.actuator) if p.stateful]):
-            raise ScenarioError(
-                f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
-            )
-        if short := [d for d in self.disturbance if isinstance(d, Impulse) and d.width < self.physics_step]:
-            raise ScenarioError(
-                f"{shown(short[0])} is shorter than a physics step of {self.physics_step:g} s: widen it"
-            )
-        if self.reference.cartesian:
-            raise ScenarioError(f"reference is a {type(self.reference).__name__}, which is a force: give a signal")
-        if self.reference.random:
-            raise ScenarioError(f"reference is {type(self.reference).__name__}, which is noise: give a smooth signal")
-        if self.jump is not None and self.jump.time >= self.duration:
-            raise ScenarioError(f"jump at {self.jump.time:g} s comes after the end of the run at {self.duration:g} s")
-        for step in (0, self.samples * self.steps):
-            given.check_numbers(self.plant, self.mechanism, frozen(self.factors(step)))
+        consistency.check(self)
 
     @property
     def realistic(self) -> bool:
@@ -203,7 +158,9 @@ class Scenario:
     @property
     def left_out(self) -> list[str]:
         """Fields whose defaults depend on others: dataclasses.replace finds them anew."""
-        return [name for name in ("physics_step", "integrator", "velocity") if given.left_out(getattr(self, name))]
+        return [
+            name for name in ("physics_step", "integrator", "velocity", "x0") if given.left_out(getattr(self, name))
+        ]
 
     @property
     def steps(self) -> int:
@@ -219,6 +176,11 @@ class Scenario:
     def stages(self) -> int:
         """Callbacks per physics step: one a stage of the integrator."""
         return 4 if self.integrator == "RK4" else 1
+
+    @property
+    def readings(self) -> int:
+        """How many readings of its sensor are under way at once, of which MuJoCo keeps a history."""
+        return 0 if self.sensor is None else self.sensor.readings(self.physics_step)
 
     @property
     def delay_steps(self) -> int:

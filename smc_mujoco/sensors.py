@@ -21,7 +21,7 @@ from smc_mujoco.plant import Field
 
 # Of a physics step, by which readings are due and taken early: MuJoCo compares sums of steps, which drift by rounding.
 EARLY = 0.5
-MOST_READINGS = 100_000  # under way at once: chosen, 1 MB a channel
+MOST_READINGS = 100_000  # under way at once: chosen, 6 MB a channel
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Encoder(Part):
     delay: float = 0.0
 
     def __post_init__(self):
-        if self.counts != math.inf:
+        if not (isinstance(self.counts, float) and self.counts == math.inf):
             object.__setattr__(self, "counts", whole("Encoder's counts", self.counts, 2, 2**32))
         object.__setattr__(self, "bias", number("Encoder's bias", self.bias))
         object.__setattr__(self, "dropout", number("Encoder's dropout", self.dropout, least=0.0, most=1.0))
@@ -57,18 +57,11 @@ class Encoder(Part):
         """One count in rad or m; 0 without quantisation."""
         return 0.0 if self.counts == math.inf else (2.0 * math.pi if unit == "rad" else 1.0) / self.counts
 
-    @property
-    def late(self) -> bool:
-        """Whether MuJoCo keeps a history of readings."""
-        return bool(self.delay or self.period)
-
-    def structure(self) -> tuple:
-        """Encoders with a history share a model whose buffer is long enough for the latest of them."""
-        return type(self), self.late
-
     def readings(self, step: float) -> int:
-        """How many readings the history must hold, with one a physics step of `step` s."""
-        return math.ceil(self.delay / (self.period or step) - 1e-9) + 2 if self.late else 0
+        """How many readings MuJoCo must remember, with one a physics step of `step` s; 0 where none is late."""
+        if not self.delay and not self.period:
+            return 0
+        return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
 
     def check(self, step: float) -> None:
         """Raise ScenarioError for times that are no whole number of physics steps, or too many to remember."""
@@ -77,7 +70,7 @@ class Encoder(Part):
                 f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"
             )
         for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
-            if abs(time / step - round(time / step)) > 1e-6:
+            if abs(time / step - round(time / step)) > 1e-6 or 0.0 < time < 0.5 * step:
                 raise ScenarioError(
                     f"Encoder's {name} {time:g} s is no whole number of physics steps of {step:g} s: "
                     "give a physics_step that divides it"
@@ -85,7 +78,7 @@ class Encoder(Part):
 
     def fields(self, model):
         """Delay and period of every channel's two sensors."""
-        if self.late:
+        if model.nhistory:
             at = sensor_ids(model)
             yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
             yield Field("sensor_interval", (at, 0), self.period or 0.0)

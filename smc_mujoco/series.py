@@ -55,13 +55,13 @@ class TimeSeries(Signal):
         return {}
 
     @classmethod
-    def from_csv(cls, path: str | os.PathLike, column: str | None = None, time: str = "t") -> "TimeSeries":
+    def from_csv(cls, path: str | os.PathLike, column: str | None = None, time: str | None = None) -> "TimeSeries":
         """The series in a CSV file: numbers separated by commas, a row for each time, at a nearly constant rate.
 
         Args:
           path: the file. Its first row may name the columns; where it does not, they are time and value.
           column: the column of the values. Default: the first besides time.
-          time: the column of the times, s.
+          time: the column of the times, s. Default: "t" or "time", else the first.
 
         Raises:
           ScenarioError: no such file or column, a cell that is empty or no finite number, times that do not increase,
@@ -148,22 +148,24 @@ def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
 
 
 def _columns(
-    path: str | os.PathLike, rows: list[tuple[int, list[str]]], column: str | None, time: str
+    path: str | os.PathLike, rows: list[tuple[int, list[str]]], column: str | None, time: str | None
 ) -> tuple[int, int, list[tuple[int, list[str]]]]:
     """Where times and values stand, and the rows below the header."""
     names = rows[0][1]
     if len(names) < 2:
-        raise ScenarioError(f"{path} has one column: give two, time and value, separated by commas")
+        raise ScenarioError(f"{path} has one column in its first line: give two, time and value, separated by commas")
     for line, row in rows:
         if len(row) != len(names):
             raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give one for each")
     if all(not name or _is_number(name) for name in names):
-        if column is not None or time != "t":
+        if wanted := column or time:
             raise ScenarioError(
-                f"{path} has no header to find {shown(time if column is None else column)} in: write the columns' "
+                f"{path} has no header to find {shown(wanted)} in: write the columns' "
                 "names in its first line, or leave out column and time"
             )
         return 0, 1, rows
+    if time is None:
+        time = next((name for name in ("t", "time") if name in names), names[0])
     if time not in names:
         raise unknown(f"time column of {path}", time, names)
     if column is not None and column not in names:

@@ -17,6 +17,7 @@ from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
 
 ARRAYS = ("t", *LOGGED)
+NEWER = ("force", "reaction")  # which the oldest files lack: they hold ideal runs
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +34,8 @@ class Trace:
       r: reference, (K + 1, n).
       force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
-        over the control period that ends at t_k, so that no blow is missed; at t = 0 they are 0.
+        over the control period that ends at t_k, of the values at its physics steps, so that no blow is missed; at
+        t = 0 they are 0.
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
@@ -131,7 +133,8 @@ def load(path: str | os.PathLike) -> Trace:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))
-            arrays = {name: file[name] for name in ARRAYS}
+            older = "mechanism" not in about
+            arrays = {name: file[name] for name in ARRAYS if not (older and name in NEWER)}
     except FileNotFoundError:
         raise ScenarioError(f"no trace at {path}: give the path of a .npz file that a run wrote") from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, NotImplementedError):
@@ -145,6 +148,8 @@ def load(path: str | os.PathLike) -> Trace:
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
     shape = (scenario.samples + 1, scenario.plant.n)
+    arrays.setdefault("force", arrays["applied"].copy())
+    arrays.setdefault("reaction", np.where(np.isfinite(arrays["applied"]), 0.0, np.nan))
     if any(a.shape != (shape[:1] if name == "t" else shape) or a.dtype != float for name, a in arrays.items()):
         raise ScenarioError(f"{path} holds arrays that do not fit its scenario: give a file that a run wrote")
     return Trace(**arrays, scenario=scenario, **end)

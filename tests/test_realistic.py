@@ -730,22 +730,23 @@ def test_a_start_inside_an_obstacle_is_refused_before_anything_runs(fields):
     assert message.endswith("give another x0")
 
 
-def test_a_start_inside_is_found_with_the_plants_own_numbers():
-    """A pendulum of half the length lies elsewhere: what counts is the scenario's, not the model's default."""
-    short = smc.plant("inverted_pendulum", l=0.25)
-    for contact, x0 in (("wall", 0.8), ("floor", 2.6)):
-        smc.run(smc.Scenario(plant=short, law="none", duration=0.01, contact=contact, x0=x0))
+@pytest.mark.parametrize("change", [{"plant": smc.plant("inverted_pendulum", l=0.25)}, {"mismatch": {"l": 1.1}}])
+def test_a_rod_of_another_length_is_refused_where_the_obstacles_stand(change):
+    with pytest.raises(smc.ScenarioError, match=r"'wall' of inverted_pendulum stands where l is 0\.5 m"):
+        smc.Scenario(**{"plant": "inverted_pendulum", "law": "none", "contact": "wall"} | change)
 
 
-def test_a_motor_without_limits_delivers_the_command_however_weak_its_constant():
+def test_a_motor_too_weak_for_any_voltage_is_refused():
+    with pytest.raises(smc.ScenarioError, match="torque_constant 1e-12 N m/A is too weak"):
+        smc.DCMotor(torque_constant=1e-12, rotor_inertia=0.0, voltage=math.inf, current=math.inf)
+
+
+def test_a_voltage_that_mujoco_would_drop_ends_the_run():
     """MuJoCo drops a control above 1e10: a run may not go on without its motor and say nothing."""
-    weak = smc.DCMotor(torque_constant=1e-12, rotor_inertia=0.0, voltage=math.inf, current=math.inf)
-    try:
-        trace = smc.run(scenario(actuator=weak))
-    except smc.ScenarioError as error:
-        assert "torque_constant" in str(error)  # noqa: PT017
-    else:
-        assert trace.failure is not None or np.abs(trace.force[50:] - trace.applied[49:-1]).max() < 0.1
+    weak = smc.DCMotor(torque_constant=1e-10, gear=12.0, resistance=1e3, rotor_inertia=0.0, voltage=math.inf)
+    trace = smc.run(scenario(actuator=weak, u_max=math.inf))
+    assert trace.failure is not None
+    same(trace, plain.run(trace.scenario))
 
 
 @pytest.mark.parametrize("fields", [{"mismatch": {"alpha": -5.0}}, {"jump": smc.Jump(0.05, {"alpha": -5.0})}])
@@ -768,7 +769,7 @@ def test_the_plain_loop_refuses_a_start_inside_too():
         return float(str(y.x)), 0.0  # numba makes no number of a text
 
     inside = smc.Scenario(plant="duffing", law=slow(), duration=0.01, contact="stops", x0=1.9)
-    with pytest.warns(smc.PlainLoopWarning), pytest.raises(smc.ScenarioError, match="beyond"):
+    with pytest.warns(smc.PlainLoopWarning), pytest.raises(smc.ScenarioError, match="inside"):
         smc.run(inside)
 
 

@@ -442,3 +442,38 @@ def test_an_existing_file_is_replaced(ending, trace, traces, tmp_path):
     WRITERS[ending](trace, path)
     assert path.read_bytes() != old
     assert names(tmp_path) == [f"a.{ending}"]
+
+
+REAL = """
+import smc_mujoco as smc
+scenario = smc.Scenario(
+    plant="duffing", law="classical", duration=0.01, contact="floor", mechanism="springs",
+    sensor=smc.Encoder(delay=0.001),
+    friction=(smc.Viscous(0.1), smc.Coulomb(0.1), smc.LuGre(0.1, 0.2, 0.05)),
+    actuator=(smc.DCMotor(), smc.Backlash(0.01)),
+    disturbance=(smc.Gust(1.0, 0.0, 0.1), smc.BandLimited(0.1, 1.0, 5.0), smc.TimeSeries((0.0, 1.0), (0.0, 1.0))),
+)
+"""
+
+
+def test_a_file_of_a_real_mechanism_loads_in_a_fresh_process(tmp_path):
+    for code in (REAL + "smc.run(scenario).save('a')", "import smc_mujoco as smc; print(smc.load('a.npz').scenario)"):
+        environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert "LuGre" in done.stdout
+
+
+def test_a_file_of_the_first_version_loads_with_what_its_actuator_gave(traces, tmp_path):
+    trace = traces["plain"]
+    with np.load(trace.save(tmp_path / "a.npz")) as file:
+        held = {name: file[name] for name in file if name not in ("force", "reaction")}
+    about = json.loads(str(held.pop("about")))
+    for name in ("mechanism", "friction", "contact", "actuator", "sensor", "left_out"):
+        del about[name]
+    np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
+    old = smc.load(tmp_path / "old.npz")
+    np.testing.assert_array_equal(old.force, trace.applied)
+    assert not old.reaction.any()

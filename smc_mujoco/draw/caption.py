@@ -163,14 +163,13 @@ def key(traces: Sequence[Trace], longest: Longest) -> list[str]:
     unit = style.units(traces[0])["u"]
     words = []
     if longest.control:
-        words.append(f"coloured arrow: mean control, longest {longest.control:.2g} {unit}")
+        words.append(f"coloured arrow: mean control, longest {style.short(longest.control)} {unit}")
         words.append("bar: the range over which it switches")
     if longest.disturbance:
-        words.append(f"dark arrow: disturbance, longest {longest.disturbance:.2g} {unit}")
+        words.append(f"dark arrow: disturbance, longest {style.short(longest.disturbance)} {unit}")
     if longest.reaction:
-        words.append(
-            f"violet arrow: {reacting(traces)}, longest {longest.reaction:.2g} {unit}{' or more' * longest.blows}"
-        )
+        most = f"{style.short(longest.reaction)} {unit}{' or more' * longest.blows}"
+        words.append(f"violet arrow: {reacting(traces)}, longest {most}")
     most = max(trace.scenario.plant.n for trace in traces)
     if most > SHOWN:
         words.append(f"machines: the first {SHOWN} of {most} pendulums")

@@ -93,7 +93,7 @@ def blows(ax: Axes, traces: Sequence[Trace]) -> None:
     usual = max(*(float(np.quantile(size, BRIEF)) for size in sizes if size.size), *map(abs, span(traces, "u")))
     if peak > 2.0 * usual > 0.0:
         ax.set_ylim(-1.16 * usual, 1.16 * usual)
-        words = f"blows up to {peak:.3g} {style.units(traces[0])['u']}"
+        words = f"blows up to {style.short(peak, 3)} {style.units(traces[0])['u']}"
         ax.set_title(words, loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
 
 

@@ -200,3 +200,8 @@ def letters_on(colour: str) -> str:
     """White or ink, whichever reads better on a colour (luma of ITU-R BT.601)."""
     red, green, blue = rgb(colour)
     return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 140 else PAPER
+
+
+def short(value: float, digits: int = 2) -> str:
+    """A number in few digits, without an exponent where it has fewer than seven: 0.25, 6, 280."""
+    return f"{float(f'{value:.{digits}g}'):g}"

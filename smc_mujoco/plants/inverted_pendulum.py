@@ -11,9 +11,10 @@ from math import asin, cos, sin
 
 import mujoco
 
-from smc_mujoco.contact import bar, box, hit
+from smc_mujoco.contact import bar, box, hit, solid
 from smc_mujoco.plant import Field, Plant, model_path
 
+DEEP = 0.4  # m, stops and wall behind their faces: no blow of 80 m/s goes through
 L, BOB, ROD, AXLE = 0.5, 0.065, 0.012, 0.8  # m: the pendulum's length, radii of bob and rod, height of the hinge
 
 FALLEN, FALL = 2.44, 0.3  # rad (140 degrees) where the bob lies, and the restitution of the floor, chosen
@@ -67,7 +68,9 @@ def stops(spec):
         bar(stop, f"{side}_finger", ((sign * 0.110, -0.02, L), (sign * 0.110, 0.12, L)), 0.018, "steel")
         arm = machine.add_body(name=f"{side}_arm", pos=(0, 0, AXLE), quat=turned(sign * (STOP + outer)))
         box(arm, f"{side}_beam", (-0.018, 0.080, 0.0), (0.018, 0.110, L + 0.04), "graphite")
-        hit(spec, (f"{side}_pad", "bob"), PAD)
+        deep = sorted((sign * BOB, sign * (BOB + DEEP)))
+        solid(stop, f"{side}_solid", (deep[0], -0.045, L - 0.20), (deep[1], 0.045, L + 0.10))
+        hit(spec, (f"{side}_solid", "bob"), PAD)
 
 
 def wall(spec):
@@ -77,7 +80,8 @@ def wall(spec):
     for y in (-0.11, 0.11):
         edge = "front" if y < 0 else "back"
         box(machine, f"wall_{edge}_rib", (face + 0.05, y - 0.02, 0.0), (face + 0.09, y + 0.02, 1.30), "graphite")
-    hit(spec, ("wall", "bob"), CLANG)
+    solid(machine, "wall_solid", (face, -0.15, 0.0), (face + DEEP, 0.15, 1.36))
+    hit(spec, ("wall_solid", "bob"), CLANG)
 
 
 def peg(spec):

@@ -1,0 +1,67 @@
+"""What several fields of a scenario must satisfy together; each failure is one sentence."""
+
+from typing import TYPE_CHECKING
+
+from smc_mujoco import given
+from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.frozen import frozen
+from smc_mujoco.signals import Impulse, OrnsteinUhlenbeck
+
+if TYPE_CHECKING:
+    from smc_mujoco.scenario import Scenario
+
+MOST_STEPS = 100_000_000  # per run: minutes of computing
+MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+
+
+def check(scenario: "Scenario") -> None:
+    """Raise ScenarioError for fields that do not go together."""
+    check_clock(scenario)
+    check_signals(scenario)
+    check_mechanism(scenario)
+
+
+def check_clock(s: "Scenario") -> None:
+    """The run, its delays and its jump fit into whole steps, and those into memory."""
+    delay = s.input_delay / s.physics_step
+    if abs(delay - round(delay)) > 1e-6:
+        raise ScenarioError(
+            f"input_delay {s.input_delay:g} s is no whole number of physics steps of {s.physics_step:g} s: "
+            "give a physics_step that divides it"
+        )
+    if s.samples < 1:
+        raise ScenarioError(f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} s")
+    if s.samples * s.steps > MOST_STEPS or (s.samples + 1) * s.plant.n > MOST_VALUES:
+        raise ScenarioError(
+            f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels and "
+            f"{s.samples * s.steps:.3g} physics steps: give a shorter duration or longer periods "
+            f"(at most {MOST_VALUES:.0e} values and {MOST_STEPS:.0e} steps)"
+        )
+    if s.jump is not None and s.jump.time >= s.duration:
+        raise ScenarioError(f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s")
+    if s.sensor is not None:
+        s.sensor.check(s.physics_step)
+
+
+def check_signals(s: "Scenario") -> None:
+    """Signals are of the kind that their place asks for, and no shorter than a step."""
+    for d in s.disturbance:
+        if isinstance(d, OrnsteinUhlenbeck) and s.duration / d.dt > MOST_STEPS:
+            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more")
+        if isinstance(d, Impulse) and d.width < s.physics_step:
+            raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
+    if s.reference.cartesian:
+        raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
+    if s.reference.random:
+        raise ScenarioError(f"reference is {type(s.reference).__name__}, which is noise: give a smooth signal")
+
+
+def check_mechanism(s: "Scenario") -> None:
+    """The integrator takes the parts' states, and mechanism and contact all parameters of the run."""
+    if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
+        raise ScenarioError(
+            f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
+        )
+    for step in (0, s.samples * s.steps):
+        given.check_numbers(s.plant, s.mechanism, frozen(s.factors(step)))
+        given.contact_fits(s.contact, s.plant, s.factors(step))
