@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.errors import number
-from smc_mujoco.part import ROTOR, Actuator, drives, joint_ids, joints
+from smc_mujoco.part import ROTOR, Actuator, driven, driven_ids, drives
 from smc_mujoco.plant import LARGEST, Field
 
 PLAY = "play:"  # the tendon of length rotor - joint
@@ -46,7 +46,7 @@ class Backlash(Actuator):
         rigid = spec.copy().compile()
         pose = mujoco.MjData(rigid)
         mujoco.mj_kinematics(rigid, pose)
-        for actuator, joint in list(zip(drives(spec), joints(spec), strict=True)):
+        for actuator, joint in list(zip(drives(spec), driven(spec), strict=True)):
             _add_rotor(spec, joint, rigid, pose)
             play = spec.add_tendon(
                 name=PLAY + joint.name, limited=True, range=(-1.0, 1.0), solref_limit=SOLREF, solimp_limit=SOLIMP
@@ -60,7 +60,7 @@ class Backlash(Actuator):
                 key.qpos = [start[joint.name.removeprefix(ROTOR)] for joint in spec.joints]
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        names = [model.joint(i).name for i in joint_ids(model)]
+        names = [model.joint(i).name for i in driven_ids(model)]
         rotors = [model.joint(ROTOR + name).dofadr[0] for name in names]
         yield Field("tendon_range", [model.tendon(PLAY + name).id for name in names], (-self.gap / 2, self.gap / 2))
         yield Field("dof_armature", rotors, self.rotor_inertia, adds=True)

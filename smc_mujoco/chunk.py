@@ -36,6 +36,8 @@ def contents(scenario: Scenario) -> row.Contents:
     sensor = scenario.sensor or PERFECT
     return row.Contents(
         law=_component(scenario.law),
+        model=scenario.model == "nominal",
+        surface=scenario.surface and _component(scenario.surface),
         estimator=_component(scenario.velocity),
         nominal=row.Part(
             address=native.nominal(scenario.plant.nominal, tuple(nominal)).address, values=tuple(nominal.values())
@@ -54,7 +56,7 @@ def contents(scenario: Scenario) -> row.Contents:
         sigma_v=scenario.noise.velocity,
         scale=math.prod(part.scale for part in scenario.actuator),
         bias=sensor.bias,
-        quantum=sensor.quantum(scenario.plant.unit),
+        counts=0.0 if sensor.counts == math.inf else sensor.counts,
         lost=sensor.dropout,
         read_period=sensor.period or 0.0,
         read_delay=sensor.delay,
@@ -178,6 +180,7 @@ class Chunk:
             row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
             row.LAW_RAISED: f"{law} raised an exception",
             row.DISTURBANCE_RAISED: "a disturbance raised an exception",
+            row.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[failure]
 
 

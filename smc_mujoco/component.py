@@ -1,4 +1,4 @@
-"""A component: a pure function with named gains and a memory - what laws and estimators are made of.
+"""A component: a pure function with named gains and a memory - what laws, surfaces and estimators are made of.
 
 A `Template` is the function with its default gains; calling it with gains gives a `Component`, plain data that a
 Scenario holds. The function is called as `function(y, gains, memory)`: y and gains are read by attribute, memory is a
@@ -12,8 +12,9 @@ import keyword
 import math
 import pkgutil
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.frozen import frozen
@@ -28,6 +29,9 @@ class Component:
     gains: Mapping[str, float]
     memory: int
     function: Callable | None
+    degree: int = 1
+    plants: tuple[str, ...] = ()
+    modelled: bool = False
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
@@ -61,12 +65,23 @@ def _bind(module: str, name: str, gains: dict[str, float]) -> Component:
     importlib.import_module(module)
     template = _at(module, name)
     assert isinstance(template, Template)
-    return template(**gains)
+    return template.bind(gains)
+
+
+class GainWarning(UserWarning):
+    """Gains that miss a condition under which the law's theorem holds."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Template:
-    """A function, its default gains and how many floats of memory it keeps per channel."""
+    """A function, its default gains and how many floats of memory it keeps per channel.
+
+    Attributes:
+      degree: relative degree of the sliding variable that a law needs, or that a surface gives.
+      conditions: what a theorem asks of the gains, in words -> whether gains, read by attribute, satisfy it.
+      plants: names of the plants it is for; empty: every one.
+      modelled: whether it cannot do without the nominal model.
+    """
 
     kind: str
     name: str
@@ -75,6 +90,10 @@ class Template:
     memory: int
     positive: frozenset[str]
     nonnegative: frozenset[str]
+    degree: int = 1
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] = dataclasses.field(default_factory=dict)
+    plants: tuple[str, ...] = ()
+    modelled: bool = False
 
     @property
     def doc(self) -> str:
@@ -84,10 +103,21 @@ class Template:
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
 
     def __call__(self, **gains: float) -> Component:
+        """The function with some of its gains changed; errors and warnings as `bind`."""
+        return self.bind(gains, level=3)
+
+    def bind(self, gains: Mapping[str, float], level: int | None = None) -> Component:
         """The function with some of its gains changed.
 
-        Raises:
-          ScenarioError: unknown gain, not a finite number, or not positive where it must be.
+        Args:
+          gains: name -> value.
+          level: of the stack, to which a GainWarning points; None: gains that were warned of before.
+
+            Raises:
+              ScenarioError: unknown gain, not a finite number, or not positive where it must be.
+
+        Warns:
+          GainWarning: gains that miss a condition of the theorem behind it.
         """
         values = dict(self.defaults)
         for key, value in gains.items():
@@ -96,11 +126,40 @@ class Template:
             above = 0.0 if key in self.positive else -math.inf
             least = 0.0 if key in self.nonnegative else -math.inf
             values[key] = number(f"{self.name}'s {key}", value, above=above, least=least)
-        return Component(kind=self.kind, name=self.name, gains=values, memory=self.memory, function=self.function)
+        for words, holds in self.conditions.items():
+            if level is not None and not _holds(holds, SimpleNamespace(**values)):
+                given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, stacklevel=level)
+        return Component(
+            kind=self.kind,
+            name=self.name,
+            gains=values,
+            memory=self.memory,
+            function=self.function,
+            degree=self.degree,
+            plants=self.plants,
+            modelled=self.modelled,
+        )
+
+
+def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace) -> bool:
+    """Whether gains satisfy a condition; those for which it cannot be worked out do not."""
+    try:
+        return condition(gains)
+    except (ArithmeticError, ValueError):
+        return False
 
 
 def template(
-    kind: str, gains: Mapping[str, float] | None, memory: int, positive: Iterable[str], nonnegative: Iterable[str]
+    kind: str,
+    gains: Mapping[str, float] | None,
+    memory: int,
+    positive: Iterable[str],
+    nonnegative: Iterable[str],
+    degree: int = 1,
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    plants: Iterable[str] = (),
+    modelled: bool = False,
 ) -> Callable[[Callable], Template]:
     """A decorator that makes a Template of a function.
 
@@ -113,7 +172,11 @@ def template(
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
     defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
-    size = whole("memory", memory, 1, 10_000)
+    size, degree = whole("memory", memory, 1, 10_000), whole("degree", degree, 1, 10)
+    if isinstance(plants, str):
+        raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
+    if not isinstance(conditions, Mapping | None) or not all(map(callable, (conditions or {}).values())):
+        raise ScenarioError(f"conditions is {shown(conditions)}: give words with functions of the gains")
     for name in (*positive, *nonnegative):
         if name not in defaults:
             raise unknown("gain with a sign", name, defaults)
@@ -132,6 +195,10 @@ def template(
             memory=size,
             positive=frozenset(positive),
             nonnegative=frozenset(nonnegative),
+            degree=degree,
+            conditions=dict(conditions or {}),
+            plants=tuple(plants),
+            modelled=modelled,
         )
 
     return decorate

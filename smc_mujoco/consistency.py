@@ -18,6 +18,7 @@ def check(scenario: "Scenario") -> None:
     """Raise ScenarioError for fields that do not go together."""
     check_clock(scenario)
     check_signals(scenario)
+    check_law(scenario)
     check_mechanism(scenario)
 
 
@@ -54,6 +55,22 @@ def check_signals(s: "Scenario") -> None:
         raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
     if s.reference.random:
         raise ScenarioError(f"reference is {type(s.reference).__name__}, which is noise: give a smooth signal")
+
+
+def check_law(s: "Scenario") -> None:
+    """The law is for this plant, and its surface for this law."""
+    if s.law.plants and s.plant.name not in s.law.plants:
+        raise ScenarioError(f"law {s.law.name!r} is for {', '.join(s.law.plants)} alone, not for {s.plant.name}")
+    if s.surface is not None and s.law.degree > 1:
+        raise ScenarioError(
+            f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "
+            "leave it out, or give a law of degree 1"
+        )
+    if s.surface is not None and s.surface.degree != s.law.degree:
+        raise ScenarioError(
+            f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.degree}, "
+            f"and surface {s.surface.name!r} has {s.surface.degree}: give another, or leave it out"
+        )
 
 
 def check_mechanism(s: "Scenario") -> None:

@@ -18,10 +18,12 @@ from smc_mujoco.part import Part
 from smc_mujoco.plant import Plant, catalogue
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
+from smc_mujoco.surfaces import surface
 
 P = TypeVar("P", bound=Part)
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
+MODELS = ("none", "nominal")
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; halving it changes no score of a realistic plant by 3 %, see tests/test_convergence.py
 FAR = 1e6  # initial states beyond this have already diverged
@@ -54,18 +56,18 @@ class FilledStep(float):
 
 
 class FilledName(str):
-    """An integrator that was left out; dataclasses.replace finds it anew."""
+    """An integrator, or a model, that was left out; dataclasses.replace finds it anew."""
 
 
 def component(value: object, kind: str) -> Component:
-    """A law or an estimator, from one, its template or its name."""
+    """A law, a surface or an estimator, from one, its template or its name."""
     if isinstance(value, str):
-        return {"law": law, "estimator": estimator}[kind](value)
+        return {"law": law, "surface": surface, "estimator": estimator}[kind](value)
     if isinstance(value, Template):
         value = value()
     if isinstance(value, Component) and value.kind == kind:
         return value
-    field = {"law": "law", "estimator": "velocity"}[kind]
+    field = {"law": "law", "surface": "surface", "estimator": "velocity"}[kind]
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
 
 
@@ -100,6 +102,15 @@ def integrator(name: object, realistic: bool) -> str:
     if not isinstance(name, str) or name not in INTEGRATORS:
         raise unknown("integrator", name, INTEGRATORS)
     return name
+
+
+def model(value: object, law: Component) -> str:
+    """What the law may know of the plant, "none" or "nominal"; what it needs where nothing is said."""
+    if value is None or isinstance(value, FilledName):
+        return FilledName("nominal" if law.modelled else "none")
+    if not isinstance(value, str) or value not in MODELS:
+        raise unknown("model", value, MODELS)
+    return value
 
 
 def start(value: object, plant: Plant, kind: str) -> tuple[float, ...]:

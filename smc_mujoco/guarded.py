@@ -1,5 +1,6 @@
 """Users' functions called as the Python they are: what they return is checked, what they raise becomes a sentence."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -48,3 +49,14 @@ def guarded(component: Component, function: Any, channel: int, y: tuple, gains: 
     except Exception as error:
         what = f"{component.kind} {component.name!r} raised {type(error).__name__} ({error})"
         raise Failure(f"{what} in channel {channel}") from error
+
+
+def surfaced(surface: Component, out: Any) -> list[float]:
+    """s and eq, as floats."""
+    return numbers(f"surface {surface.name!r}", out, "the two numbers s, eq", 2)
+
+
+def estimated(estimator: Component, out: Any) -> list[float]:
+    """Velocity and acceleration, as floats; NaN for an acceleration that is not estimated."""
+    pair = out if isinstance(out, tuple) else (out, math.nan)
+    return numbers(f"estimator {estimator.name!r}", pair, "a velocity, or it and an acceleration", 2)

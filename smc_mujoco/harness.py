@@ -21,6 +21,7 @@ from smc_mujoco import channels as column
 from smc_mujoco import noise
 from smc_mujoco import row as slot
 from smc_mujoco.compiled import call, integers, pointer
+from smc_mujoco.forces import disturb, disturbance, weigh
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
 LEFT = 1.0 - 1e-8  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
@@ -45,15 +46,16 @@ def _escaped(row, qpos, qvel):
 
 
 @njit(error_model="numpy")
-def _read(row, i, x, v, j):
+def _read(row, i, x, v, j, hinge):
     """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
     if row[slot.SIGMA_X] != 0.0 or row[slot.SIGMA_V] != 0.0:
         z = noise.normals(row[slot.SEED], i, noise.MEASUREMENT, j)
         x, v = x + row[slot.SIGMA_X] * z[0], v + row[slot.SIGMA_V] * z[1]
     if row[slot.BIAS] != 0.0:
         x += row[slot.BIAS]
-    if row[slot.QUANTUM] != 0.0:
-        x = row[slot.QUANTUM] * math.floor(x / row[slot.QUANTUM] + 0.5)
+    if row[slot.COUNTS] != 0.0:
+        quantum = (2.0 * math.pi if hinge else 1.0) / row[slot.COUNTS]
+        x = quantum * math.floor(x / quantum + 0.5)
     held = int(row[slot.HELD]) + 2 * i
     if row[slot.LOST] != 0.0:
         if j > 0 and noise.uniform(row[slot.SEED], i, noise.DROPOUT, j) < row[slot.LOST]:
@@ -70,7 +72,8 @@ def _measure(base, row, table, sensors, k):
     if row[slot.READ_PERIOD] != 0.0:
         j = max(0, math.floor((k * row[slot.PERIOD] - row[slot.READ_DELAY]) / row[slot.READ_PERIOD] + 1e-6))
     for i in range(n):
-        x, v = _read(row, i, sensors[table[i, column.X_SENSOR]], sensors[table[i, column.V_SENSOR]], j)
+        x, v = sensors[table[i, column.X_SENSOR]], sensors[table[i, column.V_SENSOR]]
+        x, v = _read(row, i, x, v, j, table[i, column.TIP] >= 0)
         row[given], row[given + 1], row[given + 2] = row[slot.PERIOD], x, v
         memory = _at(base, row, slot.ESTIMATOR_MEMORY) + 8 * i * int(row[slot.ESTIMATOR_STRIDE])
         if (
@@ -80,88 +83,98 @@ def _measure(base, row, table, sensors, k):
             != 0
         ):
             return slot.ESTIMATOR_RAISED
-        row[at + i], row[at + n + i] = x, row[out]
+        row[at + i], row[at + n + i], row[at + 2 * n + i] = x, row[out], row[out + 1]
     return slot.FINE
 
 
 @njit(error_model="numpy")
-def _decide(base, row, log, k):
-    """The law of every channel: its command into the ring, u and s into the log; a failure code."""
+def _nominal(base, row, i):
+    """Nominal f and g of channel i into the row's outputs; not 0 where the model raised."""
+    state = int(row[slot.STATE])
+    row[state], row[state + 1] = i, row[slot.CHANNELS]
+    return call(
+        int(row[slot.NOMINAL]),
+        base + 8 * state,
+        _at(base, row, slot.NOMINAL_VALUES),
+        0,
+        _at(base, row, slot.OUTPUT),
+    )
+
+
+@njit(error_model="numpy")
+def _inform(base, row, y, i, partner):
+    """What the law of channel i is told, y; `partner` moves with it without an actuator (0: none). A failure code."""
     n, state, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
+    x, v, a = state + 2, state + 2 + n, state + 2 + 2 * n
+    y[17], y[18], y[19], y[20] = 0.0, 0.0, 0.0, 0.0
+    if partner > 0:
+        if _nominal(base, row, partner) != 0:
+            return slot.NOMINAL_RAISED
+        y[17], y[18], y[19], y[20] = row[x + partner], row[v + partner], row[out], row[out + 1]
+    if _nominal(base, row, i) != 0:
+        return slot.NOMINAL_RAISED
+    y[9], y[10] = row[out], row[out + 1]
+    y[2], y[3] = row[x + i], row[v + i]
+    y[4], y[5] = y[2] - y[6], y[3] - y[7]
+    y[11] = y[8] if math.isnan(row[a + i]) else row[a + i]  # none is estimated: as the reference asks
+    y[12], y[13], y[14], y[15], y[16] = row[slot.LIMIT], row[slot.MODEL], 0.0, 0.0, 0.0
+    if row[slot.SURFACE] != 0.0:
+        memory = _at(base, row, slot.SURFACE_MEMORY) + 8 * i * int(row[slot.SURFACE_STRIDE])
+        gains = _at(base, row, slot.SURFACE_GAINS)
+        if call(int(row[slot.SURFACE]), base + 8 * given, gains, memory, base + 8 * out) != 0:
+            return slot.SURFACE_RAISED
+        y[14], y[15], y[16] = 1.0, row[out], row[out + 1]
+    return slot.FINE
+
+
+@njit(error_model="numpy")
+def _decide(base, row, table, log, k):
+    """The law of every driven channel: its command into the ring, u and s into the log; a failure code."""
+    n, given, out = int(row[slot.CHANNELS]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
     ring = int(row[slot.RING]) + (k % int(row[slot.RINGS])) * n
-    y = row[given : given + 11]
-    t = k * row[slot.PERIOD]
-    y[0], y[1], y[2] = t, 0.0, 0.0
+    y = row[given : given + 21]
+    y[0], y[1], y[2] = k * row[slot.PERIOD], 0.0, 0.0
     if call(int(row[slot.REFERENCE]), base + 8 * given, _at(base, row, slot.REFERENCE_VALUES), 0, base + 8 * out) != 0:
         return slot.REFERENCE_RAISED
     y[1], y[6], y[7], y[8] = row[slot.PERIOD], row[out], row[out + 1], row[out + 2]
-    row[state + 1] = n
+    driven = _driven(table, n)
     for i in range(n):
-        row[state] = i
-        if call(int(row[slot.NOMINAL]), base + 8 * state, _at(base, row, slot.NOMINAL_VALUES), 0, base + 8 * out) != 0:
-            return slot.NOMINAL_RAISED
-        y[9], y[10] = row[out], row[out + 1]
-        y[2], y[3] = row[state + 2 + i], row[state + 2 + n + i]
-        y[4], y[5] = y[2] - y[6], y[3] - y[7]
+        if i >= driven:  # only measured
+            row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = 0.0, 0.0, 0.0, 0.0
+            continue
+        failure = _inform(base, row, y, i, i + driven if i + driven < n else 0)
+        if failure != slot.FINE:
+            return failure
         memory = _at(base, row, slot.LAW_MEMORY) + 8 * i * int(row[slot.LAW_STRIDE])
         if call(int(row[slot.LAW]), base + 8 * given, _at(base, row, slot.GAINS), memory, base + 8 * out) != 0:
             return slot.LAW_RAISED
         u = min(max(row[out], -row[slot.LIMIT]), row[slot.LIMIT])
-        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and abs(u) * max(1.0, row[slot.SCALE]) < HUGE):
+        asked = abs(u) * max(1.0, row[slot.SCALE])
+        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and asked < HUGE):
             return slot.NOT_FINITE
         row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
     return slot.FINE
 
 
 @njit(error_model="numpy")
-def _disturb(base, row, table, xfrc, t):
-    """The sum of the disturbances of every channel at time t, onto its body."""
-    n, given, out, first = int(row[slot.CHANNELS]), int(row[slot.INPUT]), int(row[slot.OUTPUT]), int(row[slot.SIGNALS])
-    row[given], row[given + 1] = t, row[slot.SEED]
+def _driven(table, n):
+    """How many of the channels have an actuator: the first ones."""
+    count = 0
     for i in range(n):
-        xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0
-    for j in range(int(row[slot.SIGNAL_COUNT])):
-        at = first + slot.SIGNAL_FIELDS * j
-        address, values, stream = int(row[at]), base + 8 * int(row[at + 1]), row[at + 2]
-        row[given + 3] = stream
-        for i in range(n):
-            if stream != 0.0 or i == 0:  # what is not random is the same in every channel
-                row[given + 2] = i
-                memory = base + 8 * (int(row[at + 3]) + i * int(row[at + 4]))
-                if call(address, base + 8 * given, values, memory, base + 8 * out) != 0:
-                    return slot.DISTURBANCE_RAISED
-            if row[at + 5] != 0.0:  # a horizontal force
-                xfrc[table[i, column.PUSH]] += row[out]
-            else:
-                xfrc[table[i, column.XFRC]] += table[i, column.SIGN] * row[out]
-    for i in range(n):
-        if not (math.isfinite(xfrc[table[i, column.XFRC]]) and math.isfinite(xfrc[table[i, column.PUSH]])):
-            return slot.DISTURBANCE_NOT_FINITE
-    return slot.FINE
+        count += table[i, column.CTRL] >= 0
+    return count
 
 
 @njit(error_model="numpy")
-def _disturbance(table, i, xfrc, tips, anchors):
-    """The generalised force that xfrc_applied exerts on channel i."""
-    d = table[i, column.SIGN] * xfrc[table[i, column.XFRC]]
-    if table[i, column.TIP] >= 0:
-        d += (
-            table[i, column.PUSH_SIGN]
-            * (tips[table[i, column.TIP]] - anchors[table[i, column.ANCHOR]])
-            * xfrc[table[i, column.PUSH]]
-        )
-    return d
-
-
-@njit(error_model="numpy")
-def _weigh(row, table, actuators, constraints):
-    """Add up what drives, and what friction and contacts, exerted on each joint in the last physics step."""
-    for i in range(int(row[slot.CHANNELS])):
-        at = int(row[slot.FORCES]) + 2 * i
-        row[at] += actuators[table[i, column.FORCE]]
-        row[at + 1] += constraints[table[i, column.QVEL]]
-        if table[i, column.FRICTION] >= 0:
-            row[at + 1] += actuators[table[i, column.FRICTION]]
+def _apply(row, table, ctrl, step):
+    """The command whose delay has passed at a physics step, where one arrives, to the actuators."""
+    n, past = int(row[slot.CHANNELS]), step - int(row[slot.DELAY])
+    if past < 0 or past % int(row[slot.STEPS]) != 0:
+        return
+    ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
+    for i in range(n):
+        if table[i, column.CTRL] >= 0:
+            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
 
 
 @njit(error_model="numpy")
@@ -178,30 +191,29 @@ def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators
     sampling = stage == 0 and within == 0
     failure = slot.FINE
     if stage == 0:
-        _weigh(row, table, actuators, constraints)
+        weigh(row, table, actuators, constraints)
     if stage == 0 and _escaped(row, qpos, qvel):
         failure = slot.DIVERGED
     elif sampling:
         failure = _measure(base, row, table, sensors, k)
         if failure == slot.FINE:
-            failure = _decide(base, row, log, k)
-    past = step - int(row[slot.DELAY])
-    if stage == 0 and past >= 0 and past % int(row[slot.STEPS]) == 0:
-        ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
-        for i in range(n):
-            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
+            failure = _decide(base, row, table, log, k)
+    if stage == 0:
+        _apply(row, table, ctrl, step)
     if row[slot.SIGNAL_COUNT] != 0.0 and failure == slot.FINE:
         fraction = 0.0 if stage == 0 else (LEFT if stage == 3 else 0.5)
-        failure = _disturb(base, row, table, xfrc, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
+        failure = disturb(base, row, table, xfrc, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
     if failure != slot.FINE:
         row[slot.FAILURE], row[slot.FAILED_STEP] = failure, step
         for i in range(n):
-            ctrl[table[i, column.CTRL]], xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0, 0.0
+            xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0
+            if table[i, column.CTRL] >= 0:
+                ctrl[table[i, column.CTRL]] = 0.0
     elif sampling:
         for i in range(n):
             log[0, k, i], log[1, k, i] = qpos[table[i, column.QPOS]], qvel[table[i, column.QVEL]]
-            log[3, k, i] = ctrl[table[i, column.CTRL]] / row[slot.SCALE]
-            log[5, k, i] = _disturbance(table, i, xfrc, tips, anchors)
+            log[3, k, i] = ctrl[table[i, column.CTRL]] / row[slot.SCALE] if table[i, column.CTRL] >= 0 else 0.0
+            log[5, k, i] = disturbance(table, i, xfrc, tips, anchors)
             at = int(row[slot.FORCES]) + 2 * i
             log[7, k, i], log[8, k, i] = row[at] / row[slot.STEPS], row[at + 1] / row[slot.STEPS]
             row[at], row[at + 1] = 0.0, 0.0

@@ -13,6 +13,7 @@ s it ends the run.
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import functools
+import math
 from collections.abc import Callable
 
 from numba import carray
@@ -27,7 +28,7 @@ from smc_mujoco.signals import Signal
 
 @functools.cache
 def law(function: Callable, gains: tuple[str, ...], memory: int) -> Function:
-    """(y, gains, memory) -> (u, s)."""
+    """(y, gains, memory) -> (u, s); of a surface (s, eq)."""
     body, measurement, values = jit(function), loader(Measurement), loader(named(gains))
 
     def native(y, g, m, out):
@@ -43,16 +44,31 @@ def law(function: Callable, gains: tuple[str, ...], memory: int) -> Function:
 
 @functools.cache
 def estimator(function: Callable, gains: tuple[str, ...], memory: int) -> Function:
-    """(y, gains, memory) -> velocity."""
+    """(y, gains, memory) -> velocity, or velocity and acceleration."""
     body, reading, values = jit(function), loader(Reading), loader(named(gains))
 
-    def native(y, g, m, out):
+    def one(y, g, m, out):
         ok, result = attempt(body, (reading(y), values(g), carray(pointer(m), (memory,))))
         if ok:
-            carray(pointer(out), (1,))[0] = result
+            output = carray(pointer(out), (2,))
+            output[0], output[1] = result, math.nan  # no acceleration
         return not ok
 
-    return Function(native)
+    def two(y, g, m, out):
+        ok, result = attempt(body, (reading(y), values(g), carray(pointer(m), (memory,))))
+        if ok:
+            v, a = result
+            output = carray(pointer(out), (2,))
+            output[0], output[1] = v, a
+        return not ok
+
+    try:
+        return Function(one)
+    except NotCompilable as error:
+        try:
+            return Function(two)
+        except NotCompilable:
+            raise error from None
 
 
 @functools.cache
@@ -102,12 +118,12 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 def component(c: Component) -> Function:
-    """A law or an estimator, compiled.
+    """A law, a surface or an estimator, compiled.
 
     Raises:
       NotCompilable: with its name and the compiler's reason.
     """
-    compiler = {"law": law, "estimator": estimator}[c.kind]
+    compiler = {"law": law, "surface": law, "estimator": estimator}[c.kind]
     return _named(f"{c.kind} {c.name!r}", compiler, c.function, tuple(c.gains), c.memory)
 
 

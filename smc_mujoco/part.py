@@ -55,24 +55,38 @@ class Actuator(Part):
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
-    """The actuators that take commands, one a channel."""
+    """The actuators that take commands, one a channel that is driven."""
     return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
 
 
-def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
-    """The channels' joints, in the order of `drives`."""
+def driven(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+    """The joints of the channels that have an actuator, in the order of `drives`."""
     return [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
 
 
+def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+    """The channels' joints: the driven ones, and after them those that are only measured."""
+    names = [joint.name for joint in driven(spec)]
+    measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
+    return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
+
+
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The actuators that take commands, (n,)."""
+    """The actuators that take commands."""
     return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
 
 
+def driven_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The joints of the channels that have an actuator."""
+    names = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
+    return np.array([model.joint(name.removeprefix(ROTOR)).id for name in names], int)
+
+
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The channels' joints, (n,)."""
-    driven = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
-    return np.array([model.joint(name.removeprefix(ROTOR)).id for name in driven], int)
+    """The channels' joints, (n,): the driven ones, and after them those that are only measured."""
+    found = driven_ids(model)
+    measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
+    return np.array([*found, *(joint for joint in measured if joint not in found)], int)
 
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:

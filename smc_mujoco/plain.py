@@ -30,7 +30,7 @@ from smc_mujoco.channels import (
     channels,
 )  # fmt: skip
 from smc_mujoco.estimators import Reading
-from smc_mujoco.guarded import Failure, guarded, named, numbers, signalled
+from smc_mujoco.guarded import Failure, estimated, guarded, named, numbers, signalled, surfaced
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
 from smc_mujoco.plant import Values
@@ -79,12 +79,14 @@ class Loop:
             sensors.remember(self.model, self.data)
         self.calls = 0
         self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
+        self.surface = scenario.surface and remade(scenario.surface.function, as_written)
+        self.surface_memory = [np.zeros(scenario.surface.memory if scenario.surface else 0) for _ in range(n)]
         self.nominal = Values(**scenario.plant.parameters)
         self.memory = [np.zeros(scenario.law.memory) for _ in range(n)]
         self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
-        self.s, self.r = np.zeros(n), np.zeros(n)
+        self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
         self.held = np.zeros((n, 2))  # the last readings that arrived
         self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
         self.scale = math.prod(part.scale for part in scenario.actuator)
@@ -112,7 +114,7 @@ class Loop:
             d = self.disturb(data, t)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
-                applied = data.ctrl[self.table[:, CTRL]] / self.scale
+                applied = np.where(self.table[:, CTRL] >= 0, data.ctrl[self.table[:, CTRL]] / self.scale, 0.0)
                 self.log[:, k] = (
                     x,
                     v,
@@ -138,7 +140,8 @@ class Loop:
             self.commands.append(u)
         past = step - self.scenario.delay_steps
         if past >= 0:
-            data.ctrl[self.table[:, CTRL]] = self.scale * self.commands[past // self.scenario.steps]
+            driven = self.table[:, CTRL] >= 0
+            data.ctrl[self.table[driven, CTRL]] = (self.scale * self.commands[past // self.scenario.steps])[driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""
@@ -150,7 +153,7 @@ class Loop:
             x[i], v[i] = self.read(i, x[i], v[i], j)
             reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
             out = guarded(estimator, self.estimator, i, reading, named(estimator), self.estimator_memory[i])
-            v[i] = numbers(f"estimator {estimator.name!r}", (out,), "a velocity")[0]
+            v[i], self.a[i] = estimated(estimator, out)
         return x, v
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
@@ -162,7 +165,7 @@ class Loop:
         if sensor is None:
             return x, v
         x += sensor.bias
-        if q := sensor.quantum(self.scenario.plant.unit):
+        if q := sensor.quantum(self.table[i, TIP] >= 0):
             x = q * math.floor(x / q + 0.5)
         if j > 0 and words(seed, i, noise.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.held[i, 0], self.held[i, 1]
@@ -176,8 +179,20 @@ class Loop:
         r, dr, ddr = signalled(scenario.reference, t)
         self.r[:] = r
         for i in range(len(x)):
+            if self.table[i, CTRL] < 0:  # only measured
+                u[i] = s[i] = self.r[i] = 0.0
+                continue
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
-            y = Measurement(t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g))
+            y = Measurement(
+                t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
+                float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.u_max, float(scenario.model == "nominal"),
+            )  # fmt: skip
+            if (j := i + int(np.sum(self.table[:, CTRL] >= 0))) < len(x):  # moves with it, without an actuator
+                fq, gq = self.model_at(x, v, j)
+                y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
+            if scenario.surface is not None:
+                slid = guarded(scenario.surface, self.surface, i, y, named(scenario.surface), self.surface_memory[i])
+                y = y._replace(surfaced=1.0, **dict(zip(("s", "eq"), surfaced(scenario.surface, slid), strict=True)))
             out = guarded(law, self.law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
             asked = min(abs(u[i]), scenario.u_max) * max(1.0, self.scale)
@@ -200,11 +215,12 @@ class Loop:
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
             stream = self.scenario.stream(j)
             d = [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
-            xfrc[table[:, PUSH if signal.cartesian else XFRC]] += d if signal.cartesian else table[:, SIGN] * d
+            matched = table[:, SIGN] * d * (table[:, CTRL] >= 0)  # where an actuator could answer it
+            xfrc[table[:, PUSH if signal.cartesian else XFRC]] += d if signal.cartesian else matched
         d = table[:, SIGN] * xfrc[table[:, XFRC]]
-        if np.all(table[:, TIP] >= 0):
-            arm = data.xipos.ravel()[table[:, TIP]] - data.xanchor.ravel()[table[:, ANCHOR]]
-            d += table[:, PUSH_SIGN] * arm * xfrc[table[:, PUSH]]
+        hinged = table[:, TIP] >= 0
+        arm = data.xipos.ravel()[table[:, TIP]] - data.xanchor.ravel()[table[:, ANCHOR]]
+        d[hinged] += (table[:, PUSH_SIGN] * arm * xfrc[table[:, PUSH]])[hinged]
         if not np.all(np.isfinite(d)):
             raise Failure("the disturbance became NaN or inf")
         return d
@@ -212,7 +228,7 @@ class Loop:
     def weigh(self, data: mujoco.MjData) -> None:
         """Add up what drives, and what friction and contacts, exerted on the joints in the last physics step."""
         rubs = self.table[:, FRICTION] >= 0
-        self.acted[0] += data.actuator_force[self.table[:, FORCE]]
+        self.acted[0] += np.where(self.table[:, FORCE] >= 0, data.actuator_force[self.table[:, FORCE]], 0.0)
         self.acted[1] += data.qfrc_constraint[self.table[:, QVEL]]
         self.acted[1, rubs] += data.actuator_force[self.table[rubs, FRICTION]]
 

@@ -66,6 +66,7 @@ class Plant:
       lane: offset in metres between machines that stand side by side in a film, (3,).
       contacts: kind of contact -> the edit of the MjSpec that brings its obstacles and contact pairs.
       mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
+      underactuated: whether channels without an actuator come after those with one.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Plant:
     lane: tuple[float, float, float]
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
+    underactuated: bool = False
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms"):
@@ -93,7 +95,22 @@ class Plant:
     @property
     def positive(self) -> frozenset[str]:
         """Parameters without which there is no mechanism."""
-        return frozenset({self.mass, "l"})
+        return frozenset({self.mass, "M", "m", "l"}) & frozenset(self.parameters)
+
+    @property
+    def driven(self) -> int:
+        """How many channels have an actuator: the first ones. Each has at most one joint that moves with it."""
+        return self.n // 2 if self.underactuated else self.n
+
+    @property
+    def free(self) -> int:
+        """How many channels are joints that are only measured: the last ones."""
+        return self.n - self.driven
+
+    @property
+    def network(self) -> bool:
+        """Whether there are several channels of a kind."""
+        return self.driven > 1
 
     def spec(self) -> mujoco.MjSpec:
         """The mechanism as an editable MjSpec, with default parameters."""

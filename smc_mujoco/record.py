@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
 
-from smc_mujoco import __version__, actuators, friction  # noqa: F401  # so that a file finds their parts
+from smc_mujoco import __version__, actuators, friction, references  # noqa: F401  # so that a file finds their parts
 from smc_mujoco.component import Component, Template
 from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
@@ -16,6 +16,7 @@ from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.series import TimeSeries  # noqa: F401  # so that it is among the signals
 from smc_mujoco.signals import Recorded, Signal
+from smc_mujoco.surfaces import catalogue as surfaces
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 PARTS = ("friction", "contact", "actuator", "sensor")
@@ -32,6 +33,8 @@ def describe(scenario: Scenario) -> dict:
             "versions": {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")},
             "law": _component(scenario.law),
             "velocity": _component(scenario.velocity),
+            "surface": scenario.surface and _component(scenario.surface),
+            "model": scenario.model,
             "reference": _signal(scenario.reference),
             "disturbance": [_signal(d) for d in scenario.disturbance],
             "noise": dataclasses.asdict(scenario.noise),
@@ -51,12 +54,13 @@ def restore(data: dict) -> Scenario:
         raise ScenarioError(f"plant {plant['name']!r} is not the library's: run it where it is defined")
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
-    fields |= {"mechanism": data["mechanism"]} if "mechanism" in data else {}
+    fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     scenario = Scenario(
         **fields,
         plant=find_plant(plant.pop("name"), **plant),
         law=_find(data["law"], "law", laws()),
         velocity=_find(data["velocity"], "estimator", estimators()),
+        surface=data.get("surface") and _find(data["surface"], "surface", surfaces()),
         reference=_restore_signal(data["reference"]),
         disturbance=tuple(_restore_signal(d) for d in data["disturbance"]),
         noise=Noise(**data["noise"]),
@@ -68,14 +72,24 @@ def restore(data: dict) -> Scenario:
 
 
 def _component(c: Component) -> dict:
-    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory, "module": getattr(c.function, "__module__", "")}
+    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
+        "degree": c.degree,
+        "module": getattr(c.function, "__module__", ""),
+    }
 
 
 def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
     template = known.get(data["name"])
     if template is not None and template.function.__module__ == data["module"]:
-        return template(**data["gains"])
-    return Component(kind=kind, name=data["name"], gains=dict(data["gains"]), memory=data["memory"], function=None)
+        return template.bind(data["gains"])
+    return Component(
+        kind=kind,
+        name=data["name"],
+        gains=dict(data["gains"]),
+        memory=data["memory"],
+        degree=data.get("degree", 1),
+        function=None,
+    )
 
 
 def _signal(signal: Signal) -> dict:

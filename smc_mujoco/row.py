@@ -17,12 +17,14 @@ import numpy as np
     IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
     CHANNELS, TABLE, POSITIONS, VELOCITIES, STEPS, STAGES, STEP, PERIOD,  # channel table, nq, nv, clock
     DELAY, RING, RINGS, LIMIT, SCALE, FORCES,  # delay in steps, ring, its samples, u_max, drive, sums of forces
-    SEED, SIGMA_X, SIGMA_V, BIAS, QUANTUM, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
-    LAW, GAINS, ESTIMATOR, ESTIMATOR_GAINS, NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
+    SEED, SIGMA_X, SIGMA_V, BIAS, COUNTS, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
+    LAW, GAINS, MODEL, SURFACE, SURFACE_GAINS, ESTIMATOR, ESTIMATOR_GAINS,
+    NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
     SIGNALS, SIGNAL_COUNT, LOG, SAMPLES,
-    INPUT, OUTPUT, STATE, LAW_MEMORY, LAW_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
+    INPUT, OUTPUT, STATE,
+    LAW_MEMORY, LAW_STRIDE, SURFACE_MEMORY, SURFACE_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
     HEADER,
-) = range(47)  # fmt: skip
+) = range(52)  # fmt: skip
 
 # Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
 # whether it is a Cartesian force.
@@ -35,7 +37,7 @@ LOGS = len(LOGGED)
 
 # What FAILURE says.
 FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE = range(4)
-ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED, DISTURBANCE_RAISED = range(4, 9)
+ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED, DISTURBANCE_RAISED, SURFACE_RAISED = range(4, 10)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -54,6 +56,8 @@ class Contents:
     """What one simulation's row says."""
 
     law: Part
+    model: bool  # whether the law may use the nominal model
+    surface: Part | None
     estimator: Part
     nominal: Part
     reference: Part
@@ -70,7 +74,7 @@ class Contents:
     sigma_v: float
     scale: float = 1.0  # what a drive takes per unit of u: V / (N m) of a motor's amplifier
     bias: float = 0.0  # of the encoder, in the unit of x
-    quantum: float = 0.0  # of position; 0: none
+    counts: float = 0.0  # a revolution of a hinge, a metre of a slide; 0: no rounding
     lost: float = 0.0  # probability that a reading gets lost
     read_period: float = 0.0  # s between readings; 0: every control sample
     read_delay: float = 0.0  # s until a reading arrives
@@ -82,7 +86,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     Args:
       c: its contents.
       mark: what tells it from any other userdata, `callback.mark()`.
-      table: the channel table, (n, 7) int64, which must outlive the run.
+      table: the channel table, (n, 13) int64, which must outlive the run.
       log: (LOGS, K + 1, n) float64, written at samples, which must outlive the run.
     """
     row = [0.0] * HEADER
@@ -100,20 +104,25 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.period, c.delay, rings
     row[LIMIT], row[SCALE] = c.limit, c.scale
     row[SEED], row[SIGMA_X], row[SIGMA_V] = c.seed, c.sigma_x, c.sigma_v
-    row[BIAS], row[QUANTUM], row[LOST] = c.bias, c.quantum, c.lost
+    row[BIAS], row[COUNTS], row[LOST] = c.bias, c.counts, c.lost
     row[READ_PERIOD], row[READ_DELAY] = c.read_period, c.read_delay
     row[LAW], row[ESTIMATOR], row[NOMINAL] = c.law.address, c.estimator.address, c.nominal.address
     row[REFERENCE], row[SIGNAL_COUNT] = c.reference.address, len(c.disturbances)
     row[LOG], row[SAMPLES] = address(log), log.shape[1]
     row[LAW_STRIDE], row[ESTIMATOR_STRIDE] = c.law.memory, c.estimator.memory
+    row[MODEL] = c.model
     put(GAINS, c.law.values)
+    if c.surface is not None:
+        row[SURFACE], row[SURFACE_STRIDE] = c.surface.address, c.surface.memory
+        put(SURFACE_GAINS, c.surface.values)
+        reserve(SURFACE_MEMORY, c.surface.memory * n)
     put(ESTIMATOR_GAINS, c.estimator.values)
     put(NOMINAL_VALUES, c.nominal.values)
     put(REFERENCE_VALUES, c.reference.values)
     reserve(SIGNALS, SIGNAL_FIELDS * len(c.disturbances))
-    reserve(INPUT, 16)
+    reserve(INPUT, 24)
     reserve(OUTPUT, 4)
-    reserve(STATE, 2 + 2 * n)  # the nominal model's input: i, n, measured x, estimated v
+    reserve(STATE, 2 + 3 * n)  # the nominal model's input, i, n, measured x, estimated v; and estimated acceleration
     reserve(HELD, 2 * n)
     reserve(FORCES, 2 * n)
     for i, d in enumerate(c.disturbances):

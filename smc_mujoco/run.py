@@ -94,8 +94,8 @@ def _check(scenario: object) -> None:
     """Raise ScenarioError for what is no scenario, or one whose functions a file could not bring back."""
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-    for part in (scenario.law, scenario.velocity):
-        if part.function is None:
+    for part in (scenario.law, scenario.surface, scenario.velocity):
+        if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     for signal in (scenario.reference, *scenario.disturbance):
         if isinstance(signal, Recorded):
@@ -125,7 +125,8 @@ def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int)
 
 def _bytes(s: Scenario) -> int:
     """What a simulation takes: its log, its mjData, and twice its row (packed, and in the Batch) with the state."""
-    memories = s.law.memory + s.velocity.memory + sum(d.memory for d in s.disturbance)
+    surface = 0 if s.surface is None else s.surface.memory
+    memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
     row = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 40)
     return int(8 * (LOGS * (s.samples + 1) * s.plant.n + 2 * row) + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
 

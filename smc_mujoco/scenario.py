@@ -22,6 +22,7 @@ from smc_mujoco.part import Actuator, Friction
 from smc_mujoco.plant import Plant, plant
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Constant, Signal
+from smc_mujoco.surfaces import Surface
 
 SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
 
@@ -36,6 +37,9 @@ class Scenario:
     Attributes:
       plant: a Plant or the name of one.
       law: a Law (`smc.law(name, **gains)` or your own), or the name of one.
+      model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "none",
+        and "nominal" for a law that cannot do without.
+      surface: a Surface or the name of one, for the laws that take one; None: the law's own, de + c e.
       duration: s. The run lasts the whole control periods that fit into it.
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
@@ -64,6 +68,8 @@ class Scenario:
 
     plant: Plant
     law: Law
+    model: str = MISSING
+    surface: Surface | None = None
     duration: float = 10.0
     control_period: float = 1e-3
     physics_step: float = MISSING
@@ -92,6 +98,8 @@ class Scenario:
             *,
             plant: Plant | str,
             law: Law | Template | str,
+            model: str | None = None,
+            surface: Surface | Template | str | None = None,
             duration: float = 10.0,
             control_period: float = 1e-3,
             physics_step: float | None = None,
@@ -130,6 +138,8 @@ class Scenario:
         if not isinstance(self.sensor, Encoder | None):
             raise ScenarioError(f"sensor is {shown(self.sensor)}: give smc.Encoder(counts=...) or None")
         put("law", given.component(self.law, "law"))
+        put("model", given.model(self.model, self.law))
+        put("surface", None if self.surface is None else given.component(self.surface, "surface"))
         put("velocity", given.velocity(self.velocity, self.sensor))
         put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
         put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
@@ -159,7 +169,9 @@ class Scenario:
     def left_out(self) -> list[str]:
         """Fields whose defaults depend on others: dataclasses.replace finds them anew."""
         return [
-            name for name in ("physics_step", "integrator", "velocity", "x0") if given.left_out(getattr(self, name))
+            name
+            for name in ("model", "physics_step", "integrator", "velocity", "x0")
+            if given.left_out(getattr(self, name))
         ]
 
     @property

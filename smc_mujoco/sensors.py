@@ -53,9 +53,9 @@ class Encoder(Part):
             object.__setattr__(self, "period", number("Encoder's period", self.period, above=0.0))
         object.__setattr__(self, "delay", number("Encoder's delay", self.delay, least=0.0))
 
-    def quantum(self, unit: str) -> float:
-        """One count in rad or m; 0 without quantisation."""
-        return 0.0 if self.counts == math.inf else (2.0 * math.pi if unit == "rad" else 1.0) / self.counts
+    def quantum(self, hinge: bool) -> float:
+        """One count in rad of a hinge, or m of a slide; 0 without quantisation."""
+        return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
 
     def readings(self, step: float) -> int:
         """How many readings MuJoCo must remember, with one a physics step of `step` s; 0 where none is late."""

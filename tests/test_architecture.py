@@ -14,16 +14,16 @@ import smc_mujoco as smc
 
 PACKAGE = Path(smc.__file__).parent
 ROOT = PACKAGE.parent
-CATALOGUES = ("laws", "plants", "estimators")
+CATALOGUES = ("laws", "surfaces", "plants", "estimators")
 
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
     {"errors", "gl", "noise", "row", "coil", "frozen", "remade"},
     {"files", "layout", "compiled", "component", "conditions"},
-    {"law", "estimators", "signals", "plant"},
-    {"series", "part", "mechanism"},
-    {"native", "guarded", "channels", "friction", "actuators", "backlash", "contact", "sensors"},
-    {"given", "pendulum_chain", "cart"},
+    {"estimators", "signals", "plant"},
+    {"law", "series", "references", "part", "mechanism"},
+    {"surfaces", "native", "guarded", "channels", "friction", "actuators", "backlash", "contact", "sensors"},
+    {"given", "forces", "pendulum_chain", "cart"},
     {"consistency", "pendulum_row"},
     {"scenario"},
     {"harness", "record", "paper", "assembly"},
@@ -36,6 +36,7 @@ HEIGHT = {name: height for height, names in enumerate(CORE) for name in names}
 TOP = len(CORE)  # the height of what shows results
 ENTRIES = {  # what the files of a catalogue may import of ours
     "laws": {"law"},
+    "surfaces": {"surfaces", "law"},
     "plants": {"plant", "pendulum_chain", "pendulum_row", "cart", "contact", "part", "coil", "errors"},
     "estimators": {"estimators"},
 }
@@ -184,7 +185,7 @@ for name in modules:
     importlib.import_module("smc_mujoco." + name)
 import smc_mujoco as smc
 print(*[name for name in {public!r} if isinstance(getattr(smc, name), types.ModuleType)])
-print(smc.law("classical").name, smc.plants()[0], len(smc.laws()) > 1, callable(smc.run), callable(smc.estimators))
+print(smc.law("classical").name, smc.plants()[1], len(smc.laws()) > 1, callable(smc.run), callable(smc.estimators))
 """
 
 
@@ -214,6 +215,12 @@ from smc_mujoco.estimators import estimator_function
 def brand_new(y, gains, memory):
     return gains.k * y.v
 """,
+    "surfaces": """
+from smc_mujoco.surfaces import surface_function
+@surface_function(gains={"k": 2.0})
+def brand_new(y, gains, memory):
+    return y.de + gains.k * y.e, -gains.k * y.de
+""",
     "plants": """
 import dataclasses
 from smc_mujoco.plants.duffing import DUFFING
@@ -221,6 +228,7 @@ BRAND_NEW = dataclasses.replace(DUFFING, name="brand_new")
 """,
 }
 RUN = {
+    "surfaces": "smc.Scenario(plant='duffing', law='classical', surface='brand_new', duration=0.01)",
     "laws": "smc.Scenario(plant='duffing', law='brand_new', duration=0.01)",
     "estimators": "smc.Scenario(plant='duffing', law='classical', velocity='brand_new', duration=0.01)",
     "plants": "smc.Scenario(plant='brand_new', law='classical', duration=0.01)",

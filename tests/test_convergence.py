@@ -58,7 +58,7 @@ HITS = {
 def cases(n=None):
     """(plant, name) -> the fields of a scenario that make it realistic."""
     found = {}
-    for name in smc.plants():
+    for name in smc.paper.GAINS:
         plant = smc.plant(name) if n is None or smc.plant(name).n == 1 else smc.plant(name, n=n)
         for part, fields in PARTS.items():
             found[name, part] = {"plant": plant} | fields

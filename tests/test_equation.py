@@ -103,7 +103,7 @@ def everything(plant, law):
 
 
 def test_every_plant_has_its_equation_here():
-    assert set(smc.plants()) == set(EQUATION)
+    assert {name for name in smc.plants() if not smc.plant(name).underactuated} == set(EQUATION)
 
 
 @PLANTS
@@ -150,6 +150,7 @@ def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, ord
     assert np.all(np.abs(slopes - order) < (0.3 if order == 4 else 0.1)), slopes
 
 
+STUDIED = [*smc.paper.GAINS["duffing"], "none"]  # laws
 HALF = 0.25  # s
 CONDITIONS = {
     "nominal": {},
@@ -186,7 +187,7 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     fields = CONDITIONS[condition]
     if condition == "jump":
         fields = {"jump": smc.Jump(time=HALF, factors=smc.paper.JUMP_MILD[plant]), "disturbance": SINE}
-    scenarios = [dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in smc.laws()]
+    scenarios = [dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in STUDIED]
     for trace in smc.run(scenarios):
         s = trace.scenario
         states = np.stack([trace.x, trace.v])

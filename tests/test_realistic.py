@@ -19,7 +19,7 @@ from smc_mujoco.part import dof_ids, joint_ids
 from smc_mujoco.trace import ARRAYS
 
 runner = importlib.import_module("smc_mujoco.run")  # smc.run is the function
-PLANTS = pytest.mark.parametrize("name", smc.plants())
+PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
 LUGRE = smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
 MOTOR = smc.DCMotor()
@@ -30,7 +30,7 @@ APART = {"x0": (-0.5, 0.0, 0.0), "v0": (12.0, 0.0, 0.0)}  # of three bobs the fi
 
 def small(name):
     """The plant; of networks three channels."""
-    return smc.plant(name) if smc.plant(name).n == 1 else smc.plant(name, n=3)
+    return smc.plant(name, n=3) if smc.plant(name).network else smc.plant(name)
 
 
 def scenario(name="duffing", law="observer_free", **changes):
@@ -107,7 +107,7 @@ def pick(rng, *options):
 def scattered(number):
     """A random valid realistic scenario."""
     rng = np.random.default_rng(number)
-    plant = small(str(rng.choice(smc.plants())))
+    plant = small(str(rng.choice(list(smc.paper.GAINS))))
     u, h = rng.uniform, 2.5e-4
     frictions = {
         "viscous": smc.Viscous(u(0, 1)),
@@ -212,7 +212,7 @@ NUMBERS = {
         {"friction": LUGRE, "actuator": MOTOR, "noise": smc.Noise(0.01), "disturbance": smc.Gust(3.0, 0.0, 0.1)},
     ],
 }  # fmt: skip
-CONTACT_NUMBERS = [(name, contact) for name in smc.plants() for contact in smc.plant(name).contacts]
+CONTACT_NUMBERS = [(name, contact) for name in smc.paper.GAINS for contact in smc.plant(name).contacts]
 
 
 def one_batch(scenarios):
@@ -435,7 +435,7 @@ PASSIVE = {
 }
 
 
-@pytest.mark.parametrize("name", [n for n in smc.plants() if n != "van_der_pol"])  # which makes energy
+@pytest.mark.parametrize("name", [n for n in smc.paper.GAINS if n != "van_der_pol"])  # which makes energy
 @pytest.mark.parametrize("part", PASSIVE)
 def test_a_passive_mechanism_never_gains_energy(name, part):
     if part == "springs" and not smc.plant(name).mechanisms:
@@ -489,7 +489,7 @@ def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
 # what force and reaction say
 
 
-@pytest.mark.parametrize("name", [n for n in smc.plants() if n != "van_der_pol"])
+@pytest.mark.parametrize("name", [n for n in smc.paper.GAINS if n != "van_der_pol"])
 @pytest.mark.parametrize("friction", [smc.Coulomb(20.0), smc.LuGre(20.0, 20.0, 0.1)])
 def test_the_reaction_that_holds_a_stuck_joint_balances_all_other_forces(name, friction):
     trace = smc.run(scenario(name, friction=friction, duration=8.0, disturbance=smc.Constant(0.7)))
@@ -512,7 +512,7 @@ def test_two_frictions_react_together():
 
 
 def test_nothing_reacts_on_an_ideal_plant():
-    for name in smc.plants():
+    for name in smc.paper.GAINS:
         trace = smc.run(scenario(name))
         assert not trace.reaction.any()
         np.testing.assert_array_equal(trace.force[0], 0.0)
@@ -685,7 +685,7 @@ def test_what_does_not_fit_is_refused_in_one_sentence(fields, says):
     assert "give" in message or "choose" in message or "mean" in message or "leave" in message or "widen" in message
 
 
-@pytest.mark.parametrize("name", smc.plants())
+@pytest.mark.parametrize("name", smc.paper.GAINS)
 def test_an_unknown_contact_or_mechanism_lists_what_the_plant_offers(name):
     plant = smc.plant(name)
     message = refused(plant=plant, contact="zzz")

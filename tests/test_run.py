@@ -325,7 +325,7 @@ def test_an_estimator_that_raises_is_named():
     failed(smc.run(scenario(velocity=sour())), 0.0, "estimator 'sour'", "ValueError")
 
 
-@pytest.mark.parametrize("value", ["x", None, (1.0, 2.0), 10**400], ids=lambda v: type(v).__name__)
+@pytest.mark.parametrize("value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__)
 def test_an_estimator_that_returns_no_number_is_named(value):
     @smc.estimator_function()
     def odd(y, gains, memory):

@@ -538,3 +538,35 @@ def test_a_variant_is_checked_like_any_other():
 def test_a_scenario_shows_its_fields():
     assert "duffing" in repr(scenario())
     assert "classical" in repr(scenario())
+
+
+# laws, models, surfaces
+
+
+@pytest.mark.parametrize("value", ["", 0, False, [], 5, "lienar"], ids=repr)
+def test_a_surface_that_is_none_is_refused(value):
+    refused(lambda: scenario(surface=value), "surface")
+
+
+@pytest.mark.parametrize("law", ["twisting", "nested_third_order", "pid"])
+def test_a_law_of_the_error_and_its_rates_takes_no_surface(law):
+    refused(lambda: scenario(law=law, surface="linear"), f"'{law}'", "'linear'")
+
+
+def test_a_law_that_cannot_do_without_the_model_gets_it_unless_told_otherwise():
+    without = smc.Scenario(plant="cart_pole", law="hierarchical")
+    assert without.model == "nominal"
+    assert smc.Scenario(plant="cart_pole", law="hierarchical", model="none").model == "none"
+    assert dataclasses.replace(without, law=smc.law("classical")).model == "none"
+
+
+def test_a_law_for_other_plants_is_refused():
+    refused(lambda: scenario(plant="duffing", law="swing_up"), "'swing_up'", "inverted_pendulum")
+
+
+def test_a_missed_condition_warns_once_where_it_was_written():
+    with pytest.warns(smc.GainWarning, match="r1 > r2") as caught:
+        law = smc.law("twisting", r1=1.0, r2=2.0)
+    assert [w.filename for w in caught] == [__file__]
+    again = pickle.loads(pickle.dumps(law))  # and not again
+    assert again == law

@@ -1,7 +1,11 @@
-"""Velocity estimators, one per file: (y, gains, memory) -> velocity; found by walking this package."""
+"""Velocity estimators, one per file: (y, gains, memory) -> velocity; found by walking this package.
+
+An estimator of higher order returns the pair (velocity, acceleration).
+"""
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
+from types import SimpleNamespace
 from typing import NamedTuple, overload
 
 from smc_mujoco.component import Component, Template, discover, template
@@ -27,6 +31,7 @@ def estimator_function(
     memory: int = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
 ) -> Callable[[Callable], Template]: ...
 def estimator_function(
     function: Callable | None = None,
@@ -36,9 +41,10 @@ def estimator_function(
     memory: int = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
 ) -> Callable[[Callable], Template] | Template:
     """Make an estimator of a function (y, gains, memory) -> velocity. Arguments as for `law_function`."""
-    decorate = template("estimator", gains, memory, positive, nonnegative)
+    decorate = template("estimator", gains, memory, positive, nonnegative, conditions=conditions)
     return decorate if function is None else decorate(function)
 
 
@@ -54,7 +60,7 @@ def estimator(name: str, **gains: float) -> Estimator:
     Raises:
       ScenarioError: unknown estimator or gain, or a gain out of its range.
     """
-    return find("velocity estimator", name, catalogue())(**gains)
+    return find("velocity estimator", name, catalogue()).bind(gains, level=3)
 
 
 def estimators() -> list[str]:
