@@ -1,72 +1,22 @@
-"""Each law is held to what is proved of it, mostly on plant A: s' = u + d, u held between samples.
+"""The laws of the study are held to what is proved of them, mostly on plant A: s' = u + d, u held between samples.
 
-Plant A is integrated without error, for the integral of d is given in closed form. Properties that every law must have
-walk the catalogue.
+What every law must have walks the catalogue in test_laws_catalogue.py.
 """
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
+from plants_ab import called, constant, measured, one, orders, plant_a, ramp, sine, wave
 from scipy.linalg import expm
 
 import smc_mujoco as smc
-from smc_mujoco import plain
-from smc_mujoco.law import Measurement, catalogue
-
-LAWS = pytest.mark.parametrize("name", smc.laws())
-ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])
-
-
-def measured(e=0.0, de=0.0, dt=1e-3, f=0.0, g=1.0):
-    """What a law sees with the reference at 0."""
-    return Measurement(t=0.0, dt=dt, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=f, g=g)
-
-
-def called(law, y, memory):
-    """u and s of a law that keeps its memory."""
-    assert law.function is not None
-    return law.function(y, plain.named(law), memory)
-
-
-@dataclasses.dataclass(frozen=True)
-class Sampled:
-    """A run of plant A: t, s, u and the first memory cell before each sample, (K,) each."""
-
-    t: np.ndarray
-    s: np.ndarray
-    u: np.ndarray
-    memory: np.ndarray
-
-    def residual(self):
-        """Largest |s| in the last 20 % of the run."""
-        return np.abs(self.s[-len(self.s) // 5 :]).max()
-
-
-def plant_a(law, integral=lambda t: 0.0, s=1.0, h=1e-3, duration=10.0, sign=1.0, noise=None):
-    """s' = sign u + d with d given by its integral; noise (K,) is added to the s that the law sees."""
-    count = round(duration / h)
-    memory, gains = np.zeros(law.memory), plain.named(law)
-    log = np.empty((3, count))
-    for k in range(count):
-        seen = s + (0.0 if noise is None else noise[k])
-        remembered = memory[0]
-        u, _ = law.function(measured(de=seen, dt=h), gains, memory)
-        log[:, k] = s, u, remembered
-        s += sign * h * u + integral((k + 1) * h) - integral(k * h)
-    return Sampled(np.arange(count) * h, *log)
-
-
-def wave(t):
-    """The integral of d = sin t + 0.5, |d| <= 1.5, |d'| <= 1."""
-    return -math.cos(t) + 0.5 * t
 
 
 @pytest.mark.parametrize("against", [0.0, 0.5, 1.5])
 def test_classical_reaches_in_the_time_that_the_gain_leaves(against):
     """|s|' = -(k - D) where a constant disturbance D pushes away: reached at |s0| / (k - D)."""
-    run = plant_a(smc.law("classical", k=2.0), lambda t: against * t, s=1.0)
+    run = plant_a(smc.law("classical", k=2.0), constant(against), s=1.0)
     reached = run.t[np.argmax(np.abs(run.s) <= 1e-3 * (2.0 + against))]
     assert reached == pytest.approx(1.0 / (2.0 - against), abs=0.01)
 
@@ -83,45 +33,38 @@ def test_classical_chatters_within_one_sample_of_its_force():
         assert plant_a(smc.law("classical", k=2.0), wave, h=h).residual() <= h * (2.0 + 1.5)
 
 
-def orders(law):
-    """Order of the residual under d = sin t + 0.5 in the control period, over two decades, and the residuals."""
-    steps = np.array([1e-2, 1e-3, 1e-4])
-    residuals = np.array([plant_a(law, wave, h=h, duration=20).residual() for h in steps])
-    return np.diff(np.log10(residuals)) / np.diff(np.log10(steps)), residuals
-
-
 def test_classical_residual_is_first_order_in_the_control_period():
-    slopes, residuals = orders(smc.law("classical", k=2.0))
+    slopes, residuals = orders(smc.law("classical", k=2.0), duration=20.0)
     assert np.all(np.abs(slopes - 1.0) < 0.1), slopes
     np.testing.assert_allclose(residuals[:2], [3.2e-2, 3.4e-3], rtol=0.1)
 
 
 def test_super_twisting_residual_is_second_order_in_the_control_period():
-    slopes, residuals = orders(smc.law("super_twisting", k1=1.5, k2=1.1))
+    slopes, residuals = orders(smc.law("super_twisting", k1=1.5, k2=1.1), duration=20.0)
     assert np.all(np.abs(slopes - 2.0) < 0.2), slopes
     np.testing.assert_allclose(residuals[:2], [3.8e-4, 5.1e-6], rtol=0.1)
 
 
 def test_super_twisting_follows_a_ramp_of_disturbance_that_outgrows_every_constant_gain():
     """d = 0.8 t has |d'| = 0.8 < k2: s stays at O(h^2) and u tends to -d, while a gain of 4 is lost at t = 5."""
-    ramp = plant_a(smc.law("super_twisting", k1=1.5, k2=1.1), lambda t: 0.4 * t * t)
-    assert ramp.residual() < 20 * 1e-3**2
-    late = ramp.t > 8
-    assert np.abs(ramp.u + 0.8 * ramp.t)[late].max() < 20 * 1e-3
-    assert plant_a(smc.law("classical", k=4.0), lambda t: 0.4 * t * t).residual() > 1
+    run = plant_a(smc.law("super_twisting", k1=1.5, k2=1.1), ramp(0.8))
+    assert run.residual() < 20 * 1e-3**2
+    late = run.t > 8
+    assert np.abs(run.u + 0.8 * run.t)[late].max() < 20 * 1e-3
+    assert plant_a(smc.law("classical", k=4.0), ramp(0.8)).residual() > 1
 
 
 def test_super_twisting_is_lost_when_the_disturbance_is_faster_than_its_integrator():
     """k2 = 0.5 cannot follow |d'| = 0.8: the rest grows until the square root carries it."""
-    slow = plant_a(smc.law("super_twisting", k1=1.5, k2=0.5), lambda t: 0.4 * t * t)
+    slow = plant_a(smc.law("super_twisting", k1=1.5, k2=0.5), ramp(0.8))
     assert slow.residual() > 0.5
 
 
 @pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
 def test_boundary_layer_ends_within_phi_d_over_k_and_a_constant_attains_it(k, phi, d):
     law, bound = smc.law("boundary_layer", k=k, phi=phi), phi * d / k
-    assert plant_a(law, lambda t: d * t, duration=30).s[-1] == pytest.approx(bound, rel=1e-9)
-    assert plant_a(law, lambda t: -d / 7 * math.cos(7 * t), duration=30).residual() <= bound
+    assert plant_a(law, constant(d), duration=30).s[-1] == pytest.approx(bound, rel=1e-9)
+    assert plant_a(law, sine(d, 7.0), duration=30).residual() <= bound
 
 
 def test_boundary_layer_is_the_sign_outside_its_layer():
@@ -130,14 +73,9 @@ def test_boundary_layer_is_the_sign_outside_its_layer():
         assert one(law, de=s) == one(classical, de=s)
 
 
-def one(law, **y):
-    """A law's first u and s."""
-    return called(law, measured(**y), np.zeros(law.memory))
-
-
 def gain(law, run):
     """K of an adaptive law at every sample."""
-    return law.gains["k0"] + run.memory
+    return law.gains["k0"] + run.memory[:, 0]
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.05])
@@ -216,89 +154,10 @@ def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, li
     assert norms[tiny][-1] < 0.5e-6 if stable else norms[tiny][-1] > 3e-6
 
 
-@ACTING
-def test_every_law_brings_plant_a_in_and_its_mirror_image_drives_it_out(name):
-    law = smc.law(name)
-    right = plant_a(law, lambda t: 0.5 * t)
-    wrong = plant_a(law, lambda t: 0.5 * t, sign=-1.0, duration=3.0)
-    assert right.residual() < 0.3
-    assert wrong.residual() > 1.0
-
-
-@LAWS
-def test_every_law_is_zero_at_the_origin(name):
-    """sgn(0) = 0: nothing is commanded where there is no error."""
-    law = smc.law(name)
-    memory = np.zeros(law.memory)
-    for _ in range(3):
-        assert called(law, measured(), memory) == (0.0, 0.0)
-
-
-@LAWS
-def test_every_law_is_odd_in_what_it_measures(name):
-    law = smc.law(name)
-    ours, mirrored = np.zeros(law.memory), np.zeros(law.memory)
-    for e, de, f in np.random.default_rng(0).normal(size=(500, 3)):
-        u, s = called(law, measured(e, de, f=f), ours)
-        assert called(law, measured(-e, -de, f=-f), mirrored) == (-u, -s)
-
-
-@ACTING
-def test_every_law_pushes_towards_its_surface(name):
-    law = smc.law(name)
-    for e, de in np.random.default_rng(0).normal(size=(200, 2)):
-        u, s = one(law, e=e, de=de)
-        assert u * s <= 0.0
-
-
-@LAWS
-def test_every_law_names_its_equation_and_its_source(name):
-    text = catalogue()[name].doc
-    assert "u = " in text
-    assert name == "none" or "Source" in text
-
-
-@LAWS
-@pytest.mark.parametrize("plant", smc.plants())
-def test_default_gains_run_on_every_plant(name, plant):
-    trace = smc.run(smc.Scenario(plant=plant, law=name, duration=1.0))
-    assert trace.failure is None
-    assert np.isfinite(trace.u).all()
-    assert np.abs(trace.u).max() <= 6.0
-
-
-@LAWS
-def test_no_gain_takes_nan_or_infinity(name):
-    for gain_name in catalogue()[name].defaults:
-        for value in (math.nan, math.inf):
-            with pytest.raises(smc.ScenarioError, match=gain_name):
-                smc.law(name, **{gain_name: value})
-
-
 def test_gains_that_would_turn_the_law_round_or_divide_by_zero_are_refused():
     for name, gains in (("observer_free", {"lam": 0.0}), ("boundary_layer", {"phi": 0.0})):
         with pytest.raises(smc.ScenarioError):
             smc.law(name, **gains)
-
-
-@LAWS
-def test_memory_belongs_to_a_channel(name):
-    """Uncoupled pendulums, one at rest and two mirrored: the first stays at rest, the others stay mirrored."""
-    plant = smc.plant("pendulum_network", n=3, kc=0.0)
-    trace = smc.run(smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.5))
-    assert not trace.x[:, 1].any()
-    np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
-    np.testing.assert_array_equal(trace.u[:, 2], -trace.u[:, 0])
-
-
-@LAWS
-def test_memory_belongs_to_a_run(name):
-    law = smc.law(name)
-    scenario = smc.Scenario(plant="duffing", law=law, duration=0.2)
-    first, second = smc.run([scenario, scenario])
-    third = smc.run(scenario)
-    np.testing.assert_array_equal(first.u, second.u)
-    np.testing.assert_array_equal(first.u, third.u)
 
 
 @pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])

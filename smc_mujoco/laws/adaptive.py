@@ -6,14 +6,12 @@ Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; 
 "New methodologies for adaptive sliding mode control", Int. J. Control 83(9):1907, 2010.
 """
 
-import math
-
-from smc_mujoco.law import law_function
+from smc_mujoco.law import command, law_function, sgn, sliding
 
 
-@law_function(gains={"gamma": 50.0, "c": 3.0, "k0": 0.0}, nonnegative=("gamma", "c", "k0"))
+@law_function(gains={"gamma": 50.0, "c": 2.5, "k0": 0.0}, nonnegative=("gamma", "c", "k0"))
 def adaptive(y, gains, memory):
-    s = y.de + gains.c * y.e
+    s, eq = sliding(y, gains.c)
     K = gains.k0 + memory[0]
     memory[0] += y.dt * gains.gamma * abs(s)
-    return (-K * math.copysign(1.0, s) if s != 0.0 else 0.0), s
+    return command(y, eq - K * sgn(s)), s

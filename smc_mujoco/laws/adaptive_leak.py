@@ -6,18 +6,16 @@ Source: P. Ioannou & P. Kokotovic, "Instability analysis and improvement of robu
 Automatica 20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (in a switching gain).
 """
 
-import math
-
-from smc_mujoco.law import law_function
+from smc_mujoco.law import command, law_function, sgn, sliding
 
 
 @law_function(
-    gains={"gamma": 15.0, "c": 3.0, "leak": 3.0, "deadzone": 0.05, "k0": 0.0},
+    gains={"gamma": 15.0, "c": 2.5, "leak": 3.0, "deadzone": 0.05, "k0": 0.0},
     nonnegative=("gamma", "c", "leak", "deadzone", "k0"),
 )
 def adaptive_leak(y, gains, memory):
-    s = y.de + gains.c * y.e
+    s, eq = sliding(y, gains.c)
     K = gains.k0 + memory[0]
     growth = gains.gamma * abs(s) if abs(s) > gains.deadzone else 0.0
     memory[0] = max(K + y.dt * (growth - gains.leak * K), 0.0) - gains.k0
-    return (-K * math.copysign(1.0, s) if s != 0.0 else 0.0), s
+    return command(y, eq - K * sgn(s)), s

@@ -1,4 +1,7 @@
-"""No control: u = 0. The baseline that shows what the plant does by itself; s is 0, there is no surface."""
+"""No control: u = 0.
+
+The baseline that shows what the plant does by itself, with or without a model; s is 0, there is no surface.
+"""
 
 from smc_mujoco.law import law_function
 

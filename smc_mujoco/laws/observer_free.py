@@ -8,10 +8,10 @@ variable as s - u/g; the law uses neither g nor that variable, so the trace hold
 
 import math
 
-from smc_mujoco.law import law_function
+from smc_mujoco.law import command, law_function, sliding
 
 
-@law_function(gains={"lam": 6.0, "k1": 3.0}, positive=("lam",))
+@law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
 def observer_free(y, gains, memory):
-    s = y.de + gains.k1 * y.e
-    return -gains.lam * math.tanh(s), s
+    s, eq = sliding(y, gains.k1)
+    return command(y, eq - gains.lam * math.tanh(s)), s
