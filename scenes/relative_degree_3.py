@@ -1,0 +1,37 @@
+"""Behind an actuator that lags by 50 ms: which laws of third order settle, with an acceleration that is estimated?
+
+The paper gives its law for any relative degree r, as -lambda tanh of x^(r-1) + ... + k1 x, and shows r = 2. A lag makes
+r = 3: the law needs x'', which Levant's differentiator gives, its L a little above the largest jerk, g U / tau.
+
+Look for: whether the paper's form settles, beside the nested third-order law, a surface of third order under the
+classical law, and the second-order form that does not know of the lag.
+"""
+
+import smc_mujoco as smc
+
+scene = smc.Scene(
+    title="Relative degree 3",
+    conditions={
+        name: {
+            label: smc.Scenario(
+                plant=name,
+                law=law,
+                surface=surface,
+                duration=6.0,
+                actuator=smc.Lag(0.05),
+                velocity=smc.estimator("levant", L=jerk),
+            )
+            for label, law, surface in (
+                ("third order", "observer_free_third", None),
+                ("second order", "observer_free", None),
+                ("nested", "nested_third_order", None),
+                ("classical, 3rd", "classical", "higher_order"),
+            )
+        }
+        for name, jerk in {"duffing": 200.0, "inverted_pendulum": 1000.0}.items()
+    },
+    answers=("settling_time", "ultimate_bound", "tv_rate"),
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
