@@ -16,6 +16,7 @@ from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import catalogue as plants
 from smc_mujoco.run import run
 from smc_mujoco.scene import Scene, slug
+from smc_mujoco.surfaces import catalogue as surfaces
 from smc_mujoco.trace import Trace
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
@@ -133,7 +134,7 @@ def summary(trace: Trace, console: Console) -> None:
     """What a trace is of, the course of its first channel, and its scores."""
     s = trace.scenario
     console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
-    if s.plant.n > 1:
+    if s.plant.network:
         console.print(f"channel 1 of {s.plant.n}:")
     for name in ("x", "v", "u", "s", *(["reaction"] if trace.reaction.any() else [])):
         column = getattr(trace, name)[:, 0]
@@ -154,6 +155,7 @@ def catalogues(console: Console) -> None:
     known = {
         "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
         "Laws": ((name, first(t.doc)) for name, t in laws().items()),
+        "Surfaces": ((name, first(t.doc)) for name, t in surfaces().items()),
         "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
         "Scenes, for smc-mujoco run": ((name, scene.question(path)) for name, path in scene.scenes().items()),
     }

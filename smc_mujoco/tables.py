@@ -33,7 +33,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> Table:
     first = next(iter(traces.values()))
     units = {m.name: m.unit_for(first.scenario.plant.unit) for m in metrics()}
     networks = {m.name for m in metrics() if m.network}
-    shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.n > 1 or name not in networks}
+    shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.network or name not in networks}
     table = _table(title)
     for head, name in shown.items():
         table.add_column(f"{head}\n[dim]{units[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
@@ -75,7 +75,7 @@ def _grid(title: str, heads: Sequence[str], columns: Sequence[tuple[Metric, Mapp
 
 def _cell(metric: Metric, trace: Trace | None) -> Text | str:
     """A metric of a run as a table has it; nothing where there is no such run, or the metric is for networks."""
-    if trace is None or (metric.network and trace.scenario.plant.n < 2):
+    if trace is None or (metric.network and not trace.scenario.plant.network):
         return ""
     return FAILED if trace.diverged_at is not None else number(metric.formula(trace))
 

@@ -87,7 +87,7 @@ class Charts:
 
 def draw_axes(axes: Sequence[Axes], traces: Sequence[Trace], end: float, point: float) -> None:
     """Frames, names and units, and what lines and bands are; a point has `point` px."""
-    unit, n, window = style.units(traces[0]), traces[0].x.shape[1], panels.mean_window(traces)
+    unit, n, window = style.units(traces[0]), traces[0].scenario.plant.driven, panels.mean_window(traces)
     names = f"{style.quantity(traces[0])} x ({unit['x']})", f"control u ({unit['u']})"
     for ax, name, words in zip(axes, names, (note(n), note(n, window, band=True)), strict=True):
         room = ax.get_window_extent().width - style.width(name, 11 * point, bold=True) - 15 * point

@@ -53,7 +53,7 @@ def figure(
     base = _base(path)
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
     traces = [finite(trace) for trace in traces]
-    network = any(trace.x.shape[1] > 1 for trace in traces)
+    network = any(trace.scenario.plant.network for trace in traces)
     with style.page():
         page = _page(7.2 + 1.3 * len(_realism(traces)))
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
@@ -99,7 +99,7 @@ def signals(
             panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
             ax.set_title(_variation(trace), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         for law, ax in zip(laws, axes[:, 0], strict=True):
-            ax.set_ylabel(_name(traces[0], "u", traces[0].x.shape[1] > 1).replace("control ", ""))
+            ax.set_ylabel(_name(traces[0], "u", traces[0].scenario.plant.network).replace("control ", ""))
             words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
             ax.set_title(words, color=style.law_colour(law), parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
@@ -118,8 +118,9 @@ def _overview(
     page: Figure, place: SubplotSpec, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]
 ) -> None:
     """The quantities over time, one below the other."""
-    network = traces[0].x.shape[1] > 1
-    rows = [*(["x", "spread", "u"] if network else ["x", "u"]), *_realism(traces), "s"]
+    plant = traces[0].scenario.plant
+    network = plant.network
+    rows = ["x", *["spread"] * network, *["q"] * bool(plant.free), "u", *_realism(traces), "s"]
     column, axes = place.subgridspec(len(rows), 1), {}
     for i, name in enumerate(rows):
         ax = axes[name] = page.add_subplot(column[i], sharex=axes.get("x"))
@@ -177,7 +178,7 @@ def _name(trace: Trace, name: str, network: bool) -> str:
     if name in ("spread", "force", "reaction"):
         words = {"spread": "max − min x", "force": "delivered", "reaction": "reaction"}
         return f"{'mean ' * (network and name != 'spread')}{words[name]} ({unit})"
-    words = {"x": style.quantity(trace), "v": "velocity", "u": "control", "s": "sliding variable"}
+    words = {"x": style.quantity(trace), "v": "velocity", "u": "control", "s": "sliding variable", "q": "angle"}
     return f"{'mean' if network else words[name]} {name} ({unit})"
 
 
@@ -197,7 +198,7 @@ def _key(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) 
 
 def _meaning(traces: Sequence[Trace], names: str) -> list[Line2D | Patch]:
     """What the bands and the lines of the named quantities are, where they need words."""
-    n, over = traces[0].x.shape[1], panels.mean_window(traces)
+    n, over = traces[0].scenario.plant.driven, panels.mean_window(traces)
     words = [] if over is None and n == 1 else [f"band: range of {names}"]
     words += [f"line: mean over {1e3 * over:.3g} ms"] if over else []
     handles: list[Line2D | Patch] = [Patch(color=style.MUTED, alpha=0.3, label=", ".join(words))] if words else []

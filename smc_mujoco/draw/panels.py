@@ -25,16 +25,22 @@ MARKED = 12  # rests in a phase portrait
 FINE = 1 / 200  # of a phase portrait's diagonal: how far apart its points are
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
-    "x": lambda trace: trace.x,
-    "v": lambda trace: trace.v,
-    "u": lambda trace: trace.u,
-    "applied": lambda trace: trace.applied,
-    "d": lambda trace: trace.d,
-    "s": lambda trace: trace.s,
-    "force": lambda trace: trace.force,
-    "reaction": lambda trace: trace.reaction,
+    "x": lambda trace: driven(trace, trace.x),
+    "v": lambda trace: driven(trace, trace.v),
+    "u": lambda trace: driven(trace, trace.u),
+    "applied": lambda trace: driven(trace, trace.applied),
+    "d": lambda trace: driven(trace, trace.d),
+    "s": lambda trace: driven(trace, trace.s),
+    "force": lambda trace: driven(trace, trace.force),
+    "reaction": lambda trace: driven(trace, trace.reaction),
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
+    "q": lambda trace: trace.x[:, trace.scenario.plant.driven :],  # of what is only measured
 }
+
+
+def driven(trace: Trace, y: np.ndarray) -> np.ndarray:
+    """The columns of the channels that have an actuator."""
+    return y[:, : trace.scenario.plant.driven]
 
 
 def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace, str, float]]:
@@ -60,7 +66,7 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     found = [
         window(trace) * trace.scenario.control_period
         for trace in traces
-        if smoothed(trace) and stretches(trace.u.mean(axis=1), window(trace))
+        if smoothed(trace) and stretches(QUANTITIES["u"](trace).mean(axis=1), window(trace))
     ]
     return max(found, default=None)
 
@@ -138,7 +144,7 @@ def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
 def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     """Draw v over x, with a ring where each trace starts."""
     for trace, colour, wider in layers(traces, colours):
-        x, v = trace.x, trace.v
+        x, v = QUANTITIES["x"](trace), QUANTITIES["v"](trace)
         if x.shape[1] > 1:
             for i in light(x.shape[1]):
                 ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=0.7)

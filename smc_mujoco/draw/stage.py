@@ -93,7 +93,8 @@ class Stage:
         Args:
           ahead: how far their rotors are ahead of them, (shown,) rad or m; default: not at all.
         """
-        x = np.clip(x, -self.rails[k] / 2, self.rails[k] / 2)
+        slides = self.model.jnt_type[self.joints[k]] == mujoco.mjtJoint.mjJNT_SLIDE
+        x = np.where(slides, np.clip(x, -self.rails[k] / 2, self.rails[k] / 2), x)
         self.data.qpos[self.model.jnt_qposadr[self.joints[k]]] = x
         for rotor, value in zip(self.rotors[k], x if ahead is None else x + ahead, strict=True):
             if rotor is not None:

@@ -173,9 +173,9 @@ def same_plant(traces: Sequence[Trace]) -> Sequence[Trace]:
 
 
 def units(trace: Trace) -> dict[str, str]:
-    """Units of the quantities x, v, u and s."""
+    """Units of the quantities x, v, u, s, and q, the angle of what is only measured."""
     x = trace.scenario.plant.unit
-    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
+    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s", "q": "rad"}
 
 
 def quantity(trace: Trace) -> str:

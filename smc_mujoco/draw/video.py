@@ -205,7 +205,7 @@ def frames(
                 stage.dress(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame])
                 stage.paint(k, style.FAILED if failed[k] else colour)
-                for i in range(0 if failed[k] else stage.shown[k]):
+                for i in range(0 if failed[k] else stage.shown[k] - traces[k].scenario.plant.free):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
             ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
             moved = [part[frame] for part in (*places, *ahead)]
