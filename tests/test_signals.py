@@ -14,6 +14,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco import native, plain, record
 from smc_mujoco.part import Part
+from smc_mujoco.references import MinimumJerk, Ramp
 from smc_mujoco.series import TimeSeries
 from smc_mujoco.signals import (
     TERMS,
@@ -42,6 +43,8 @@ EVERY = [
     OrnsteinUhlenbeck(0.5, 0.1),
     NOISE,
     UNEVEN,
+    Ramp(2.0, 0.3),
+    MinimumJerk(1.0, 0.2, 0.5),
 ]
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian)]  # what a reference may be
 
