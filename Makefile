@@ -31,6 +31,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 	@./setup.sh requirements-bench.lock
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/realistic.py
+	$(BIN)/python benchmarks/laws.py
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from smc_mujoco.actuators import RateLimit as RateLimit
     from smc_mujoco.backlash import Backlash as Backlash
     from smc_mujoco.cli import play as play
+    from smc_mujoco.component import GainWarning as GainWarning
     from smc_mujoco.conditions import Jump as Jump
     from smc_mujoco.conditions import Noise as Noise
     from smc_mujoco.contact import Contact as Contact
+    from smc_mujoco.design import lqr as lqr
     from smc_mujoco.draw.figure import figure as figure
     from smc_mujoco.draw.video import clip as clip
     from smc_mujoco.draw.video import film as film
@@ -46,6 +48,8 @@ if TYPE_CHECKING:
     from smc_mujoco.plant import Plant as Plant
     from smc_mujoco.plant import plant as plant
     from smc_mujoco.plant import plants as plants
+    from smc_mujoco.references import MinimumJerk as MinimumJerk
+    from smc_mujoco.references import Ramp as Ramp
     from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning
     from smc_mujoco.run import run as run
     from smc_mujoco.run import stream as stream
@@ -62,6 +66,10 @@ if TYPE_CHECKING:
     from smc_mujoco.signals import Signal as Signal
     from smc_mujoco.signals import Sine as Sine
     from smc_mujoco.signals import Step as Step
+    from smc_mujoco.surfaces import Surface as Surface
+    from smc_mujoco.surfaces import surface as surface
+    from smc_mujoco.surfaces import surface_function as surface_function
+    from smc_mujoco.surfaces import surfaces as surfaces
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
 
@@ -71,8 +79,10 @@ _HOMES = {
     "actuators": ("DCMotor", "Lag", "RateLimit"),
     "backlash": ("Backlash",),
     "cli": ("play",),
+    "component": ("GainWarning",),
     "conditions": ("Jump", "Noise"),
     "contact": ("Contact",),
+    "design": ("lqr",),
     "draw.figure": ("figure",),
     "draw.video": ("clip", "film", "still"),
     "errors": ("ScenarioError",),
@@ -83,12 +93,14 @@ _HOMES = {
     "metrics": ("score",),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),
+    "references": ("MinimumJerk", "Ramp"),
     "run": ("PlainLoopWarning", "run", "stream"),
     "scenario": ("Scenario",),
     "scene": ("Scene",),
     "sensors": ("Encoder",),
     "series": ("TimeSeries",),
     "signals": ("BandLimited", "Constant", "Gust", "Impulse", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
+    "surfaces": ("Surface", "surface", "surface_function", "surfaces"),
     "trace": ("Trace", "load"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

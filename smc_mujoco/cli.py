@@ -1,4 +1,4 @@
-"""The command line: smc-mujoco list | run SCENE | show TRACE."""
+"""The command line: smc-mujoco list | laws [NAME] | run SCENE | show TRACE."""
 
 import contextlib
 import signal
@@ -92,6 +92,28 @@ def list_() -> None:
             from smc_mujoco import show
 
         show.catalogues(Console())
+
+
+@app.command()
+def laws(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="A law, a surface or a velocity estimator; all without one.")
+    ] = None,
+) -> None:
+    """Show the laws there are, or one in full: formula, gains, conditions, discretisation, source.
+
+    The table has every law, surface and velocity estimator with its formula. deg is the relative degree of what a law
+    acts on: 1 a sliding variable s, with any surface of degree 1; 2 the error e and its rate; 3 e and two rates.
+
+    Example: smc-mujoco laws super_twisting
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco import lawbook
+
+        lawbook.show(name, Console())
 
 
 @app.command()
