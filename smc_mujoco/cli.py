@@ -84,7 +84,7 @@ def options(
 
 @app.command("list")
 def list_() -> None:
-    """List plants, laws, velocity estimators, scenes, and the conditions of the paper's study."""
+    """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study."""
     with mendable():
         with loading():
             from rich.console import Console
