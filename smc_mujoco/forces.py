@@ -38,7 +38,7 @@ def disturb(base, row, table, xfrc, t):
     return slot.FINE
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def disturbance(table, i, xfrc, tips, anchors):
     """The generalised force that xfrc_applied exerts on channel i."""
     d = table[i, column.SIGN] * xfrc[table[i, column.XFRC]]
@@ -51,7 +51,7 @@ def disturbance(table, i, xfrc, tips, anchors):
     return d
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def weigh(row, table, actuators, constraints):
     """Add up what drives, and what friction and contacts, exerted on each joint in the last physics step."""
     for i in range(int(row[slot.CHANNELS])):

@@ -34,7 +34,7 @@ def _at(base, row, name):
     return base + 8 * int(row[name])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _escaped(row, qpos, qvel):
     for i in range(int(row[slot.POSITIONS])):
         if not abs(qpos[i]) < WORLD:
@@ -45,7 +45,7 @@ def _escaped(row, qpos, qvel):
     return False
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _read(row, i, x, v, j, hinge):
     """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
     if row[slot.SIGMA_X] != 0.0 or row[slot.SIGMA_V] != 0.0:
@@ -87,7 +87,7 @@ def _measure(base, row, table, sensors, k):
     return slot.FINE
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _nominal(base, row, i):
     """Nominal f and g of channel i into the row's outputs; not 0 where the model raised."""
     state = int(row[slot.STATE])
@@ -101,7 +101,7 @@ def _nominal(base, row, i):
     )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _inform(base, row, y, i, partner):
     """What the law of channel i is told, y; `partner` moves with it without an actuator (0: none). A failure code."""
     n, state, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
@@ -156,7 +156,7 @@ def _decide(base, row, table, log, k):
     return slot.FINE
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _driven(table, n):
     """How many of the channels have an actuator: the first ones."""
     count = 0
@@ -165,7 +165,7 @@ def _driven(table, n):
     return count
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _apply(row, table, ctrl, step):
     """The command whose delay has passed at a physics step, where one arrives, to the actuators."""
     n, past = int(row[slot.CHANNELS]), step - int(row[slot.DELAY])
