@@ -72,6 +72,8 @@ if TYPE_CHECKING:
     from smc_mujoco.surfaces import surfaces as surfaces
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
+    from smc_mujoco.tuned import Tuned as Tuned
+    from smc_mujoco.tuning import tune as tune
 
 __version__ = "0.1.0"
 
@@ -102,6 +104,8 @@ _HOMES = {
     "signals": ("BandLimited", "Constant", "Gust", "Impulse", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
     "surfaces": ("Surface", "surface", "surface_function", "surfaces"),
     "trace": ("Trace", "load"),
+    "tuned": ("Tuned",),
+    "tuning": ("tune",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

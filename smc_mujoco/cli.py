@@ -1,4 +1,4 @@
-"""The command line: smc-mujoco list | laws [NAME] | run SCENE | show TRACE."""
+"""The command line: smc-mujoco list | laws [NAME] | run SCENE | show TRACE | tune PLANT LAW."""
 
 import contextlib
 import signal
@@ -170,6 +170,47 @@ def show(
         summary(loaded, console)
         for path in written:
             console.print(f"wrote {path}", soft_wrap=True, highlight=False)
+
+
+@app.command()
+def tune(
+    plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows.")],
+    law: Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")],
+    objective: Annotated[
+        str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
+    ] = "balanced",
+    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to evaluate.")] = 256,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+) -> None:
+    """Find a law's gains on a plant by the rule that is the same for every law.
+
+    Same bound on u, same objective (error times time, and variation of u, in a nominal, a noisy and a delayed run of
+    5 s), same number of gains tried, same width of search about the scale that each gain has by dimension. The same
+    seed gives the same gains; a larger budget never worse ones.
+
+    Example: smc-mujoco tune duffing observer_free --budget 128 --out duffing.json
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco import tuned, tuning
+
+        path, clock, console = out and tuned.checked(out), Clock(), Console()
+        with clock("tuning"):
+            found = tuning.tune(plant, law, budget, seed, objective, threads, progress=True)
+        console.print(tuned.table(found))
+        console.print(f"{found.definition}", soft_wrap=True, highlight=False)
+        console.print(
+            f"objective {found.objective:.4g} s², with the law's default gains {found.before:.4g}; "
+            f"{len(found.history)} sets of gains, seed {seed}, {clock.spent['tuning']:.1f} s",
+            soft_wrap=True,
+            highlight=False,
+        )
+        if path:
+            console.print(f"wrote {found.save(path)}", soft_wrap=True, highlight=False)
 
 
 class Clock:

@@ -1,0 +1,207 @@
+"""Gains by one rule for every law: same actuator bound, objective, budget and search space.
+
+    tuned = tune("duffing", "classical", budget=256, seed=0)     # Tuned(law, objective, history)
+    tuned.save("duffing-classical.json")
+    compare([tuned, tune("duffing", "observer_free")])           # refuses what was not tuned alike
+
+The rule: a differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin,
+weight 0.2 to 0.7, 16 members, no polishing) in the logarithm of the gains, from a Latin hypercube that has the scales
+themselves in it, never from gains that someone tuned before. Each generation is one batch of runs. Gains are rounded to
+four digits, so that what is printed is what was run; a set that was evaluated before costs no budget. Bounds are those
+of `bounds`. After 128 evaluations those at which the best lies are moved out by a decade, once, and the search goes on
+within the same budget; `Tuned.at_bound` names gains that are at a bound in the end. A population that has collapsed
+starts anew. Nothing in this depends on the budget, so a longer search repeats a shorter one and goes on: it is never
+worse. `objective` says what is minimised.
+"""
+
+import contextlib
+import dataclasses
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from smc_mujoco import bounds, given
+from smc_mujoco.component import Component, Template
+from smc_mujoco.errors import whole
+from smc_mujoco.objective import Objective
+from smc_mujoco.objective import objective as find_objective
+from smc_mujoco.plant import Plant
+from smc_mujoco.run import run
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.tuned import Evaluation, Tuned, compare, load, versions
+
+__all__ = ["Tuned", "compare", "load", "tune"]
+
+RULE = (
+    "differential evolution best1bin (16 members, weight 0.2 to 0.7) in the logarithm of the gains, within 1.5 decades"
+    " about their scale by dimension, bounds that the best is at widened once by a decade after 128 evaluations"
+)
+MEMBERS, STAGE = 16, 128  # of the population; evaluations before the bounds are looked at
+DITHER = (0.2, 0.7)  # differential weight, drawn anew each generation; of three tried the best within 128 evaluations
+DIGITS = 4  # of a gain
+LONGEST = 1_000_000  # candidates
+Report = Callable[[int], None]
+
+
+def tune(
+    plant: Plant | str,
+    law: Component | Template | str,
+    budget: int = 256,
+    seed: int = 0,
+    objective: Objective | str = "balanced",
+    threads: int | None = None,
+    progress: bool = False,
+) -> Tuned:
+    """The law's best gains on the plant, by the rule that is the same for every law.
+
+    Args:
+      law: its gains are the starting point of nothing: `Tuned.before` says what they cost. Those held keep their value.
+      budget: how many sets of gains are evaluated, each in as many runs as the objective has conditions.
+      seed: of the search, and of the noise that all candidates see alike.
+      objective: an Objective, "balanced", or "tracking", which has no price on the variation of u.
+      threads, progress: as of `run`.
+
+    Raises:
+      ScenarioError: a law with gains of unknown unit, a plant without scales, or something out of its range.
+    """
+    goal = find_objective(objective)
+    budget = whole("budget", budget, 1, LONGEST)
+    whole("seed", seed, 0, 2**53 - 1)
+    cases = goal.scenarios(plant, given.component(law, "law"), seed)
+    plant, law = cases[0].plant, cases[0].law
+    scales = bounds.scales(plant, goal.u_max, cases[0].model == "nominal")
+    start = bounds.box(law, scales)
+    before = goal.terms(run(cases, threads))
+    with _bar(f"{law.name} on {plant.name}", budget, progress) as report:
+        ledger = _Ledger(goal, cases, tuple(start), budget, threads, report)
+        box = _search(ledger, start, seed)
+    best = ledger.best
+    return Tuned(
+        law=_with(law, tuple(start), best.gains),
+        objective=best.objective,
+        history=tuple(ledger.evaluations),
+        before=before[0] + goal.weight * before[1],
+        plant=plant,
+        definition=goal,
+        rule=RULE,
+        budget=budget,
+        seed=seed,
+        scales=scales,
+        bounds=start,
+        searched=box,
+        versions=versions(),
+    )
+
+
+class _Spent(Exception):
+    """The budget is."""
+
+
+class _Ledger:
+    """What was evaluated, in order; raises _Spent when it is as much as the budget."""
+
+    def __init__(
+        self,
+        goal: Objective,
+        cases: Sequence[Scenario],
+        names: tuple[str, ...],
+        budget: int,
+        threads: int | None,
+        report: Report,
+    ):
+        self.goal, self.cases, self.names = goal, cases, names
+        self.budget, self.threads, self.report = budget, threads, report
+        self.evaluations: list[Evaluation] = []
+        self.known: dict[tuple[float, ...], float] = {}
+
+    @property
+    def best(self) -> Evaluation:
+        """The first of the best."""
+        return min(self.evaluations, key=lambda e: e.objective)
+
+    def costs(self, logs: np.ndarray) -> np.ndarray:
+        """J of candidates given as columns of log10 gains (gains, candidates)."""
+        asked = [tuple(float(f"{10.0**z:.{DIGITS}g}") for z in column) for column in logs.T.tolist()]
+        new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
+        left = self.budget - len(self.evaluations)
+        self.evaluate(new[:left])
+        if len(new) >= left:
+            raise _Spent
+        return np.array([self.known[gains] for gains in asked])
+
+    def evaluate(self, candidates: Sequence[tuple[float, ...]]) -> None:
+        """Run candidates, all in one batch."""
+        size = len(self.cases)
+        laws = [_with(self.cases[0].law, self.names, gains) for gains in candidates]
+        traces = run([dataclasses.replace(case, law=law) for law in laws for case in self.cases], self.threads)
+        for i, gains in enumerate(candidates):
+            tracking, variation = self.goal.terms(traces[i * size : (i + 1) * size])
+            cost = tracking + self.goal.weight * variation
+            self.known[gains] = cost
+            self.evaluations.append(Evaluation(gains=gains, objective=cost, tracking=tracking, variation=variation))
+        self.report(len(candidates))
+
+
+def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
+    """The law with other gains; search warns of no theorem's conditions."""
+    return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
+
+
+def _search(ledger: _Ledger, start: bounds.Box, seed: int) -> bounds.Box:
+    """Spend the budget; the bounds in the end."""
+    random, box = np.random.default_rng(seed), start
+    members = _hypercube(box, random)
+    with contextlib.suppress(_Spent):
+        while len(ledger.evaluations) < STAGE:
+            members = _evolve(ledger, box, members, random, until=STAGE)
+        box = bounds.widened(box, bounds.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box))
+        while True:
+            members = _evolve(ledger, box, members, random)
+    return box
+
+
+def _evolve(
+    ledger: _Ledger, box: bounds.Box, members: np.ndarray, random: np.random.Generator, until: float = np.inf
+) -> np.ndarray:
+    """Evolve the members until so many are evaluated; from a population that has collapsed, a fresh one."""
+    from scipy.optimize import differential_evolution
+
+    found = differential_evolution(
+        ledger.costs,
+        [(low, high) for low, high in np.log10(list(box.values()))],
+        strategy="best1bin",
+        init=members,  # pyright: ignore[reportArgumentType]
+        tol=0.0,
+        mutation=DITHER,
+        maxiter=100,
+        rng=random,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+        callback=lambda intermediate_result: len(ledger.evaluations) >= until,
+    )
+    return found.population if len(ledger.evaluations) >= until else _hypercube(box, random)
+
+
+def _hypercube(box: bounds.Box, random: np.random.Generator) -> np.ndarray:
+    """Log10 gains of a first population, (members, gains): the middle of the box, and a Latin hypercube's."""
+    from scipy.stats.qmc import LatinHypercube
+
+    low, high = np.log10(list(box.values())).T
+    unit = LatinHypercube(len(low), rng=random).random(MEMBERS)
+    unit[0] = 0.5
+    return low + (high - low) * unit
+
+
+@contextlib.contextmanager
+def _bar(what: str, total: int, progress: bool) -> Iterator[Report]:
+    """A progress bar over candidates, or nothing."""
+    if not progress:
+        yield lambda candidates: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda candidates: bar.advance(task, candidates)
