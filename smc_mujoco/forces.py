@@ -43,11 +43,8 @@ def disturbance(table, i, xfrc, tips, anchors):
     """The generalised force that xfrc_applied exerts on channel i."""
     d = table[i, column.SIGN] * xfrc[table[i, column.XFRC]]
     if table[i, column.TIP] >= 0:
-        d += (
-            table[i, column.PUSH_SIGN]
-            * (tips[table[i, column.TIP]] - anchors[table[i, column.ANCHOR]])
-            * xfrc[table[i, column.PUSH]]
-        )
+        arm = tips[table[i, column.TIP]] - anchors[table[i, column.ANCHOR]]
+        d += table[i, column.PUSH_SIGN] * arm * xfrc[table[i, column.PUSH]]
     return d
 
 

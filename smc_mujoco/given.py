@@ -15,7 +15,7 @@ from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law
 from smc_mujoco.part import Part
-from smc_mujoco.plant import Plant, catalogue
+from smc_mujoco.plant import Plant
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
 from smc_mujoco.surfaces import surface
@@ -25,7 +25,7 @@ P = TypeVar("P", bound=Part)
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-REALISTIC_STEP = 2.5e-4  # s; halving it changes no score of a realistic plant by 3 %, see tests/test_convergence.py
+REALISTIC_STEP = 2.5e-4  # s; what halving it changes is studied in tests/test_convergence.py and told in docs/design.md
 FAR = 1e6  # initial states beyond this have already diverged
 
 
@@ -159,14 +159,14 @@ def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...
 
 
 def contact_fits(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError where a rod has not the length for which the obstacles stand."""
-    known = catalogue().get(plant.name)
-    length = None if known is None else known.parameters.get("l")
-    if contact.kind != "none" and length is not None and plant.values(factors).l != length:
-        raise ScenarioError(
-            f"contact {contact.kind!r} of {plant.name} stands where l is {length:g} m, and l is "
-            f"{plant.values(factors).l:g} m: leave l as it is"
-        )
+    """Raise ScenarioError where a parameter has not the value for which the obstacles stand."""
+    for name, value in plant.placed.items() if contact.kind != "none" else ():
+        is_now = getattr(plant.values(factors), name)
+        if is_now != value:
+            raise ScenarioError(
+                f"contact {contact.kind!r} of {plant.name} stands where {name} is {value:g}, and {name} is {is_now:g}: "
+                f"leave {name} as it is"
+            )
 
 
 def contact(value: object, plant: Plant) -> Contact:

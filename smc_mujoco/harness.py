@@ -76,12 +76,8 @@ def _measure(base, row, table, sensors, k):
         x, v = _read(row, i, x, v, j, table[i, column.TIP] >= 0)
         row[given], row[given + 1], row[given + 2] = row[slot.PERIOD], x, v
         memory = _at(base, row, slot.ESTIMATOR_MEMORY) + 8 * i * int(row[slot.ESTIMATOR_STRIDE])
-        if (
-            call(
-                int(row[slot.ESTIMATOR]), base + 8 * given, _at(base, row, slot.ESTIMATOR_GAINS), memory, base + 8 * out
-            )
-            != 0
-        ):
+        gains = _at(base, row, slot.ESTIMATOR_GAINS)
+        if call(int(row[slot.ESTIMATOR]), base + 8 * given, gains, memory, base + 8 * out) != 0:
             return slot.ESTIMATOR_RAISED
         row[at + i], row[at + n + i], row[at + 2 * n + i] = x, row[out], row[out + 1]
     return slot.FINE

@@ -167,6 +167,8 @@ def laws(plant: Plant | str | None = None) -> list[str]:
     kind = find_plant(plant) if isinstance(plant, str) else plant
     if not isinstance(kind, Plant):
         raise ScenarioError(f"plant is {shown(kind)}: give smc.plant(...) or one of the names smc.plants() lists")
-    meant = {name: template.plants for name, template in catalogue().items()}
-    every = [name for name in meant if name == "none" or not kind.underactuated]
-    return [name for name, ones in meant.items() if (kind.name in ones if ones else name in every)]
+    return [
+        name
+        for name, template in catalogue().items()
+        if (kind.name in template.plants if template.plants else name == "none" or not kind.underactuated)
+    ]

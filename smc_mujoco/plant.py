@@ -67,6 +67,7 @@ class Plant:
       contacts: kind of contact -> the edit of the MjSpec that brings its obstacles and contact pairs.
       mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
       underactuated: whether channels without an actuator come after those with one.
+      placed: parameter -> the value for which the obstacles of its contacts stand.
     """
 
     name: str
@@ -83,9 +84,10 @@ class Plant:
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
     underactuated: bool = False
+    placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
-        for name in ("parameters", "contacts", "mechanisms"):
+        for name in ("parameters", "contacts", "mechanisms", "placed"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def __repr__(self) -> str:

@@ -386,3 +386,8 @@ def test_runs_of_one_batch_may_differ_in_every_parameter():
             np.testing.assert_array_equal(trace.x, other.x)
             np.testing.assert_array_equal(trace.u, other.u)
         assert len({dataclasses.replace(run).plant.parameters["l"] for run in runs}) == 2
+
+
+def test_obstacles_on_the_rail_do_not_ask_for_a_length_of_the_pole():
+    plant = smc.plant("cart_pole", l=0.6)
+    assert smc.run(smc.Scenario(plant=plant, law="hierarchical", contact="stops", duration=0.05)).failure is None

@@ -108,4 +108,5 @@ INVERTED_PENDULUM = Plant(
     nominal=nominal,
     lane=(1.3, 0.0, 0.0),
     contacts={"floor": on_floor, "stops": stops, "wall": wall, "peg": peg},
+    placed={"l": L},
 )
