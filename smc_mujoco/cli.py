@@ -1,17 +1,14 @@
 """The command line: smc-mujoco list | laws [NAME] | run SCENE | show TRACE | tune PLANT LAW."""
 
-import contextlib
-import signal
 import sys
-import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.terminal import Clock, loading, mendable
 
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
@@ -33,36 +30,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def play(scene: str) -> None:
     """Run a scene file as a script: `if __name__ == "__main__": smc.play(__file__)`."""
     main(["run", scene, *sys.argv[1:]])
-
-
-@contextlib.contextmanager
-def mendable() -> Iterator[None]:
-    """Errors that the user can mend, and Ctrl-C, as one sentence."""
-    try:
-        yield
-    except ScenarioError as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
-    except KeyboardInterrupt:
-        _fail("stopped; files already written are complete", 130)
-
-
-def _fail(sentence: str, code: int = 2) -> None:
-    print(f"smc-mujoco: {sentence}", file=sys.stderr)
-    raise SystemExit(code)
-
-
-@contextlib.contextmanager
-def loading() -> Iterator[None]:
-    """Hold Ctrl-C back while libraries load: they cannot be interrupted halfway."""
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _version(wanted: bool) -> None:
@@ -211,20 +178,3 @@ def tune(
         )
         if path:
             console.print(f"wrote {found.save(path)}", soft_wrap=True, highlight=False)
-
-
-class Clock:
-    """Seconds spent in named stretches."""
-
-    def __init__(self):
-        self.spent: dict[str, float] = {}
-
-    @contextlib.contextmanager
-    def __call__(self, what: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - start
-
-    def __str__(self) -> str:
-        parts = [f"{what} {seconds:.2f} s" for what, seconds in self.spent.items()]
-        return ", ".join([*parts, f"in all {sum(self.spent.values()):.2f} s"])
