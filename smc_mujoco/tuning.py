@@ -8,14 +8,15 @@ The rule: a differential evolution (R. Storn & K. Price, J. Global Optimization 
 weight 0.2 to 0.7, 16 members, no polishing) in the logarithm of the gains, from a Latin hypercube that has the scales
 themselves in it, never from gains that someone tuned before. Each generation is one batch of runs. Gains are rounded to
 four digits, so that what is printed is what was run; a set that was evaluated before costs no budget. Bounds are those
-of `bounds`. After 128 evaluations those at which the best lies are moved out by a decade, once, and the search goes on
-within the same budget; `Tuned.at_bound` names gains that are at a bound in the end. A population that has collapsed
-starts anew. Nothing in this depends on the budget, so a longer search repeats a shorter one and goes on: it is never
-worse. `objective` says what is minimised.
+of `bounds`. After every 64 evaluations those at which the best lies are moved out by a decade, half of the members are
+drawn anew between them, and the search goes on; `Tuned.at_bound` names gains that are at a bound in the end. A
+population that has collapsed starts anew. Nothing in this depends on the budget, so a longer search repeats a shorter
+one and goes on: it is never worse. `objective` says what is minimised.
 """
 
 import contextlib
 import dataclasses
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -34,9 +35,10 @@ __all__ = ["Tuned", "compare", "load", "tune"]
 
 RULE = (
     "differential evolution best1bin (16 members, weight 0.2 to 0.7) in the logarithm of the gains, within 1.5 decades"
-    " about their scale by dimension, bounds that the best is at widened once by a decade after 128 evaluations"
+    " about their scale by dimension; after every 64 evaluations bounds that the best is at are widened by a decade and"
+    " half of the members drawn anew"
 )
-MEMBERS, STAGE = 16, 128  # of the population; evaluations before the bounds are looked at
+MEMBERS, STAGE = 16, 64  # of the population; evaluations after which the bounds are looked at, again and again
 DITHER = (0.2, 0.7)  # differential weight, drawn anew each generation; of three tried the best within 128 evaluations
 DIGITS = 4  # of a gain
 LONGEST = 1_000_000  # candidates
@@ -152,16 +154,17 @@ def _search(ledger: _Ledger, start: bounds.Box, seed: int) -> bounds.Box:
     random, box = np.random.default_rng(seed), start
     members = _hypercube(box, random)
     with contextlib.suppress(_Spent):
-        while len(ledger.evaluations) < STAGE:
-            members = _evolve(ledger, box, members, random, until=STAGE)
-        box = bounds.widened(box, bounds.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box))
-        while True:
-            members = _evolve(ledger, box, members, random)
+        for stage in itertools.count(STAGE, STAGE):
+            while len(ledger.evaluations) < stage:
+                members = _evolve(ledger, box, members, random, until=stage)
+            if sides := bounds.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box):
+                box = bounds.widened(box, sides)
+                members[MEMBERS // 2 :] = _hypercube(box, random)[MEMBERS // 2 :]  # or they would stay crowded at it
     return box
 
 
 def _evolve(
-    ledger: _Ledger, box: bounds.Box, members: np.ndarray, random: np.random.Generator, until: float = np.inf
+    ledger: _Ledger, box: bounds.Box, members: np.ndarray, random: np.random.Generator, until: int
 ) -> np.ndarray:
     """Evolve the members until so many are evaluated; from a population that has collapsed, a fresh one."""
     from scipy.optimize import differential_evolution
