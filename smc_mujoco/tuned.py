@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smc_mujoco import __version__, record
+from smc_mujoco import __version__, gains, record
 from smc_mujoco.bounds import DECADES, Box, at_bound
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, shown
@@ -154,6 +154,15 @@ def load(path: str | os.PathLike) -> Tuned:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"{type(error).__name__}, {error}"
         raise ScenarioError(f"{path} is no tuning ({why}): give a .json file that Tuned.save wrote") from None
+
+
+def shipped(plant: str, law: str, objective: str = "balanced") -> Tuned:
+    """The tuning that comes with the package, from which the gains of a set in `gains` are.
+
+    Raises:
+      ScenarioError: there is none.
+    """
+    return load(gains.file(plant, law, objective))
 
 
 def _evaluation(gains: Sequence[float], objective: float, tracking: float, variation: float) -> Evaluation:
