@@ -1,0 +1,95 @@
+"""smc-mujoco margins: how much delay, disturbance, friction, mass and noise each law bears."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from smc_mujoco.terminal import Clock, loading, mendable
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from smc_mujoco.margins import Margin
+
+QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturbance"]}
+
+
+def margins(
+    plants: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PLANT]...", help="Plants of the study; all without one.", show_default=False),
+    ] = None,
+    laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
+    kinds: Annotated[
+        str | None, typer.Option(help="Of delay,disturbance,friction,mass,noise, as a,b; default all.")
+    ] = None,
+    gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Shorter runs, coarser; by default 2 plants, 4 laws, delay and disturbance.")
+    ] = False,
+    json: Annotated[Path | None, typer.Option(help="Also write the margins to a .json file.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+) -> None:
+    """Find how much a law bears: the largest level at which the plant still ends within 5 % of where it began.
+
+    Constant disturbance and dry friction in N or N m, mass as a multiple of the nominal one, noise as the standard
+    deviation of the position (the velocity's is 5/s of it), delay of the command in s. Theory is that of the loop
+    linearised at rest, for laws that have one: for a delay, where rest turns unstable; a law may bear more, in a small
+    steady oscillation. The search and its limits: smc_mujoco.margins.
+
+    Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco import gains as sets
+            from smc_mujoco import margins as search
+            from smc_mujoco import paper
+            from smc_mujoco.commands.bar import bar
+
+        clock, console = Clock(), Console()
+        chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
+        names = _names(laws) or (paper.LAWS if quick else sets.LAWS)
+        kind = _names(kinds) or (QUICK["kinds"] if quick else search.KINDS)
+        with clock("in all"), bar("margins") as report:
+            found = search.margins(chosen, names, kind, gains, quick, threads, report)
+        for name in kind:
+            console.print(table(name, [margin for margin in found if margin.kind == name]))
+        said = f"{len(found)} margins, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        console.print(said, style="dim", soft_wrap=True, highlight=False)
+        if json:
+            console.print(f"wrote {search.save(found, json)}", soft_wrap=True, highlight=False)
+
+
+def table(kind: str, found: "list[Margin]") -> "Table":
+    """The margins of one kind: a line a plant and law."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from smc_mujoco.draw.style import law_colour
+    from smc_mujoco.tables import number
+
+    made = Table(title=f"largest {kind} borne", title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    made.add_column("plant")
+    made.add_column("law")
+    for head in ("margin", "to within", "theory"):
+        made.add_column(head, justify="right", no_wrap=True)
+    made.add_column("unit")
+    last = None
+    for margin in found:
+        value = "none" if margin.value != margin.value else f"{'>= ' * margin.open}{number(margin.value)}"
+        theory = "" if margin.theory is None else "any" if margin.theory == float("inf") else number(margin.theory)
+        plant = "" if margin.plant == last else margin.plant
+        law = Text(margin.law, style=law_colour(margin.law))
+        within = number(margin.resolution) if margin.resolution else ""
+        made.add_row(plant, law, value, within, theory, margin.unit)
+        last = margin.plant
+    return made
+
+
+def _names(text: str | None) -> list[str]:
+    """The names in a,b."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]

@@ -1,0 +1,224 @@
+"""Margins: what is found is a boundary, the first one from below, and theory's where there is one."""
+
+import dataclasses
+import json
+import math
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco import bearing, gains, margins, paper
+from smc_mujoco.commands.margins import QUICK, table
+from smc_mujoco.commands.margins import margins as command
+from smc_mujoco.margins import COARSE, FINE, KINDS, Margin
+
+BASE = paper.scenario("duffing", "observer_free", duration=4.0)
+ROUGH = Margin(
+    plant="p", law="l", kind="delay", value=math.nan, unit="s", resolution=0.1, searched=1.0, theory=math.inf
+)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Every margin of two laws on one plant, coarsely."""
+    bases = [BASE, paper.scenario("duffing", "classical", duration=4.0)]
+    return margins.of(bases, resolution=COARSE, threads=2)
+
+
+def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
+    return bearing.Kind(unit="{u}", levels=levels, put=put, none=none)
+
+
+def pushed(level):
+    """A scenario that bears what it is asked to: a push of more than the law has, or none."""
+    return dataclasses.replace(BASE, duration=0.5, x0=0.0, disturbance=smc.Constant(0.0 if level else 50.0))
+
+
+# what a margin is
+
+
+def test_it_is_the_boundary_between_what_is_borne_and_what_is_not(found):
+    bases = {"observer_free": BASE, "classical": paper.scenario("duffing", "classical", duration=4.0)}
+    closed = [margin for margin in found if not margin.open]
+    assert len(closed) > 5
+    for margin in closed:
+        kind = bearing.SPECS[margin.kind]
+        levels = margin.value, margin.value + margin.resolution
+        assert margin.resolution > 0.0
+        runs = smc.run([kind.put(bases[margin.law], level) for level in levels])
+        assert [bearing.bears(trace) for trace in runs] == [True, False]
+
+
+def test_a_run_bears_what_leaves_it_within_five_percent_of_its_start():
+    held = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.2)))
+    carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))
+    assert abs(held.x[-1, 0]) < 0.05 * 1.5 < abs(carried.x[-1, 0])
+    assert (bearing.bears(held), bearing.bears(carried)) == (True, False)
+
+
+def test_a_run_that_fails_bears_nothing():
+    @smc.law_function
+    def broken(y, gains, memory):
+        return math.nan, 0.0
+
+    assert not bearing.bears(smc.run(dataclasses.replace(BASE, law=broken())))
+
+
+def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_for(found):
+    assert [(margin.law, margin.kind) for margin in found] == [
+        (law, kind) for law in ("observer_free", "classical") for kind in KINDS
+    ]
+    assert [margin.unit for margin in found[:5]] == ["s", "N", "N", "1", "m"]
+    for margin in found:
+        if not margin.open:
+            step = 5 * BASE.control_period if margin.kind == "delay" else COARSE * margin.value
+            assert margin.resolution <= step * (1.0 + 1e-9)
+
+
+def test_it_does_not_depend_on_company_or_threads(found):
+    assert margins.of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
+
+
+# the search
+
+
+def test_it_stops_at_the_first_level_that_is_not_borne(monkeypatch):
+    island = kind_of(lambda base, level: pushed(not 1.3 < level < 2.5))
+    monkeypatch.setitem(bearing.SPECS, "island", island)
+    (margin,) = margins.of([pushed(True)], ["island"])
+    assert margin.value == pytest.approx(1.3, rel=FINE)
+    assert margin.searched == 4.0
+
+
+def test_an_island_between_two_levels_goes_unseen(monkeypatch):
+    monkeypatch.setitem(bearing.SPECS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
+    (margin,) = margins.of([pushed(True)], ["island"])
+    assert margin.open
+
+
+def test_what_never_fails_is_told_by_value_and_searched_alike(monkeypatch):
+    monkeypatch.setitem(bearing.SPECS, "nothing", kind_of(lambda base, level: pushed(True)))
+    (margin,) = margins.of([pushed(True)], ["nothing"])
+    assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
+
+
+def test_a_law_that_fails_anyway_has_no_margin():
+    (margin,) = margins.of([dataclasses.replace(BASE, law=smc.law("none"))], ["mass"])
+    assert math.isnan(margin.value)
+    assert not margin.open
+
+
+def test_a_margin_below_the_smallest_level_is_found_too(monkeypatch):
+    monkeypatch.setitem(bearing.SPECS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
+    (margin,) = margins.of([pushed(True)], ["tiny"])
+    assert margin.value == pytest.approx(0.3, abs=FINE)
+
+
+def test_delays_are_whole_control_periods():
+    slow = dataclasses.replace(BASE, control_period=0.03, physics_step=None)
+    (margin,) = margins.of([slow], ["delay"])
+    periods = margin.value / 0.03
+    assert periods == pytest.approx(round(periods))
+    assert margin.resolution == pytest.approx(0.03)
+
+
+def test_it_tells_how_far_it_is():
+    told = []
+    margins.of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))
+    assert all(0.0 < done <= whole for done, whole in told)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert told[-1][0] == told[-1][1]
+
+
+# theory beside it
+
+
+@pytest.mark.parametrize("plant", paper.PLANTS)
+def test_the_disturbance_borne_is_the_one_of_theory(plant):
+    (margin,) = margins.margins([plant], ["observer_free"], ["disturbance"], "study", quick=True)
+    assert margin.theory is not None
+    assert margin.value <= margin.theory * 1.001
+    assert margin.value + margin.resolution >= margin.theory * 0.999
+
+
+def test_a_delay_may_be_borne_beyond_where_rest_turns_unstable_in_a_small_oscillation():
+    (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
+    assert margin.theory is not None
+    assert margin.theory - BASE.control_period < margin.value < 1.25 * margin.theory
+    ringing = paper.scenario("inverted_pendulum", "observer_free", changes={"input_delay": margin.value})
+    x = abs(smc.run(ringing).x[:, 0])
+    assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)  # neither grows nor decays
+    assert 0.01 < x[-1000:].max() / 0.5 <= bearing.BEARS
+
+
+def test_dry_friction_up_to_theory_is_borne(found):
+    friction = next(margin for margin in found if margin.kind == "friction")
+    assert friction.theory is not None
+    assert friction.value >= friction.theory - friction.resolution
+
+
+def test_only_laws_with_a_linear_part_have_theory(found):
+    assert [margin.kind for margin in found if margin.theory is not None] == ["delay", "disturbance", "friction"]
+
+
+# files and the command
+
+
+def test_margins_survive_their_file(found, tmp_path):
+    path = margins.save([*found, ROUGH], tmp_path / "margins.json")
+    *again, rough = margins.load(path)
+    assert again == found
+    assert math.isnan(rough.value)
+    assert rough.theory == math.inf
+    assert "NaN" not in path.read_text()
+
+
+@pytest.mark.parametrize("text", ["", "3", '[{"plant": 1}]'])
+def test_what_holds_no_margins_is_refused(text, tmp_path):
+    path = tmp_path / "margins.json"
+    path.write_text(text)
+    with pytest.raises(smc.ScenarioError, match="holds no margins"):
+        margins.load(path)
+    with pytest.raises(smc.ScenarioError, match=r"end the name in .json"):
+        margins.save([], tmp_path / "margins.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((["duffin"], ["classical"], ["delay"], "study"), "did you mean 'duffing'"),
+        ((["duffing"], ["classic"], ["delay"], "study"), "did you mean 'classical'"),
+        ((["duffing"], ["classical"], ["delays"], "study"), "did you mean 'delay'"),
+        ((["duffing"], ["classical"], ["delay"], "best"), "unknown set of gains"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_the_cure(arguments, sentence):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        margins.margins(*arguments)
+
+
+def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
+    path = tmp_path / "margins.json"
+    command(["duffing"], "observer_free,classical", "disturbance", "study", quick=True, json=path)
+    shown = capsys.readouterr().out
+    assert "largest disturbance borne" in shown
+    assert "1.28" in shown
+    assert [entry["law"] for entry in json.loads(path.read_text())] == ["observer_free", "classical"]
+
+
+def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_borne():
+    from rich.console import Console
+
+    console = Console(width=100)
+    with console.capture() as captured:
+        console.print(table("delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]))
+    first, second = captured.get().splitlines()[-3:-1]
+    assert "none" in first
+    assert "any" in first
+    assert ">= 1.00" in second
+
+
+def test_what_is_quick_is_part_of_the_study():
+    assert set(QUICK["plants"]) <= set(paper.PLANTS)
+    assert set(QUICK["kinds"]) <= set(KINDS)
+    assert set(paper.LAWS) <= set(gains.LAWS)
