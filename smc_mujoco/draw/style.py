@@ -19,16 +19,18 @@ COLOURS = {
     "adaptive": "#D55E00",
     "classical": "#E69F00",
     "super_twisting": "#009E73",
+    "conditioned_super_twisting": "#6A4C93",
     "boundary_layer": "#CC79A7",
     "adaptive_leak": "#56B4E9",
     "none": "#6E7781",
 }
-OTHERS = ("#6A4C93", "#8C5A2B", "#1A936F", "#B5179E", "#3D405B", "#7F9C1E")  # chosen: apart from those above
+OTHERS = ("#8C5A2B", "#1A936F", "#B5179E", "#3D405B", "#7F9C1E")  # chosen: apart from those above
 NAMES = {  # a law of your own is called as you call it
     "observer_free": "Observer-free",
     "classical": "Classical",
     "adaptive": "Adaptive",
     "super_twisting": "Super-twisting",
+    "conditioned_super_twisting": "Conditioned super-twisting",
     "boundary_layer": "Boundary layer",
     "adaptive_leak": "Adaptive + leak",
     "none": "No control",

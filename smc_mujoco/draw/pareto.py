@@ -1,0 +1,74 @@
+"""Pareto fronts of tunings: tracking error against variation of the command, a staircase a law.
+
+    pareto([tune("duffing", law) for law in ("observer_free", "classical")], "fronts.svg")
+
+Down and to the left is better. Of the gains that a search tried, a front has those that none beats in both; nothing
+that it tried lies below the staircase. The chosen gains are where the objective is least, see `objective`.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from smc_mujoco.draw import figure, style
+from smc_mujoco.tuned import Tuned, compare
+
+HEIGHT = 6.4  # inches
+REST = 1e-6  # 1/s: less variation than that, or none, has no place on a logarithmic axis
+MARKS = "osD^vPX"  # a law's, so that it is told without colours too
+CHOSEN = {"ms": 11, "mew": 2.0, "mfc": "none", "lw": 0}
+
+
+def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None = None) -> list[Path]:
+    """Draw the fronts of tunings of one plant, made by the same rule with the same means.
+
+    Args:
+      path: as of `figure`.
+      title: default: names the plant.
+
+    Returns:
+      The two files.
+
+    Raises:
+      ScenarioError: no tunings, tunings that cannot be compared, another ending, or a path that cannot be written.
+    """
+    base, best = figure._base(path), compare(tunings)
+    with style.page():
+        page = figure._page(HEIGHT)
+        ax = page.subplots()
+        handles = [_front(ax, one, MARKS[i % len(MARKS)]) for i, one in enumerate(best)]
+        ax.set(xscale="log", yscale="log")
+        ax.set_xlabel("tracking: ITAE / |x₀|, summed over conditions (s²)")
+        ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
+        ax.tick_params(which="both", length=0)
+        ax.margins(0.04, 0.06)
+        if ax.get_ylim()[1] > 0.1 * (limit := _most(best[0])):
+            ax.axhline(limit, color=style.RULE, lw=1.0, ls=(0, (4, 3)))
+            handles.append(
+                Line2D([], [], color=style.RULE, ls=(0, (4, 3)), label="from bound to bound at every sample")
+            )
+        handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **CHOSEN))
+        figure._head(page, title or f"{best[0].plant.name}: tracking against variation", handles)
+        return figure._write(page, base)
+
+
+def _front(ax: Axes, tuned: Tuned, mark: str) -> Line2D:
+    """Draw a law's front with its chosen gains; what the legend says of it."""
+    colour, words = style.law_colour(tuned.law.name), style.law_name(tuned.law.name)
+    if not tuned.front:
+        return Line2D([], [], color=colour, lw=3, label=f"{words}: every run failed")
+    x = [one.tracking for one in tuned.front]
+    y = [max(one.variation, REST) for one in tuned.front]
+    ax.step(x, y, where="post", color=colour, marker=mark, ms=4.5, mec="none", alpha=0.9)
+    chosen = min(tuned.history, key=lambda one: one.objective)
+    ax.plot([chosen.tracking], [max(chosen.variation, REST)], color=colour, marker=mark, zorder=3, **CHOSEN)
+    label = f"{words}: J = {tuned.objective:.3g} s²"
+    return Line2D([], [], color=colour, lw=3, marker=mark, ms=7, mec="none", label=label)
+
+
+def _most(tuned: Tuned) -> float:
+    """The variation of a command that goes from bound to bound at every sample of every condition, 1/s."""
+    return 2 / tuned.definition.control_period * len(tuned.definition.conditions)
