@@ -55,7 +55,7 @@ def settling_time(trace: Trace) -> float:
 
     Last exit of max_i |e_i| from 2 % of the scale, in s since t[0]; a late step of r counts from t[0] too.
     """
-    return last_exit(trace.t, np.abs(error(trace)).max(axis=1), BAND * scale(trace))
+    return last_exit(trace.t, measure.largest(np.abs(error(trace))), BAND * scale(trace))
 
 
 @metric("s")
@@ -145,7 +145,7 @@ def reaching_time(trace: Trace) -> float:
     on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout, as for a law
     without a surface. s is what the law computed from its measurement: under noise it may never stay.
     """
-    size = np.abs(trace.s).max(axis=1)
+    size = measure.largest(np.abs(trace.s))
     return last_exit(trace.t, size, BAND * (size[0] or size.max()))
 
 
@@ -227,8 +227,8 @@ def reversal_rate(trace: Trace) -> float:
 
     After swings of at least half the ripple; 0 for a ripple up to 1e-6 of the scale. It sees no cycle beyond that part.
     """
-    part = last(trace)
-    return max(measure.turns(e, 1e-6 * scale(trace)) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
+    part, least = last(trace), 1e-6 * scale(trace)
+    return max(measure.turns(e, least) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
 
 
 @metric("s", network=True)
@@ -240,7 +240,7 @@ def mean_settling_time(trace: Trace) -> float:
 @metric("s", network=True)
 def spread_settling_time(trace: Trace) -> float:
     """Time from which max_i x_i - min_i x_i stays within 2 % of the scale."""
-    return last_exit(trace.t, np.ptp(trace.x, axis=1), BAND * scale(trace))
+    return last_exit(trace.t, measure.largest(trace.x) - measure.smallest(trace.x), BAND * scale(trace))
 
 
 @metric("{x}", network=True)
