@@ -1,0 +1,64 @@
+"""smc-mujoco bench: the study's grid, computed so that nothing is lost, to a table and a leaderboard."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.terminal import Clock, loading, mendable
+
+
+def bench(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A fraction: 4 conditions, 3 seeds, 5 s a run; half a minute on 2 cores.")
+    ] = False,
+    plants: Annotated[str | None, typer.Option(help="Plants, as a,b; default the paper's five.")] = None,
+    laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
+    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, help="How many starts and noises; default 20.")] = None,
+    gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
+    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
+    executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
+    traces: Annotated[
+        str, typer.Option(help="Which to save: none, all, or the worst by plant and condition.")
+    ] = "none",
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the runs that the folder holds.")] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+) -> None:
+    """Compare laws on plants in conditions: every combination from every seed, to OUT/results.parquet.
+
+    Finished runs are kept: stop it whenever you like, start it again with the same options, and it goes on. Names are
+    those that `smc-mujoco list` shows. The whole grid is 7,200 runs of 10 s.
+
+    Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 10 --out duffing
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco.leaderboard import leaderboard, leaderboard_table
+            from smc_mujoco.study import FULL, QUICK, grid, study
+
+        clock, console = Clock(), Console()
+        chosen = QUICK if quick else FULL
+        with clock("in all"):
+            scenarios = grid(
+                _names(plants) or chosen.plants,
+                _names(laws) or chosen.laws,
+                _names(conditions) or chosen.conditions,
+                seeds or chosen.seeds,
+                gains,
+                chosen.duration if duration is None else duration,
+            )
+            table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
+        console.print(leaderboard_table(leaderboard(table)))
+        failed = len(table) - table.data["failure"].null_count
+        said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        console.print(said, soft_wrap=True, highlight=False)
+        console.print(f"wrote {out / 'results.parquet'}", soft_wrap=True, highlight=False)
+
+
+def _names(text: str | None) -> list[str]:
+    """The names in a,b."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]

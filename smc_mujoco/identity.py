@@ -1,0 +1,100 @@
+"""What a run is: the hash that tells it from others, the name of its condition, what a table's row says of it."""
+
+import functools
+import hashlib
+import json
+from typing import Any
+
+from smc_mujoco import fingerprint, paper, record
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.plant import Plant
+from smc_mujoco.scenario import Scenario
+
+OURS = "smc_mujoco."
+# Of a description: what tells no condition from another, for it is of the plant, the law or the run.
+NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions")
+LONGEST = 60  # characters of a condition's name
+
+
+def described(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain data, the same for equal scenarios."""
+    data = record.describe(scenario)
+    del data["left_out"]
+    return data
+
+
+def key(scenario: Scenario) -> str:
+    """A hash of all that decides what a run does: its scenario, the code of its parts, versions; 32 hex digits."""
+    return _key(scenario, described(scenario))
+
+
+def row(scenario: Scenario) -> dict[str, Any]:
+    """The columns of a table that say what ran."""
+    data = described(scenario)
+    return {
+        "hash": _key(scenario, data),
+        "plant": scenario.plant.name,
+        "law": scenario.law.name,
+        "gains": json.dumps(dict(scenario.law.gains)),
+        "condition": _condition(scenario, data),
+        "seed": scenario.seed,
+        "duration": scenario.duration,
+        "versions": json.dumps(data["versions"]),
+        "scenario": json.dumps(data),
+    }
+
+
+def condition(scenario: Scenario) -> str:
+    """The name that `paper.CONDITIONS` has for the run's conditions, or what sets them apart from the nominal ones.
+
+    Plant, law, start, seed and duration are no conditions.
+    """
+    return _condition(scenario, described(scenario))
+
+
+def _key(scenario: Scenario, data: dict[str, Any]) -> str:
+    text = json.dumps([data, _codes(scenario)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _codes(s: Scenario) -> list[str]:
+    """Hashes of the code that a run calls: of laws, estimators, surfaces and signals; of plants and parts of yours."""
+    functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
+    signals = [type(signal) for signal in (s.reference, *s.disturbance)]
+    parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
+    own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(OURS) and kind is not type(None)]
+    if not s.plant.build.__module__.startswith(OURS):
+        builds = *s.plant.contacts.items(), *s.plant.mechanisms.items()
+        own.append((s.plant.build, s.plant.fields, s.plant.nominal, builds))
+    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)]
+
+
+def _condition(scenario: Scenario, data: dict[str, Any]) -> str:
+    known = _conditions(scenario.plant, scenario.duration)
+    if (text := _compared(data)) in known:
+        return known[text]
+    nominal = json.loads(next(iter(known), "{}"))
+    changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
+    differ = [name for name in changed if name not in scenario.left_out]  # what others brought with them
+    name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
+    return name if len(name) <= LONGEST else f"{name[:LONGEST]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
+
+
+def _compared(data: dict[str, Any]) -> str:
+    return json.dumps({name: value for name, value in data.items() if name not in NO_CONDITION})
+
+
+@functools.lru_cache(maxsize=256)
+def _conditions(plant: Plant, duration: float) -> dict[str, str]:
+    """What runs of a plant look like in the paper's conditions -> their names, the nominal one first."""
+    found: dict[str, str] = {}
+    for name, fields in paper.CONDITIONS.items():
+        try:
+            given = fields(plant.name) if callable(fields) else fields
+            common = {"plant": plant, "law": "none", "duration": duration}
+            chosen: dict[str, Any] = common | {"control_period": paper.CONTROL_PERIOD, "u_max": paper.U_MAX} | given
+            scenario = Scenario(**chosen)
+        except (KeyError, ScenarioError):  # it is not for this plant, or for runs as short as this
+            continue
+        found.setdefault(_compared(described(scenario)), name)
+    return found

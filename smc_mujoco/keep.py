@@ -1,0 +1,58 @@
+"""Which traces of a study are saved, and where."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.executor import batches, cost
+from smc_mujoco.progress import counter
+from smc_mujoco.run import stream
+from smc_mujoco.scene import slug
+from smc_mujoco.table import Table
+
+CHOICES = ("none", "worst", "all")
+LONGEST = 40  # characters of a condition in a file's name
+
+
+def folder(out: str | os.PathLike) -> Path:
+    """Where a study keeps traces."""
+    return Path(out) / "traces"
+
+
+def path(folder: Path, row: Mapping[str, Any]) -> Path:
+    """The file of a row's trace."""
+    condition = slug(row["condition"])[:LONGEST]
+    return folder / f"{row['plant']}-{condition}-{slug(row['law'])}-{row['seed']}-{row['hash'][:8]}.npz"
+
+
+def worst(table: Table) -> list[int]:
+    """For every plant and condition the row that failed first, or else ends with the largest ultimate bound."""
+    bounds, failed = table.column("ultimate_bound"), table.column("failure") != np.array(None)
+    badness = np.where(failed, np.inf, np.nan_to_num(bounds, nan=np.inf))
+    found: dict[tuple, int] = {}
+    for i, place in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
+        if place not in found or (failed[i], badness[i]) > (failed[found[place]], badness[found[place]]):
+            found[place] = i
+    return list(found.values())
+
+
+def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
+    """Save the chosen traces that are not there, by running them again.
+
+    Raises:
+      ScenarioError: the folder cannot be written.
+    """
+    chosen = {"none": [], "worst": worst(table), "all": range(len(table))}[choice]
+    files = {}
+    for i in chosen:
+        row = table.data.slice(int(i), 1).to_pylist()[0]
+        if not (file := path(folder, row)).exists():
+            files[table.scenario(int(i))] = file
+    with counter(len(files), sum(map(cost, files)), progress) as counts:
+        for batch in batches(files, threads):
+            for i, trace in stream(batch, threads, counts.stepped):
+                trace.save(files[batch[i]])
+                counts.finished(1)

@@ -1,0 +1,191 @@
+"""The study: a grid of runs, computed so that nothing is lost, to a table of scores.
+
+    scenarios = smc.grid(["duffing"], ["observer_free", "classical"], ["noise", "coulomb"], seeds=20)
+    table = smc.study(scenarios, "study")          # study/results.parquet; killed, it continues where it was
+    print(table.select(law="classical").column("ultimate_bound"))
+
+Runs are told apart by all that decides their outcome: the scenario, the code of its law, signals and other parts of
+yours, and the versions of the packages. A run that is there is not run again; one whose law was edited is.
+"""
+
+import dataclasses
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco import cluster, identity, keep, paper
+from smc_mujoco import executor as executors
+from smc_mujoco.component import Component
+from smc_mujoco.errors import ScenarioError, find, shown, whole
+from smc_mujoco.executor import Batch, Outcome
+from smc_mujoco.gains import LAWS
+from smc_mujoco.law import Law
+from smc_mujoco.progress import Counter, counter
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.store import Store
+from smc_mujoco.table import Table
+from smc_mujoco.trace import Trace
+
+key, condition = identity.key, identity.condition
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Extent:
+    """What a study spans, see `grid`."""
+
+    plants: tuple[str, ...] = paper.PLANTS
+    laws: tuple[str, ...] = LAWS
+    conditions: tuple[str, ...]
+    seeds: int
+    duration: float = paper.DURATION
+
+
+# Of the paper's conditions one of a kind; of a real machine's, friction, drive, gear, sensor and obstacles.
+IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
+REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
+FULL = Extent(conditions=IDEAL + REAL, seeds=20)
+QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=3, duration=5.0)
+SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
+
+
+def grid(
+    plants: Sequence[str],
+    laws: Sequence[str | Law],
+    conditions: Sequence[str],
+    seeds: int | Iterable[int],
+    gains: str = "tuned",
+    duration: float = paper.DURATION,
+) -> list[Scenario]:
+    """Every plant in every condition under every law from every seed; plant varies slowest, seed fastest.
+
+    Args:
+      plants: names out of `paper.PLANTS`.
+      laws: names, with gains from the set `gains`, or laws with gains of their own.
+      conditions: names out of `paper.CONDITIONS`.
+      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. Seed 0 starts from the plant's own x0, seed s from
+        x0_i (1 + 0.2 z_i) with z_i uniform in [-1, 1], the same in every condition and under every law; with a contact
+        from x0_i (1 - 0.2 |z_i|), which is clear of stops, and with "bobs" in order from left to right.
+      gains: "study", "tuned", "tracking" or "default", see `gains`.
+      duration: of each run, s.
+
+    Raises:
+      ScenarioError: a name that is not known, or gains that the set does not have.
+    """
+    numbers = range(whole("seeds", seeds, 1, 10**6)) if isinstance(seeds, int | float) else _listed("seeds", seeds)
+    plants, conditions = _listed("plants", plants), _listed("conditions", conditions)
+    return [
+        _seeded(_scenario(plant, law, condition, duration, gains), seed)
+        for plant in plants
+        for condition in conditions
+        for law in _listed("laws", laws)
+        for seed in numbers
+    ]
+
+
+def _listed(what: str, values: object) -> list:
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable) or not (found := list(values)):
+        raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
+    return found
+
+
+def _scenario(plant: str, law: str | Law, condition: str, duration: float, gains: str) -> Scenario:
+    if isinstance(law, Component):
+        return paper.scenario(plant, "none", condition, duration=duration, changes={"law": law})
+    return paper.scenario(plant, law, condition, duration=duration, gains=gains)
+
+
+def _seeded(scenario: Scenario, seed: int) -> Scenario:
+    """The scenario from a seed, and from the start that belongs to it."""
+    seed = whole("seed", seed, 0, 2**53 - 1)
+    if seed == 0:
+        return scenario
+    z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
+    kind = scenario.contact.kind
+    inward = z if kind == "none" else [-abs(factor) for factor in z]
+    x0 = [x * (1.0 + SPREAD * factor) for x, factor in zip(scenario.x0, inward, strict=True)]
+    return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
+
+
+def study(
+    scenarios: Iterable[Scenario],
+    out: str | os.PathLike,
+    resume: bool = True,
+    executor: str = "local",
+    threads: int | None = None,
+    progress: bool = False,
+    traces: str = "none",
+) -> Table:
+    """Run scenarios, score them, and write their table, out/results.parquet: a row each, in order, equal ones once.
+
+    Finished runs are kept in out/parts, some seconds of work a file. A study that was killed, or found the disk full,
+    and is started again with the same arguments goes on from there and ends with the same file, bit for bit.
+
+    Args:
+      out: the folder; it may hold the parts of other studies.
+      resume: False forgets what the folder holds.
+      executor: "local", or "dask://HOST:PORT" for the workers of that scheduler.
+      threads: simulations at once, if local; None for one per available core.
+      progress: whether to show a progress bar.
+      traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": the run with the
+        largest ultimate bound, or one that failed.
+
+    Raises:
+      ScenarioError: what cannot be run, a folder that cannot be written, no scheduler; what was finished stays.
+    """
+    where = executors.checked(executor)
+    find("choice of traces", traces, dict.fromkeys(keep.CHOICES))
+    threads = executors.cores() if threads is None else whole("threads", threads, 1, 1024)
+    store = Store(Path(out))
+    named = _named(scenarios)
+    store.open(resume)
+    missing = [scenario for name, scenario in named.items() if name not in store.where]
+    with counter(len(missing), sum(map(executors.cost, missing)), progress) as counts:
+        if where == "local":
+            folder = keep.folder(out) if traces == "all" else None
+            _compute(missing, store, threads, counts, folder)
+        else:
+            _send(missing, store, where, counts)
+    store.collect(list(named))
+    table = dataclasses.replace(Table.read(store.results), known=named)
+    keep.save(table, traces, keep.folder(out), threads, progress)
+    return table
+
+
+def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
+    """Hash -> scenario, in order; of equal ones the first."""
+    found: dict[str, Scenario] = {}
+    for scenario in _listed("scenarios", scenarios):
+        if not isinstance(scenario, Scenario):
+            raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
+        found.setdefault(key(scenario), scenario)
+    return found
+
+
+def _compute(scenarios: list[Scenario], store: Store, threads: int, counts: Counter, folder: Path | None) -> None:
+    """Run scenarios here."""
+
+    def finish(batch: Batch, traces: Sequence[Trace]) -> None:
+        if folder:
+            for scenario, trace in zip(batch, traces, strict=True):
+                trace.save(keep.path(folder, identity.row(scenario)))
+        store.add([_row(s, executors.outcome(trace)) for s, trace in zip(batch, traces, strict=True)])
+        counts.finished(len(batch))
+
+    executors.local(executors.batches(scenarios, threads), threads, finish, counts.stepped)
+
+
+def _send(scenarios: list[Scenario], store: Store, address: str, counts: Counter) -> None:
+    """Have a cluster run scenarios."""
+
+    def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
+        store.add([_row(s, outcome) for s, outcome in zip(batch, outcomes, strict=True)])
+        counts.stepped(sum(map(executors.cost, batch)))
+        counts.finished(len(batch))
+
+    cluster.remote(executors.batches(scenarios, 1), address, finish)
+
+
+def _row(scenario: Scenario, outcome: Outcome) -> dict:
+    return identity.row(scenario) | outcome

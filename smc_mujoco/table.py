@@ -1,0 +1,130 @@
+"""The table of a study: a row a run, as parquet, with the run itself a call away.
+
+    table = smc.Table.read("study/results.parquet")
+    best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
+    table.scenario(0), table.trace(0)          # what ran, and what it did, by running it again
+
+Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s), every metric of
+`metrics` (null where the run failed or the metric is not for it, inf for "never"), how it failed if it did
+(`diverged_at` in s, `failure`), and from what to make it again (`versions`, `scenario`, both JSON).
+"""
+
+import dataclasses
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco import record
+from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.frozen import frozen
+from smc_mujoco.metrics import metrics
+from smc_mujoco.run import run
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.trace import Trace
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
+BEFORE |= {"seed": "int64", "duration": "float64"}
+AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
+FEW: Mapping[str, Scenario] = frozen({})
+
+
+def columns() -> dict[str, str]:
+    """Column -> its type, in order."""
+    return BEFORE | {m.name: "float64" for m in metrics()} | AFTER
+
+
+def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
+    """The schema of a study's files."""
+    import pyarrow as pa
+
+    kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
+    return pa.schema([(name, kinds[kind]) for name, kind in columns().items()], metadata=dict(metadata or {}))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Runs and their scores.
+
+    Attributes:
+      data: the pyarrow Table.
+      known: hash -> Scenario, for laws and signals of yours, whose code no file holds.
+    """
+
+    data: "pa.Table"
+    known: Mapping[str, Scenario] = dataclasses.field(default=FEW, repr=False)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike) -> "Table":
+        """The table in a parquet file that a study wrote, or in the study's folder.
+
+        Raises:
+          ScenarioError: no such file, or no table of a study.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path = Path(path)
+        path = path / "results.parquet" if path.is_dir() else path
+        try:
+            data = pq.ParquetFile(path).read()
+        except FileNotFoundError:
+            raise ScenarioError(f"no table at {path}: give the results.parquet of a study that has ended") from None
+        except (OSError, pa.ArrowException):
+            raise ScenarioError(f"{path} is no parquet file: give the results.parquet of a study") from None
+        if missing := [name for name in (*BEFORE, *AFTER) if name not in data.column_names]:
+            raise ScenarioError(f"{path} has no column {missing[0]!r}: give the results.parquet of a study")
+        return cls(data=data)
+
+    def __len__(self) -> int:
+        return self.data.num_rows
+
+    def __repr__(self) -> str:
+        counts = [f"{len(set(self.column(name).tolist()))} {name}s" for name in ("plant", "law", "condition")]
+        return f"Table({len(self)} runs: {', '.join(counts)})"
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every row as column -> value."""
+        return self.data.to_pylist()
+
+    def column(self, name: str) -> np.ndarray:
+        """A column, (rows,): numbers with NaN for null, or texts with None."""
+        find("column of the table", name, dict.fromkeys(self.data.column_names))
+        return self.data[name].to_numpy()
+
+    def select(
+        self,
+        plant: str | Sequence[str] | None = None,
+        law: str | Sequence[str] | None = None,
+        condition: str | Sequence[str] | None = None,
+    ) -> "Table":
+        """The rows with this plant, law and condition, each a name, several, or None for all."""
+        import pyarrow.compute as pc
+
+        data = self.data
+        for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
+            if wanted is not None:
+                there = dict.fromkeys(self.column(name).tolist())
+                names = [wanted] if isinstance(wanted, str) else list(wanted)
+                for one in names:
+                    find(f"{name} of this table", one, there)
+                data = data.filter(pc.field(name).isin(names))
+        return dataclasses.replace(self, data=data)
+
+    def scenario(self, i: int) -> Scenario:
+        """The scenario of row i."""
+        if not isinstance(i, int | np.integer) or not -len(self) <= i < len(self):
+            raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
+        row = self.data.slice(int(i) % len(self), 1)
+        known = self.known.get(row["hash"][0].as_py())
+        return known or record.restore(json.loads(row["scenario"][0].as_py()))
+
+    def trace(self, i: int) -> Trace:
+        """The trace of row i: the run once more, which with the same versions is the same to the last bit."""
+        return run(self.scenario(i))

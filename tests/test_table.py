@@ -1,0 +1,74 @@
+"""The table of a study: its rows are the runs' scores, and from each its run can be made again."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.study import condition, grid, key, study
+from smc_mujoco.table import Table
+
+
+def small(seeds: int = 2) -> list[smc.Scenario]:
+    return grid(["duffing"], ["observer_free", "classical"], ["nominal", "noise"], seeds, "study", duration=0.05)
+
+
+@smc.law_function(gains={"when": 0.02})
+def fails_late(y, gains, memory):
+    return (math.nan if y.t > gains.when else -y.e), y.e
+
+
+def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
+    scenarios = small()
+    table = study(scenarios, tmp_path)
+    for s, row in zip(scenarios, table.rows(), strict=True):
+        assert row["hash"] == key(s)
+        scores = smc.score(smc.run(s))
+        assert {name: row[name] for name in scores} == scores
+        assert (row["plant"], row["law"], row["condition"]) == (s.plant.name, s.law.name, condition(s))
+        assert (row["seed"], row["duration"], json.loads(row["gains"])) == (s.seed, s.duration, dict(s.law.gains))
+        assert (row["failure"], row["diverged_at"], row["spread_bound"]) == (None, None, None)
+
+
+def test_equal_runs_are_one_row_where_the_first_stands(tmp_path):
+    one, two, *_ = small(seeds=1)
+    table = study([two, one, two, one], tmp_path)
+    assert table.column("hash").tolist() == [key(two), key(one)]
+
+
+def test_a_table_is_read_back_selected_and_run_again(tmp_path):
+    scenarios = small()
+    study(scenarios, tmp_path)
+    table = Table.read(tmp_path / "results.parquet")
+    assert table.rows() == Table.read(tmp_path).rows()
+    chosen = table.select(law="classical", condition=["noise"])
+    assert set(zip(chosen.column("law"), chosen.column("condition"), strict=True)) == {("classical", "noise")}
+    i = len(chosen) - 1
+    assert chosen.scenario(i) == scenarios[-1]
+    assert np.array_equal(chosen.trace(i).x, smc.run(scenarios[-1]).x)
+    assert smc.score(chosen.trace(-1))["itae"] == chosen.column("itae")[-1]
+    assert np.isnan(table.column("spread_bound")).all()
+    with pytest.raises(smc.ScenarioError, match="did you mean 'classical'"):
+        table.select(law="clasical")
+    with pytest.raises(smc.ScenarioError, match="unknown column"):
+        table.column("itea")
+    with pytest.raises(smc.ScenarioError, match="has no row 8"):
+        table.scenario(8)
+
+
+def test_what_is_no_table_is_one_sentence(tmp_path):
+    with pytest.raises(smc.ScenarioError, match="no table at"):
+        Table.read(tmp_path)
+    (tmp_path / "results.parquet").write_text("nothing")
+    with pytest.raises(smc.ScenarioError, match="is no parquet file"):
+        Table.read(tmp_path)
+
+
+def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
+    s = smc.Scenario(plant="duffing", law=fails_late(when=1.0), duration=0.05)
+    table = study([s], tmp_path)
+    assert smc.score(table.trace(0)) == smc.score(smc.run(s))
+    with pytest.raises(smc.ScenarioError, match="came from a file without its code"):
+        Table.read(tmp_path).trace(0)
