@@ -1,0 +1,102 @@
+"""What the paper's simulations of the Van der Pol oscillator show under noise and disturbance, of x and of u.
+
+Noise is the study's, 0.01 m on x and 0.05 m/s on v; the disturbance is the paper's, d = 0.2 sin(5t) N.
+"""
+
+import numpy as np
+
+from smc_mujoco import measure
+from smc_mujoco.claims import claim
+from smc_mujoco.claims.compare import OURS, RIVALS, bound, deviation, scores
+from smc_mujoco.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.metrics import HIGH
+from smc_mujoco.paper import LAWS
+from smc_mujoco.trace import Trace
+
+PLANT = "van_der_pol"
+
+
+@claim(
+    "45",
+    "Van der Pol with noise: stable, small fluctuations",
+    where="robustness under disturbances",
+    measured="ultimate bound with noise on x and v",
+    holds_if="< 5 % of |x0|",
+)
+def small_fluctuations(runs: Runs) -> list[Check]:
+    """Largest |x| in the last 20 % of the run over |x0|."""
+    last = runs.score(PLANT, OURS, "noise")["ultimate_bound"]
+    return [
+        check(f"{PLANT}: ultimate bound with noise, over |x0|", last / scale(runs.scenario(PLANT, OURS)), "<", 0.05)
+    ]
+
+
+@claim(
+    "46",
+    "Van der Pol with d: nearly identical, strong rejection",
+    where="robustness under disturbances",
+    measured="largest |x - x_nominal| under d = 0.2 sin(5t); ultimate bound under it against each rival's",
+    holds_if="< 5 % of |x0|; residual not larger than any rival's",
+)
+def nearly_identical(runs: Runs) -> list[Check]:
+    """Deviation from the nominal run over |x0|; the residual, largest |x| in the last 20 %, against each rival's."""
+    disturbed, nominal = runs.traces([runs.scenario(PLANT, OURS, condition) for condition in ("sine", "nominal")])
+    residual = {law: s["ultimate_bound"] for (_, law), s in scores(runs, [PLANT], LAWS, "sine").items()}
+    return [
+        check(f"{PLANT}: deviation from nominal under d, over |x0|", deviation(disturbed, nominal), "<", 0.05),
+        *(
+            check(f"{PLANT}: residual under d of {OURS} against that of {law}, m", residual[OURS], "<=", residual[law])
+            for law in RIVALS
+        ),
+    ]
+
+
+@claim(
+    "48",
+    "u under noise: smooth, small fluctuations",
+    where="control signal analysis",
+    measured="Van der Pol with noise, last 20 % of the run: standard deviation of u, its largest step from sample to "
+    "sample, share of its variance above 50 Hz",
+    holds_if="std < 10 % of lambda, step < 10 % of lambda, share < 50 %",
+    note="Over the whole run the swing from the start, not noise, is most of u's variance; so all three are of the "
+    "last 20 %.",
+)
+def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
+    """How u of the paper's law fluctuates about rest; see `fluctuation`."""
+    (trace,) = runs.traces([runs.scenario(PLANT, OURS, "noise")])
+    std, step, share = fluctuation(trace)
+    lam = bound(runs, PLANT)
+    return [
+        check(f"{PLANT}: standard deviation of u with noise, over lambda", ratio(std, lam), "<", 0.1),
+        check(f"{PLANT}: largest step of u with noise, over lambda", ratio(step, lam), "<", 0.1),
+        check(f"{PLANT}: share of u above {HIGH:g} Hz with noise", share, "<", 0.5),
+        Beside(f"{PLANT}: the same over the whole run", runs.score(PLANT, OURS, "noise")["hf_share"]),
+    ]
+
+
+@claim(
+    "49",
+    "u under d: continuous, bounded",
+    where="control signal analysis",
+    measured="Van der Pol under d = 0.2 sin(5t): largest change of u per sample of 1 ms",
+    holds_if="< 2 % of lambda",
+)
+def continuous(runs: Runs) -> list[Check]:
+    """Largest step of u over lambda."""
+    step = runs.score(PLANT, OURS, "sine")["max_step"]
+    return [check(f"{PLANT}: largest step of u under d, over lambda", ratio(step, bound(runs, PLANT)), "<", 0.02)]
+
+
+def fluctuation(trace: Trace) -> tuple[float, float, float]:
+    """Of u in the last part, worst channel: standard deviation, largest step, share of the variance above 50 Hz.
+
+    The share is from the discrete Fourier transform, no window; a failed run gives inf, a constant u 0.
+    """
+    u = trace.u[measure.last(trace)]
+    if not np.isfinite(u).all():
+        return np.inf, np.inf, np.inf
+    std, step = float(u.std(axis=0).max()), float(np.abs(np.diff(u, axis=0)).max())
+    power = (np.abs(np.fft.rfft(u - u.mean(axis=0), axis=0)) ** 2).max(axis=1)
+    frequency = np.fft.rfftfreq(len(u), trace.scenario.control_period)
+    share = float(power[frequency > HIGH].sum() / power.sum()) if power.any() else 0.0
+    return std, step, share

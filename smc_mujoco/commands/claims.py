@@ -1,0 +1,55 @@
+"""smc-mujoco claims: which of the paper's claims hold, under which gains, by what numbers."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.terminal import Clock, loading, mendable
+
+
+def claims(
+    ids: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="ID", help="Claims, as 3 18; all without one.", show_default=False),
+    ] = None,
+    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default study,tuned,tracking.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarser grids, no network above 50 pendulums, tuned gains alone.")
+    ] = False,
+    table: Annotated[Path | None, typer.Option(help="results.parquet of a bench: its runs are not made again.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+) -> None:
+    """Audit the paper's claims: each measured against the threshold that was fixed for it before any run.
+
+    A claim is supported where all its checks hold, refuted where none does, partly supported between; under each set
+    of gains, and where the verdict depends on the set it says so. A few claims are shown in full, with every check;
+    all of them take minutes.
+
+    Example: smc-mujoco claims 3 18 --gains tuned
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco.claims import audit, show
+            from smc_mujoco.table import Table
+
+        clock, console = Clock(), Console()
+        names = None if gains is None else [name.strip() for name in gains.split(",") if name.strip()]
+        known = None if table is None else Table.read(table)
+        if out:
+            show.writable(out)
+        with clock("in all"):
+            found = audit.watched(known, ids or None, names, quick, threads)
+        text = show.document(found)
+        if out:
+            show.write(text, out)
+        if json:
+            print(text)
+        else:
+            show.tell(found, console, full=bool(ids))
+            where = f"; wrote {out}" if out else ""
+            console.print(f"{clock.spent['in all']:.0f} s{where}", style="dim", soft_wrap=True, highlight=False)
