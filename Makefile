@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test check gallery bench lock setup
+.PHONY: help demo test check report gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -24,6 +24,12 @@ check: setup ## lint, format and types
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 
+report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
+	$(BIN)/smc-mujoco report
+
+gains: setup ## the laws' gains again, tuned by one rule (20 minutes)
+	$(BIN)/python benchmarks/gains.py --all
+
 gallery: setup ## the clips that README shows
 	$(BIN)/python videos/gallery.py
 
@@ -32,6 +38,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/realistic.py
 	$(BIN)/python benchmarks/laws.py
+	$(BIN)/python benchmarks/study.py --quick
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

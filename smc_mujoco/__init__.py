@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from smc_mujoco.actuators import Lag as Lag
     from smc_mujoco.actuators import RateLimit as RateLimit
     from smc_mujoco.backlash import Backlash as Backlash
+    from smc_mujoco.basin import basin as basin
+    from smc_mujoco.claims import Claim as Claim
+    from smc_mujoco.claims import claims as claims
     from smc_mujoco.cli import play as play
     from smc_mujoco.component import GainWarning as GainWarning
     from smc_mujoco.conditions import Jump as Jump
@@ -43,6 +46,8 @@ if TYPE_CHECKING:
     from smc_mujoco.law import law as law
     from smc_mujoco.law import law_function as law_function
     from smc_mujoco.law import laws as laws
+    from smc_mujoco.leaderboard import leaderboard as leaderboard
+    from smc_mujoco.margins import margins as margins
     from smc_mujoco.mechanism import deviation as deviation
     from smc_mujoco.metrics import score as score
     from smc_mujoco.plant import Plant as Plant
@@ -50,6 +55,7 @@ if TYPE_CHECKING:
     from smc_mujoco.plant import plants as plants
     from smc_mujoco.references import MinimumJerk as MinimumJerk
     from smc_mujoco.references import Ramp as Ramp
+    from smc_mujoco.report import report as report
     from smc_mujoco.run import PlainLoopWarning as PlainLoopWarning
     from smc_mujoco.run import run as run
     from smc_mujoco.run import stream as stream
@@ -66,10 +72,13 @@ if TYPE_CHECKING:
     from smc_mujoco.signals import Signal as Signal
     from smc_mujoco.signals import Sine as Sine
     from smc_mujoco.signals import Step as Step
+    from smc_mujoco.study import grid as grid
+    from smc_mujoco.study import study as study
     from smc_mujoco.surfaces import Surface as Surface
     from smc_mujoco.surfaces import surface as surface
     from smc_mujoco.surfaces import surface_function as surface_function
     from smc_mujoco.surfaces import surfaces as surfaces
+    from smc_mujoco.table import Table as Table
     from smc_mujoco.trace import Trace as Trace
     from smc_mujoco.trace import load as load
     from smc_mujoco.tuned import Tuned as Tuned
@@ -80,6 +89,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "actuators": ("DCMotor", "Lag", "RateLimit"),
     "backlash": ("Backlash",),
+    "basin": ("basin",),
+    "claims": ("Claim", "claims"),
     "cli": ("play",),
     "component": ("GainWarning",),
     "conditions": ("Jump", "Noise"),
@@ -91,18 +102,23 @@ _HOMES = {
     "estimators": ("estimator", "estimator_function", "estimators"),
     "friction": ("Coulomb", "LuGre", "Viscous"),
     "law": ("Law", "law", "law_function", "laws"),
+    "leaderboard": ("leaderboard",),
+    "margins": ("margins",),
     "mechanism": ("deviation",),
     "metrics": ("score",),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),
     "references": ("MinimumJerk", "Ramp"),
+    "report": ("report",),
     "run": ("PlainLoopWarning", "run", "stream"),
     "scenario": ("Scenario",),
     "scene": ("Scene",),
     "sensors": ("Encoder",),
     "series": ("TimeSeries",),
     "signals": ("BandLimited", "Constant", "Gust", "Impulse", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
+    "study": ("grid", "study"),
     "surfaces": ("Surface", "surface", "surface_function", "surfaces"),
+    "table": ("Table",),
     "trace": ("Trace", "load"),
     "tuned": ("Tuned",),
     "tuning": ("tune",),

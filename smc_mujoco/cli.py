@@ -1,4 +1,4 @@
-"""The command line: smc-mujoco list | laws [NAME] | run SCENE | show TRACE | tune PLANT LAW."""
+"""The command line: smc-mujoco list | laws | run | show | tune, here, and bench | margins | basin | claims | report."""
 
 import sys
 import warnings
@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.commands import basin, bench, claims, margins, report
 from smc_mujoco.terminal import Clock, loading, mendable
 
 app = typer.Typer(
@@ -149,6 +150,9 @@ def tune(
     budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to evaluate.")] = 256,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
+    front: Annotated[
+        Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
+    ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
     """Find a law's gains on a plant by the rule that is the same for every law.
@@ -178,3 +182,12 @@ def tune(
         )
         if path:
             console.print(f"wrote {found.save(path)}", soft_wrap=True, highlight=False)
+        if front:
+            from smc_mujoco.draw.pareto import pareto
+
+            for drawn in pareto([found], front):
+                console.print(f"wrote {drawn}", soft_wrap=True, highlight=False)
+
+
+for command in (bench.bench, margins.margins, basin.basin, claims.claims, report.report):
+    app.command()(command)

@@ -1,0 +1,60 @@
+"""What a report computes: how much of everything, in full or quick."""
+
+import dataclasses
+
+from smc_mujoco import gains, paper
+from smc_mujoco.study import FULL as GRID
+from smc_mujoco.study import QUICK as LOOK
+
+GAINS = "tuned"  # with which everything but the claims is run, which look at every set
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Plan:
+    """How much of everything.
+
+    Attributes:
+      quick: whether margins and claims are to be quick.
+      plants, laws, conditions, seeds, duration: of the grid; s. Fewer than eight seeds decide hardly anything, see
+        `ranking`.
+      kinds: of margins, found for all plants and laws.
+      basins: plants whose regions of attraction are mapped: on 2 cores a map of 2500 states takes half a minute.
+      basin_laws: under which laws.
+      points: of a map, across and up.
+      region: the longest run of a map, s.
+      claims: ids of claims to judge; None for all.
+      scenes: (plant, condition) of the traces and films.
+      filmed: how many of the scenes are filmed.
+      scene_laws: side by side in them.
+      scene: s, of traces and films.
+    """
+
+    quick: bool
+    plants: tuple[str, ...] = paper.PLANTS
+    laws: tuple[str, ...] = gains.LAWS
+    conditions: tuple[str, ...] = tuple(GRID.conditions)
+    seeds: int = GRID.seeds
+    duration: float = paper.DURATION
+    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
+    basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol")
+    basin_laws: tuple[str, ...] = paper.LAWS
+    points: tuple[int, int] = (50, 50)
+    region: float = paper.DURATION
+    claims: tuple[str, ...] | None = None
+    scenes: tuple[tuple[str, str], ...] = tuple((plant, "nominal") for plant in paper.PLANTS)
+    filmed: int = len(paper.PLANTS)
+    scene_laws: tuple[str, ...] = paper.LAWS
+    scene: float = 5.0
+
+
+FULL = Plan(quick=False)
+QUICK = Plan(
+    quick=True,
+    conditions=tuple(LOOK.conditions),
+    seeds=8,
+    duration=LOOK.duration,
+    kinds=("delay", "disturbance"),
+    basins=("inverted_pendulum",),
+    points=(16, 16),
+    filmed=1,
+)

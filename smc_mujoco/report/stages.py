@@ -1,0 +1,182 @@
+"""The stages of a report: grid, claims, margins, maps, fronts, scenes; each kept in the report's folder when done.
+
+    findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
+
+Killed and called again, nothing that was finished is computed again: the grid goes on within itself, the others with
+the first plant, map, film or list of claims that is missing.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco import gains as sets
+from smc_mujoco import gl, tuned
+from smc_mujoco.errors import ScenarioError
+from smc_mujoco.files import replacing
+from smc_mujoco.plant import plant as find_plant
+from smc_mujoco.report import about, scores
+from smc_mujoco.report.bars import Bars
+from smc_mujoco.report.findings import Field, Findings, Front
+from smc_mujoco.report.kept import kept
+from smc_mujoco.report.plan import GAINS, Plan
+from smc_mujoco.report.scenes import all_scenes
+from smc_mujoco.report.work import Work, part
+from smc_mujoco.study import grid as make_grid
+from smc_mujoco.study import study
+from smc_mujoco.table import Table
+
+PAPER = "observer_free"
+WORDS = {"Infinity": float("inf"), "-Infinity": float("-inf"), "NaN": float("nan")}
+FIELD_POINTS = 121  # of a map of V', along each axis
+
+
+def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
+    """Everything that a report tells, computed or read from the folder."""
+    work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
+    table = grid(work)
+    judged = claims(work, table)
+    margins, basins, scenes = all_margins(work), all_basins(work), all_scenes(work)
+    with bars.stage("statistics"):
+        return Findings(
+            scores=scores.scores(table),
+            places=scores.places(table),
+            claims=judged,
+            fields=fields(plan),
+            fronts=fronts(plan),
+            margins=margins,
+            basins=basins,
+            scenes=scenes,
+            about=about.about(plan, table, bars.spent, _no_film(plan)),
+        )
+
+
+def _no_film(plan: Plan) -> str | None:
+    why = gl.missing() if plan.filmed else None
+    return why and why.removeprefix("no film: ")
+
+
+def grid(work: Work) -> Table:
+    """The table of runs."""
+    plan = work.plan
+    scenarios = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
+    with work.bars.stage("grid", f"{len(scenarios)} runs", bar=False):
+        return study(scenarios, work.folder / "study", threads=work.threads, progress=work.bars.shown)
+
+
+def claims(work: Work, table: Table) -> tuple[Any, ...]:
+    """The claims, judged; the table's runs are not made again."""
+    from smc_mujoco.claims import Claim, evaluations
+    from smc_mujoco.claims import claims as judge
+
+    plan = work.plan
+    total = evaluations(plan.claims, None, plan.quick)
+    with work.bars.stage("claims", f"{total} judgements") as report:
+        done = [0]
+
+        def told(n: int) -> None:
+            done[0] += n
+            report(done[0], total)
+
+        return kept(
+            work.folder / "claims.json",
+            [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
+            lambda: tuple(judge(table, plan.claims, None, plan.quick, None, work.threads, told)),
+            lambda found, path: _write(path, [claim.plain() for claim in found]),
+            lambda path: tuple(Claim(**_numbers(entry)) for entry in json.loads(path.read_text())),
+        )
+
+
+def _write(path: Path, data: object) -> None:
+    with replacing(path) as part:
+        part.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+
+def _numbers(value: Any) -> Any:
+    """The numbers that `Claim.plain` wrote as words."""
+    if isinstance(value, Mapping):
+        return {name: _numbers(each) for name, each in value.items()}
+    return WORDS.get(value, value) if isinstance(value, str) else value
+
+
+def all_margins(work: Work) -> tuple[Any, ...]:
+    """Every law's margins, plant by plant."""
+    from smc_mujoco.margins import load, margins, save
+
+    plan, found = work.plan, []
+    plants = plan.plants if plan.kinds else ()
+    with work.bars.stage("margins", f"{len(plants)} plants") as report:
+        for k, plant in enumerate(plants):
+            told = part(report, k, len(plants))
+            found += kept(
+                work.folder / f"margins-{plant}.json",
+                [plan.laws, plan.kinds, plan.quick, GAINS],
+                lambda plant=plant, told=told: margins(
+                    [plant], plan.laws, plan.kinds, gains=GAINS, quick=plan.quick, threads=work.threads, report=told
+                ),
+                save,
+                load,
+            )
+            report(k + 1, len(plants))
+    return tuple(found)
+
+
+def all_basins(work: Work) -> tuple[Any, ...]:
+    """The maps, one a plant and law."""
+    from smc_mujoco.basin import Basin, basin, load
+
+    plan, found = work.plan, []
+    pairs = [(plant, law) for plant in plan.basins for law in plan.basin_laws]
+    with work.bars.stage("regions", f"{len(pairs)} maps") as report:
+        for k, (plant, law) in enumerate(pairs):
+            told = part(report, k, len(pairs))
+            found.append(
+                kept(
+                    work.folder / f"region-{plant}-{law}.json",
+                    [plan.points, plan.region, GAINS],
+                    lambda plant=plant, law=law, told=told: basin(
+                        plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=told
+                    ),
+                    Basin.save,
+                    load,
+                )
+            )
+            report(k + 1, len(pairs))
+    return tuple(found)
+
+
+def fields(plan: Plan) -> tuple[Field, ...]:
+    """V' of the paper's law on the state plane of every plant."""
+    from smc_mujoco.claims import lyapunov
+
+    found = []
+    for name in plan.plants if PAPER in plan.laws else ():
+        plant, law = find_plant(name), sets.law(name, PAPER, GAINS)
+        lam, k1 = law.gains["lam"], law.gains["k1"]
+        x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
+        rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)
+        found.append(Field(plant=name, law=PAPER, x=x[0], v=v[:, 0], vdot=rate, s=s))
+    return tuple(found)
+
+
+def fronts(plan: Plan) -> tuple[Front, ...]:
+    """Error against effort, of the tunings that come with the package; none where it has none."""
+    found = []
+    for plant in plan.plants:
+        for law in plan.laws:
+            try:
+                its = tuned.shipped(plant, law)
+            except ScenarioError:
+                continue
+            best = min(its.history, key=lambda e: e.objective)
+            found.append(
+                Front(
+                    plant=plant,
+                    law=law,
+                    tracking=tuple(e.tracking for e in its.front),
+                    variation=tuple(e.variation for e in its.front),
+                    chosen=(best.tracking, best.variation),
+                )
+            )
+    return tuple(found)

@@ -1,0 +1,150 @@
+"""The definitions that a report's numbers link to, beside those of the metrics, which are their docstrings."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from smc_mujoco.metrics import metrics
+from smc_mujoco.report import words
+
+
+class Term(NamedTuple):
+    """A definition: its anchor, what it is called, and what it is."""
+
+    id: str
+    name: str
+    text: str
+
+
+class Metric(NamedTuple):
+    """A metric's name, and its docstring in paragraphs."""
+
+    name: str
+    parts: tuple[str, ...]
+
+
+STATISTICS = (
+    Term(
+        "cell",
+        "cell",
+        "One plant in one condition: every law runs in it with the same seeds.",
+    ),
+    Term(
+        "median",
+        "median",
+        "Of the runs of a cell over its seeds. Seed 0 starts at the plant’s own x0, seed s at x0 (1 + 0.2 z), z "
+        "uniform in [-1, 1]; where there is noise, the seed is the noise’s too. A run that fails counts as never.",
+    ),
+    Term(
+        "interval",
+        "95 % interval",
+        "Of the median, by bootstrap over the seeds: expanded percentiles of the medians of 1999 resamples, with "
+        "whole seeds drawn again. Its ends are values of runs.",
+    ),
+    Term(
+        "best",
+        "best, or level with the best",
+        "No other law of the cell is better by more than the noise: a permutation test over whole seeds, corrected"
+        " for the number of laws, does not reject at 95 % that no law is better. One such law alone is the winner;"
+        " where there are several, none is declared. Fewer than six seeds can decide nothing.",
+    ),
+    Term(
+        "rank",
+        "rank, place",
+        "In each run, the law with the lowest value has rank 1, and so on; ties share the mean of their ranks, and"
+        " so do runs that never get there. Mean rank is over all runs that the laws share; the place orders the "
+        "laws by it, with a 95 % interval by bootstrap over the seeds.",
+    ),
+    Term(
+        "settles",
+        "settles",
+        "The share of runs with a finite settling time.",
+    ),
+    Term(
+        "never",
+        "never",
+        "A run that does not get there before it ends, or that fails.",
+    ),
+    Term(
+        "ratio",
+        "times",
+        "The law’s median over that of the best law; less is better in every metric here.",
+    ),
+    Term(
+        "verdict",
+        "verdict",
+        "Of a claim under one set of gains: supported where every check holds, refuted where none does, partly "
+        "supported between, not testable where there is nothing to check. Over the sets: the one that they share, "
+        "else partly supported, and marked as depending on the gains. Thresholds were fixed before any run.",
+    ),
+    Term(
+        "lyapunov",
+        "where V rises",
+        "The points of a grid on the state plane at which V′ = s s′ > 0 and |s| > 1e-6, u neither saturated nor "
+        "sampled, with the plant’s exact f and g; their share in percent.",
+    ),
+    Term(
+        "tracking",
+        "tracking",
+        "The first term of the objective of tuning: ITAE over the sum of |x0|, in s², summed over a nominal, a "
+        "noisy and a delayed run.",
+    ),
+    Term(
+        "variation",
+        "variation",
+        "The second: total variation of u over u_max and the duration, in 1/s, summed over the same runs.",
+    ),
+    Term(
+        "margin",
+        "margin",
+        "The largest level below the first that is not borne. A run bears a level if it does not fail and its "
+        "ultimate bound is at most 5 % of its scale. The search looks at some ten levels from small to large, then"
+        " halves what is left. What is above the first level not borne was not looked at, nor what is above the "
+        "end of the search. None: the run without any of it does not stay within the 5 % either.",
+    ),
+    Term(
+        "theory",
+        "linear theory",
+        "The same of the plant and the law linearised at rest, where the law is smooth.",
+    ),
+    Term(
+        "basin",
+        "region map",
+        "From each state of a grid one run of up to 10 s; the joints of a network all start alike. It converges if"
+        " it is within 2 % of the grid’s reach in position and velocity in the last 20 %, does not if it is never "
+        "there in them, fails, or stands still elsewhere; else it is undecided. Decided ones end early. A pendulum"
+        " that rests a turn away has not converged. The share is that of the grid’s states.",
+    ),
+    Term(
+        "decimated",
+        "curves in few points",
+        "Of each stretch of samples the least and the largest are kept, so that no extreme is lost. Where u "
+        "chatters, the line is its mean over 1 % of the run and the band reaches from its least to its largest "
+        "value in each window.",
+    ),
+)
+
+
+def terms(kinds: Sequence[str]) -> list[Term]:
+    """Every definition, those of the kinds of margin among them."""
+    about = _about_margins()
+    found = [Term(f"margin-{kind}", words.kind(kind), about.get(kind, "")) for kind in kinds]
+    return [*STATISTICS, *found]
+
+
+def _about_margins() -> dict[str, str]:
+    return {
+        "delay": "Input delay, s: the command reaches the plant so much later.",
+        "disturbance": "A constant force on every joint, N m or N.",
+        "friction": "Coulomb friction in every joint, N m or N.",
+        "mass": "Factor on the mass of the true plant; the law’s gains stay.",
+        "noise": "Standard deviation of the noise on the measured position, rad or m.",
+    }
+
+
+def definitions() -> list[Metric]:
+    """Every metric with its docstring."""
+    found = []
+    for metric in metrics():
+        parts = words.definition(metric.name).split("\n\n")
+        found.append(Metric(metric.name, tuple(" ".join(part.split()) for part in parts)))
+    return found
