@@ -103,9 +103,9 @@ def checked(name: object) -> str:
     if name == "local":
         return "local"
     host, _, port = str(name).removeprefix(ADDRESS).rpartition(":")
-    if not isinstance(name, str) or not name.startswith(ADDRESS) or not host or not port.isdecimal():
-        raise ScenarioError(f"executor is {shown(name)}: give 'local' or 'dask://HOST:PORT'")
-    return name
+    if isinstance(name, str) and name.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16:
+        return name
+    raise ScenarioError(f"executor is {shown(name)}: give 'local' or 'dask://HOST:PORT'")
 
 
 def cores() -> int:

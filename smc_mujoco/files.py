@@ -9,6 +9,14 @@ from pathlib import Path
 from smc_mujoco.errors import ScenarioError
 
 
+def ended(path: str | os.PathLike, ending: str) -> Path:
+    """The path, if a file can have its name and the ending, such as ".json"; else a ScenarioError."""
+    path = Path(path)
+    if path.suffix != ending or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {ending}")
+    return path
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside `path`, with its ending, that takes its place when the block ends well, else goes away.

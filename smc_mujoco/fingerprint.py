@@ -3,8 +3,9 @@
     of(my_law.function)        # "5f0c..."; another after an edit of it, or of a helper that it calls
 
 What counts: bytecode, constants, defaults, closed-over values, and whatever it reaches by a global name - constants by
-value, functions by their own code, down to those of Python and of the numerical packages, which a version tells. The
-names of files, lines and comments do not count. It holds for one version of Python.
+value, functions by their own code, objects by their class and what pickle would keep of them, down to functions and
+classes of Python and of the numerical packages, which a version tells. The names of files, lines and comments do not
+count. It holds for one version of Python.
 """
 
 import functools
@@ -12,7 +13,7 @@ import hashlib
 import pickle
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from smc_mujoco.errors import ScenarioError, shown
 
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages told by version, not by code
 SIMPLE = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic)
+CONTAINERS = (tuple, list, set, frozenset, Mapping)
+Seen = dict[int, tuple[int, Any]]  # id -> number, and the thing itself, so that no other one gets its id
 
 
 def of(thing: Any) -> str:
@@ -29,8 +32,9 @@ def of(thing: Any) -> str:
     Raises:
       ScenarioError: it holds what can be neither read nor pickled.
     """
+    kept = isinstance(thing, FunctionType | type | tuple)  # anything else may change
     try:
-        return _kept(thing)
+        return _kept(thing) if kept else _of(thing)
     except TypeError:  # not hashable
         return _of(thing)
 
@@ -45,67 +49,83 @@ def _of(thing: Any) -> str:
 _kept = functools.cache(_of)  # as a compiled law keeps the globals that it was compiled with
 
 
-def _pieces(thing: Any, seen: dict[int, int]) -> Iterator[bytes]:
+def _pieces(thing: Any, seen: Seen) -> Iterator[bytes]:
     """What makes the thing, piece by piece; one met before is told by its number, so that circles end."""
-    thing = getattr(thing, "py_func", thing)  # of numba's dispatchers
-    thing = getattr(thing, "__func__", thing)  # of static methods
+    thing = _written(thing)
     if isinstance(thing, SIMPLE):
         yield f"{type(thing).__name__} {thing!r}".encode()
         return
     if not isinstance(thing, tuple | CodeType):  # of which equal ones may or may not be the same
         if id(thing) in seen:
-            yield f"again {seen[id(thing)]}".encode()
+            yield f"again {seen[id(thing)][0]}".encode()
             return
-        seen[id(thing)] = len(seen)
+        seen[id(thing)] = len(seen), thing
     if isinstance(thing, ModuleType):
         yield f"module {thing.__name__}".encode()
     elif _versioned(thing):
         yield f"{thing.__module__}.{getattr(thing, '__qualname__', '')}".encode()
     elif isinstance(thing, FunctionType):
         yield from _function(thing, seen)
+    elif isinstance(thing, MethodType):
+        yield from _all((thing.__func__, thing.__self__), seen)
     elif isinstance(thing, CodeType):
-        yield thing.co_code
+        yield thing.co_code + thing.co_exceptiontable
         yield from _all([*thing.co_names, *thing.co_varnames, thing.co_argcount, *thing.co_consts], seen)
     elif isinstance(thing, type):
         yield from _class(thing, seen)
-    elif isinstance(thing, tuple | list | set | frozenset | Mapping):
+    elif isinstance(thing, CONTAINERS):
         yield from _container(thing, seen)
     else:
         yield from _object(thing, seen)
 
 
-def _container(thing: Any, seen: dict[int, int]) -> Iterator[bytes]:
+def _container(thing: Any, seen: Seen) -> Iterator[bytes]:
     yield type(thing).__name__.encode()
     if isinstance(thing, Mapping):
-        for item in sorted(thing.items(), key=repr):
+        for item in sorted(thing.items(), key=lambda item: repr(item[0])):
             yield from _all(item, seen)
     else:
         yield from _all(thing if isinstance(thing, tuple | list) else sorted(thing, key=repr), seen)
 
 
-def _all(things: Iterable[Any], seen: dict[int, int]) -> Iterator[bytes]:
+def _all(things: Iterable[Any], seen: Seen) -> Iterator[bytes]:
     for thing in things:
         yield from _pieces(thing, seen)
     yield b"end"
 
 
+def _written(thing: Any) -> Any:
+    """The function as it was written, of one that numba compiles, a static method, or one whose results are kept."""
+    if not isinstance(thing, FunctionType | MethodType | type):
+        for name in ("py_func", "__func__", "__wrapped__"):
+            thing = getattr(thing, name, thing)
+    return thing
+
+
 def _versioned(thing: Any) -> bool:
-    """Whether a package's version says what it is."""
+    """Whether it is a function or class of a package whose version says what it is."""
     module = getattr(thing, "__module__", None)
-    return callable(thing) and isinstance(module, str) and module.split(".")[0] in VERSIONED
+    return hasattr(thing, "__qualname__") and isinstance(module, str) and module.split(".")[0] in VERSIONED
 
 
-def _function(function: FunctionType, seen: dict[int, int]) -> Iterator[bytes]:
+def _function(function: FunctionType, seen: Seen) -> Iterator[bytes]:
     yield from _pieces(function.__code__, seen)
     yield from _all((function.__defaults__, function.__kwdefaults__), seen)
     yield from _all((_content(cell) for cell in function.__closure__ or ()), seen)
     names = _names(function.__code__)
     for name in sorted(names & function.__globals__.keys()):
         yield name.encode()
-        value = function.__globals__[name]
-        yield from _pieces(value, seen)
-        if isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED:
-            yield from _all((vars(value)[n] for n in sorted(names & vars(value).keys())), seen)
+        yield from _reached(function.__globals__[name], names, seen)
+
+
+def _reached(value: Any, names: set[str], seen: Seen) -> Iterator[bytes]:
+    """What a function reaches by these names: a value, and of a module what is in it."""
+    known = id(value) in seen
+    yield from _pieces(value, seen)
+    if isinstance(value, ModuleType) and not known and value.__name__.split(".")[0] not in VERSIONED:
+        for name in sorted(names & vars(value).keys()):
+            yield name.encode()
+            yield from _reached(vars(value)[name], names, seen)
 
 
 def _content(cell: Any) -> Any:
@@ -120,34 +140,30 @@ def _names(code: CodeType) -> set[str]:
     return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
-def _class(kind: type, seen: dict[int, int]) -> Iterator[bytes]:
+def _class(kind: type, seen: Seen) -> Iterator[bytes]:
     """A class by the functions that it was written with, and its bases."""
     yield kind.__qualname__.encode()
     yield from _all((base for base in kind.__bases__ if not _versioned(base)), seen)
     for name, held in sorted(vars(kind).items()):
-        value = held.fget if isinstance(held, property) else getattr(held, "__func__", held)
+        value = _written(held.fget if isinstance(held, property) else held)
         written = name == "__call__" or not name.startswith("__")
-        if written and isinstance(value, (FunctionType, *SIMPLE)):
+        if written and isinstance(value, (FunctionType, np.ndarray, *CONTAINERS, *SIMPLE)):
             yield name.encode()
             yield from _pieces(value, seen)
 
 
-def _object(thing: Any, seen: dict[int, int]) -> Iterator[bytes]:
-    """Anything else: arrays by their bytes, objects by class and attributes, or as pickle writes it."""
+def _object(thing: Any, seen: Seen) -> Iterator[bytes]:
+    """Anything else: arrays by their bytes, objects by what pickle would keep of them, functions by their code."""
     yield from _pieces(type(thing), seen)
     if isinstance(thing, np.ndarray) and thing.dtype != object:
         yield f"{thing.dtype} {thing.shape}".encode() + thing.tobytes()
-    elif hasattr(thing, "__dict__") and not _versioned(type(thing)):
-        yield from _pieces(vars(thing), seen)
-    else:
-        yield _pickled(thing)
-
-
-def _pickled(thing: Any) -> bytes:
+        return
     try:
-        return pickle.dumps(thing)
+        reduced = thing.__reduce_ex__(pickle.DEFAULT_PROTOCOL)
+        parts = [reduced] if isinstance(reduced, str) else [list(p) if isinstance(p, Iterator) else p for p in reduced]
     except Exception as error:  # whatever its class raises
         why = " ".join(str(error).split())
         raise ScenarioError(
             f"cannot tell {shown(thing)} from others ({why}): use plain functions and numbers"
         ) from None
+    yield from _all(parts, seen)

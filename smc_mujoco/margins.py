@@ -27,7 +27,7 @@ from smc_mujoco import gains as sets
 from smc_mujoco import paper
 from smc_mujoco.bearing import SPECS, bears
 from smc_mujoco.errors import ScenarioError, find
-from smc_mujoco.files import replacing
+from smc_mujoco.files import ended, replacing
 from smc_mujoco.run import stream
 from smc_mujoco.scenario import Scenario
 
@@ -214,9 +214,7 @@ class _Work:
 
 def save(found: Sequence[Margin], path: str | os.PathLike) -> Path:
     """Write margins to a .json file that `load` reads back; NaN is null there, infinity "inf"."""
-    path = Path(path)
-    if path.suffix != ".json" or "\0" in path.name:
-        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in .json")
+    path = ended(path, ".json")
     with replacing(path) as file:
         file.write_text(json.dumps([to_json(margin) for margin in found], indent=1, allow_nan=False) + "\n")
     return path

@@ -15,9 +15,11 @@ import functools
 import hashlib
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from smc_mujoco import fingerprint, table
 from smc_mujoco.errors import ScenarioError
@@ -71,9 +73,11 @@ class Store:
         Raises:
           ScenarioError: the folder cannot be written.
         """
+        import pyarrow as pa
+
         hashes = [row["hash"] for row in rows]
         path = self.parts / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
-        self._write(path, [rows])
+        self._write(path, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
     def collect(self, hashes: Sequence[str]) -> None:
@@ -82,22 +86,27 @@ class Store:
         Raises:
           ScenarioError: the folder cannot be written, or a part was removed meanwhile.
         """
+        import pyarrow as pa
+
         held = functools.lru_cache(maxsize=PARTS_HELD)(self._read)
 
-        def rows(names: Sequence[str]) -> list[dict[str, Any]]:
-            places = [self.where[name] for name in names]
-            tables = {path: held(path) for path, _ in dict.fromkeys(places)}
-            if missing := [path for path, part in tables.items() if part is None]:
-                raise ScenarioError(f"part {missing[0]} was removed or broken while the study ran: start it once more")
-            parts = {path: part.to_pylist() for path, part in tables.items() if part is not None}
-            return [parts[path][i] for path, i in places]
+        def rows(names: Sequence[str]) -> "pa.Table":
+            wanted: dict[Path, list[int]] = {}  # part -> which of the names are in it
+            for i, name in enumerate(names):
+                wanted.setdefault(self.where[name][0], []).append(i)
+            found = []
+            for path, here in wanted.items():
+                if (part := held(path)) is None:
+                    raise ScenarioError(f"part {path} was removed or broken while the study ran: start it once more")
+                found.append(part.take([self.where[names[i]][1] for i in here]))
+            order = np.argsort(np.concatenate(list(wanted.values())))
+            return pa.concat_tables(found).take(order).combine_chunks()
 
         groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
         self._write(self.results, map(rows, groups))
 
-    def _write(self, path: Path, groups: Any) -> None:
-        """A parquet file, a row group a list of rows."""
-        import pyarrow as pa
+    def _write(self, path: Path, groups: "Iterable[pa.Table]") -> None:
+        """A parquet file, a row group a table."""
         import pyarrow.parquet as pq
 
         with (
@@ -106,7 +115,7 @@ class Store:
             pq.ParquetWriter(sink, self.schema, compression="zstd", write_page_checksum=True) as writer,
         ):
             for rows in groups:
-                writer.write_table(pa.Table.from_pylist(list(rows), schema=self.schema))
+                writer.write_table(rows)
 
     def _enter(self, path: Path) -> None:
         part = self._read(path)

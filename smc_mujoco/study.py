@@ -17,7 +17,7 @@ import numpy as np
 
 from smc_mujoco import cluster, identity, keep, paper
 from smc_mujoco import executor as executors
-from smc_mujoco.component import Component
+from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import ScenarioError, find, shown, whole
 from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
@@ -47,12 +47,13 @@ IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mi
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
 QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=3, duration=5.0)
+MOST = 1_000_000  # runs of a grid, some kB each; chosen
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
 
 
 def grid(
     plants: Sequence[str],
-    laws: Sequence[str | Law],
+    laws: Sequence[str | Law | Template],
     conditions: Sequence[str],
     seeds: int | Iterable[int],
     gains: str = "tuned",
@@ -71,15 +72,17 @@ def grid(
       duration: of each run, s.
 
     Raises:
-      ScenarioError: a name that is not known, or gains that the set does not have.
+      ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
     """
-    numbers = range(whole("seeds", seeds, 1, 10**6)) if isinstance(seeds, int | float) else _listed("seeds", seeds)
-    plants, conditions = _listed("plants", plants), _listed("conditions", conditions)
+    numbers = _listed("seeds", seeds) if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
+    plants, laws, conditions = _listed("plants", plants), _listed("laws", laws), _listed("conditions", conditions)
+    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
+        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
     return [
         _seeded(_scenario(plant, law, condition, duration, gains), seed)
         for plant in plants
         for condition in conditions
-        for law in _listed("laws", laws)
+        for law in laws
         for seed in numbers
     ]
 
@@ -90,8 +93,8 @@ def _listed(what: str, values: object) -> list:
     return found
 
 
-def _scenario(plant: str, law: str | Law, condition: str, duration: float, gains: str) -> Scenario:
-    if isinstance(law, Component):
+def _scenario(plant: str, law: str | Law | Template, condition: str, duration: float, gains: str) -> Scenario:
+    if isinstance(law, Component | Template):
         return paper.scenario(plant, "none", condition, duration=duration, changes={"law": law})
     return paper.scenario(plant, law, condition, duration=duration, gains=gains)
 
@@ -134,6 +137,8 @@ def study(
     Raises:
       ScenarioError: what cannot be run, a folder that cannot be written, no scheduler; what was finished stays.
     """
+    if not isinstance(out, str | os.PathLike):
+        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     where = executors.checked(executor)
     find("choice of traces", traces, dict.fromkeys(keep.CHOICES))
     threads = executors.cores() if threads is None else whole("threads", threads, 1, 1024)

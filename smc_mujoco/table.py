@@ -12,7 +12,7 @@ Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`,
 import dataclasses
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -111,7 +111,7 @@ class Table:
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
                 there = dict.fromkeys(self.column(name).tolist())
-                names = [wanted] if isinstance(wanted, str) else list(wanted)
+                names = list(wanted) if isinstance(wanted, Iterable) and not isinstance(wanted, str) else [wanted]
                 for one in names:
                     find(f"{name} of this table", one, there)
                 data = data.filter(pc.field(name).isin(names))

@@ -1,6 +1,7 @@
 """Regions of attraction: early leaving changes no verdict, and the analytic limits hold."""
 
 import dataclasses
+import importlib
 import json
 import math
 
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import basin as maps
 from smc_mujoco import theory
 from smc_mujoco.basin import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.commands.basin import basin as command
 from smc_mujoco.draw import region
+
+maps = importlib.import_module("smc_mujoco.basin")  # smc.basin is the function
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
@@ -70,6 +72,15 @@ def test_what_creeps_away_from_an_unstable_rest_has_not_converged():
     law = smc.law("observer_free", lam=0.23, k1=9.7)  # 0.253 would do
     found = maps.of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
     assert found.outcome[1, 1] != CONVERGES
+
+
+@pytest.mark.parametrize(("lam", "k1"), [(0.3, 3.076), (0.95, 1.0)])  # growing by 0.12 and 0.04 per s
+def test_what_leaves_slowly_is_not_taken_for_home_early(lam, k1):
+    plant = smc.plant("duffing")
+    assert lam < theory.smallest_lam(plant, k1)
+    slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
+    found = maps.of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
+    assert (found.outcome[1] != CONVERGES).all()
 
 
 def test_a_run_that_fails_does_not_converge():
@@ -192,7 +203,9 @@ def test_the_command_prints_the_share_and_writes_what_it_is_asked_for(tmp_path, 
     assert (tmp_path / "a.png").exists()
 
 
-def test_the_command_refuses_a_picture_it_cannot_draw_before_it_runs(capsys):
-    with pytest.raises(SystemExit):
-        command("duffing", out="map.gif")
-    assert "end the name in" in capsys.readouterr().err
+def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(capsys, monkeypatch):
+    monkeypatch.setattr(maps, "basin", lambda *a, **k: pytest.fail("it ran"))
+    for option in ({"out": "map.gif"}, {"json": "map.txt"}):
+        with pytest.raises(SystemExit):
+            command("duffing", **option)
+        assert "end the name in" in capsys.readouterr().err

@@ -269,6 +269,13 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
         np.testing.assert_allclose(trace.u, expected, rtol=1e-12)
 
 
+def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_asks_for(runs):
+    strong = with_gains(runs.law("duffing", OURS), lam=26.0)  # of which 6 N come
+    (trace,) = runs.traces([short(runs, law=squeezed(strong))])
+    asked = -26.0 * np.tanh(trace.v + strong.gains["k1"] * trace.x)
+    np.testing.assert_allclose(trace.u, np.clip(asked, -6.0, 6.0) / (1.0 + trace.x**2), rtol=1e-12)
+
+
 # Lyapunov
 
 
@@ -404,6 +411,7 @@ def test_the_command_prints_one_json_document(terminal, tmp_path):
 def test_a_claim_is_shown_in_full(terminal):
     done = terminal("18", "--gains", "study", "--quick")
     assert done.exit_code == 0, done.output
+    assert "quick: coarser grids" in done.stdout
     for part in ("Vdot <= -eps s^2", "holds if", "refuted", "van_der_pol: share of the plane", "largest Vdot, at x"):
         assert part in done.stdout
 
@@ -414,8 +422,14 @@ def test_an_overview_has_a_line_a_claim(only, capsys):
     only(entry("3", found={"study": [YES], "tuned": [NO]}), entry("18", found=[], note="Nothing to see."))
     show.tell(claims(gains=["study", "tuned"]), Console(width=120), full=False)
     text = capsys.readouterr().out
-    for part in ("partly supported, flips", "● ", "no 3, not < 2", "Nothing to see.", "1 not testable"):
+    for part in ("partly supported, flips", "● ", "no = 3 (asked: < 2)", "Nothing to see.", "1 not testable"):
         assert part in text
+
+
+def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
+    late = show.sentence(check("settling time, s", math.inf, "<", 10.0))
+    far = show.sentence(check("deviation", math.inf, "<", 0.01))
+    assert (late, far) == ("settling time, s = never (asked: < 10)", "deviation = inf (asked: < 0.01)")
 
 
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):

@@ -1,9 +1,12 @@
 """What tells runs apart: equal ones have one key, and whatever decides what a run does changes it."""
 
+import functools
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -136,3 +139,53 @@ def test_an_object_that_is_called_is_told_by_what_it_holds():
 
     one, same, other = (Policy(np.array(w)) for w in ([1.0, 2.0], [1.0, 2.0], [1.0, 3.0]))
     assert fingerprint.of(one) == fingerprint.of(same) != fingerprint.of(other)
+
+
+class Weighted:
+    """Has methods that may be laws."""
+
+    def __init__(self, weight: float):
+        self.weight = weight
+
+    def law(self, y, gains, memory):
+        return self.weight * y.e, y.e
+
+
+def reaching(value: object, text: str = "THING(y.e)", before: str = "") -> Callable:
+    """A law that calls something global."""
+    space: dict = {"__name__": "written", "THING": value, "functools": functools}
+    exec(f"{before}\ndef law(y, gains, memory): return {text}, y.e", space)
+    return space["law"]
+
+
+def package(factor: float) -> ModuleType:
+    """A package with a module in it."""
+    inner, outer = ModuleType("mine.inner"), ModuleType("mine")
+    exec(f"def helper(x): return {factor} * x", vars(inner))
+    vars(outer)["inner"] = inner
+    return outer
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda k: Weighted(k).law,
+        lambda k: functools.partial(Weighted.law, weight=k),
+        lambda k: reaching(functools.partial(max, k)),
+        lambda k: reaching(np.vectorize(lambda x: k * x)),
+        lambda k: reaching(np.poly1d([k, 1.0])),
+        lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
+        lambda k: reaching(type("Table", (), {"values": (k, 1.0)}), "THING.values[0]"),
+        lambda k: reaching(None, "helper(y.e)", f"@functools.cache\ndef helper(x): return {k} * x"),
+    ],
+    ids=["method", "partial", "global partial", "vectorized", "object", "package", "class", "kept results"],
+)
+def test_what_a_law_reaches_in_any_way_tells_it_from_others(made):
+    assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
+
+
+def test_an_object_that_changed_is_another():
+    policy = Weighted(1.0)
+    before = fingerprint.of(policy)
+    policy.weight = 2.0
+    assert fingerprint.of(policy) != before

@@ -15,7 +15,7 @@ import pytest
 from smc_mujoco.study import grid, study
 
 ROOT = Path(__file__).parents[1]
-WARM = """
+LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path
 from smc_mujoco import executor, store
@@ -27,12 +27,13 @@ import pyarrow.parquet
 out, executor.STEPS = Path(sys.argv[1]), 60
 plants, laws, conditions = ["duffing", "van_der_pol"], ["observer_free", "classical"], ["nominal", "noise"]
 scenarios = grid(plants, laws, conditions, 15, "study", 0.05)
-for scenario in scenarios:
-    contents(scenario), key(scenario)
-compiled_callback(), silence()
 """
 KILLER = """
 import json
+
+for scenario in scenarios:
+    contents(scenario), key(scenario)
+compiled_callback(), silence()
 
 def told(pipe):
     # what a life does, as it does it: "run", "write", "wrote <hashes>", "collect"
@@ -125,7 +126,7 @@ def python(code: str, out: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="lives are forked")
 def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_twice(tmp_path):
-    done = python(WARM + KILLER, tmp_path)
+    done = python(LOADED + KILLER, tmp_path)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["same"]
@@ -138,7 +139,7 @@ def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_t
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 def test_on_a_full_disk_a_study_stops_with_one_sentence_and_later_goes_on(tmp_path):
-    done = python(WARM + FULL, tmp_path)
+    done = python(LOADED + FULL, tmp_path)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("smc-mujoco: cannot write")
     assert done.stderr.rstrip().endswith("choose another folder or make room")

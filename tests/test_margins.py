@@ -1,16 +1,19 @@
 """Margins: what is found is a boundary, the first one from below, and theory's where there is one."""
 
 import dataclasses
+import importlib
 import json
 import math
 
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import bearing, gains, margins, paper
+from smc_mujoco import bearing, gains, paper
 from smc_mujoco.commands.margins import QUICK, table
 from smc_mujoco.commands.margins import margins as command
 from smc_mujoco.margins import COARSE, FINE, KINDS, Margin
+
+margins = importlib.import_module("smc_mujoco.margins")  # smc.margins is the function
 
 BASE = paper.scenario("duffing", "observer_free", duration=4.0)
 ROUGH = Margin(
@@ -204,6 +207,13 @@ def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
     assert "largest disturbance borne" in shown
     assert "1.28" in shown
     assert [entry["law"] for entry in json.loads(path.read_text())] == ["observer_free", "classical"]
+
+
+def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(capsys, monkeypatch):
+    monkeypatch.setattr(margins, "margins", lambda *a, **k: pytest.fail("it ran"))
+    with pytest.raises(SystemExit):
+        command(["duffing"], json="margins.txt")
+    assert "end the name in .json" in capsys.readouterr().err
 
 
 def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_borne():

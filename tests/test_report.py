@@ -263,8 +263,55 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
     lost = answer.losses(answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"])
     assert [(loss.law, loss.times) for loss in lost] == [("classical", 3.0)]
     assert answer.losses(answer.cells(scores(observer_free=1.0, classical=3.0)), ["settling_time"]) == []
+    exact = answer.losses(answer.cells(scores(observer_free=3.0, classical=1e-20)), ["settling_time"])
+    assert exact[0].times == pytest.approx(3e9)  # over what rounding leaves of zero, not over 1e-20
+    assert exact[0].rounded
     never = answer.losses(answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"])
     assert never[0].times == math.inf
+
+
+def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
+    share = [
+        Place("", "settles", law, 1.0, 1.0, 1.0, True, of, "") for law, of in (("classical", 0.5), ("adaptive", 1))
+    ]
+    few = dataclasses.replace(
+        findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
+    )
+    told = " ".join(part.text for part in answer.paragraph(few, []))
+    assert "Of Classical’s runs 50 % settle, the fewest" in told
+    assert "3 of 40 runs failed" in told
+
+
+def test_the_report_tells_what_was_not_done(text, findings):
+    assert findings.about.limits
+    assert all(sentence.split(",")[0] in text for sentence in findings.about.limits)
+    assert "encoder" in findings.about.limits[-1]  # a condition of the full grid that this one lacks
+
+
+def test_a_claims_row_says_where_it_stands_and_what_decides_it(text, findings):
+    for claim in findings.claims:
+        row = text.split(f'id="claim-{claim.id}"')[1].split("</summary>")[0]
+        one = claim.decisive("tuned")
+        assert words.pretty(claim.where) in row
+        assert html.escape(words.number(one.value)) in row
+        assert (", not " in row) is not one.holds
+
+
+@pytest.mark.parametrize(
+    ("what", "target"),
+    [
+        ("duffing: settling time, s", "metric-settling_time"),
+        ("duffing tv_rate / classical", "metric-tv_rate"),
+        ("inverted_pendulum: TV rate, over that of classical", "metric-tv_rate"),
+        ("largest step with noise, over lambda", "verdict"),  # there is a metric called ise
+    ],
+)
+def test_a_check_leads_to_the_metric_that_it_names(what, target):
+    assert page.link(what) == target
+
+
+def test_signs_are_put_for_words_and_not_within_them():
+    assert words.pretty("steps of eps s^2 <= lambda") == "steps of ε s² ≤ λ"
 
 
 def test_a_cell_in_which_nothing_settles_has_no_leader():
@@ -286,6 +333,15 @@ def test_curves_keep_every_extreme_of_a_chattering_control():
 
 def test_a_calm_control_has_no_band():
     assert films.curve(run(paper.scenario("duffing", "observer_free", duration=1.0))).low.size == 0
+
+
+def test_fronts_are_staircases_from_the_left(findings):
+    lines = [line for line in charts.fronts(findings.fronts, ["duffing"])["data"] if line.get("line", {}).get("shape")]
+    assert len(lines) == len(TINY.laws)
+    for line in lines:
+        assert line["line"]["shape"] == "hv"
+        assert line["x"] == sorted(line["x"])
+        assert line["y"] == sorted(line["y"], reverse=True)
 
 
 def test_numbers_off_an_axis_stand_at_its_end():
@@ -368,9 +424,9 @@ def browser():
 class Seen:
     """A page in the browser, with all that it said and asked for."""
 
-    def __init__(self, browser, url):
+    def __init__(self, browser, url, width=1400):
         self.said, self.asked = [], []
-        self.page = browser.new_page(viewport={"width": 1400, "height": 900})
+        self.page = browser.new_page(viewport={"width": width, "height": 900})
         self.page.on("console", lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None)
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
@@ -386,6 +442,12 @@ def seen(browser, made):
 def test_the_page_has_no_error_and_asks_for_nothing(seen, made):
     assert seen.said == []
     assert [url for url in seen.asked if not url.startswith(("data:", "blob:")) and url != made.as_uri()] == []
+
+
+def test_no_button_of_a_chart_sends_it_anywhere(seen):
+    titles = seen.page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
+    assert titles
+    assert {title for title in titles if not title.startswith(("Download", "Zoom", "Pan", "Reset"))} == set()
 
 
 def test_every_chart_is_drawn(seen, findings):
@@ -465,6 +527,18 @@ def test_a_number_leads_to_its_definition(seen):
     seen.page.locator("#leaderboard tbody tr:not([hidden]) td.number a").first.click()
     assert seen.page.evaluate("location.hash") == "#metric-settling_time"
     assert seen.page.evaluate("document.querySelector(':target').tagName") == "DT"
+
+
+def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_keyboard(browser, made):
+    phone = Seen(browser, made.as_uri(), 420).page
+    assert phone.evaluate("document.documentElement.scrollWidth") == 420
+    assert (
+        phone.eval_on_selector_all(
+            ".chart, .wide", "all => all.filter(a => a.scrollWidth > a.clientWidth + 1 && a.tabIndex < 0).length"
+        )
+        == 0
+    )
+    phone.close()
 
 
 def test_it_prints_with_everything_open(seen, tmp_path):

@@ -11,6 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco import executor, identity, keep, paper, record, store
 from smc_mujoco.assembly import check_starts
+from smc_mujoco.commands.bench import bench
 from smc_mujoco.study import condition, grid, study
 from smc_mujoco.table import Table
 
@@ -74,13 +75,15 @@ def test_a_seed_starts_every_law_in_every_condition_alike_and_within_a_fifth_of_
     starts = {s.seed: {t.x0 for t in made if t.seed == s.seed} for s in made}
     assert all(len(found) == 1 for found in starts.values())
     home = np.array(made[0].plant.x0)
-    for (x0,) in starts.values():
-        assert np.all(np.abs(np.array(x0) / home - 1.0) <= 0.2)
+    for seed, (x0,) in starts.items():
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(home.size)]
+        assert np.allclose(x0, home * (1.0 + 0.2 * np.array(z)))
     assert starts[3] != starts[4]
 
 
 def test_no_start_lies_beyond_a_stop():
     made = grid(paper.PLANTS, ["none"], ["contact"], 6, "study", duration=10.0)
+    assert all(0.8 <= x / home <= 1.0 for s in made if s.plant.n == 1 for x, home in zip(s.x0, s.plant.x0, strict=True))
     assert len({(s.plant.name, s.x0) for s in made}) == len(paper.PLANTS) * 6
     for plant in paper.PLANTS:
         check_starts([s for s in made if s.plant.name == plant])
@@ -89,6 +92,13 @@ def test_no_start_lies_beyond_a_stop():
 def test_laws_may_come_with_gains_of_their_own():
     law = smc.law("classical", k=2.5)
     assert [s.law for s in grid(["duffing"], [law], ["nominal"], 1)] == [law]
+    assert [s.law for s in grid(["duffing"], [raises], ["nominal"], 1)] == [raises()]
+
+
+def test_whatever_can_be_gone_through_once_makes_the_grid():
+    names = [["duffing", "van_der_pol"], ["classical", "adaptive"], ["nominal", "noise"]]
+    once = grid(*map(iter, names), np.int64(2), "study")  # pyright: ignore[reportArgumentType]
+    assert once == grid(*names, np.arange(2), "study")
 
 
 @pytest.mark.parametrize(
@@ -102,6 +112,8 @@ def test_laws_may_come_with_gains_of_their_own():
         ({"plants": "duffing"}, "plants is 'duffing': give several"),
         ({"gains": "best"}, "unknown set of gains"),
         ({"conditions": []}, "give several"),
+        ({"seeds": None}, "seeds is None: give a whole number"),
+        ({"plants": paper.PLANTS, "seeds": 10**6}, "5,000,000 runs: give fewer seeds"),
     ],
 )
 def test_what_the_grid_cannot_make_is_one_sentence(change, said):
@@ -118,10 +130,18 @@ def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
         study(small(), tmp_path / "a", traces="some")
     with pytest.raises(smc.ScenarioError, match="executor is 'ray'"):
         study(small(), tmp_path / "a", executor="ray")
+    with pytest.raises(smc.ScenarioError, match="out is None: give the path"):
+        study(small(), None)  # pyright: ignore[reportArgumentType]
     (tmp_path / "file").write_text("")
     with pytest.raises(smc.ScenarioError, match="cannot use"):
         study(small(), tmp_path / "file")
     assert not (tmp_path / "a").exists()
+
+
+def test_the_command_takes_no_names_for_none(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        bench(laws=",", out=tmp_path / "a")
+    assert "laws is []: give several" in capsys.readouterr().err
 
 
 # failures
@@ -207,10 +227,15 @@ def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
 
 
 def test_a_byte_that_changed_in_a_part_never_reaches_the_table(tmp_path, monkeypatch):
+    import pyarrow.parquet as pq
+
     study(small(), tmp_path)
     before, (part,) = bytes_of(tmp_path), (tmp_path / "parts").iterdir()
-    whole = part.read_bytes()
-    for position in np.linspace(0, len(whole) - 1, 30).astype(int):
+    whole, group = part.read_bytes(), pq.read_metadata(part).row_group(0)
+    columns = [group.column(i) for i in range(0, group.num_columns, 4)]
+    starts = [c.dictionary_page_offset or c.data_page_offset for c in columns]
+    values = [start + c.total_compressed_size - 1 for start, c in zip(starts, columns, strict=True)]  # the last of each
+    for position in [*np.linspace(0, len(whole) - 1, 6).astype(int), *values]:
         part.write_bytes(whole[:position] + bytes([whole[position] ^ 0x55]) + whole[position + 1 :])
         study(small(), tmp_path)
         assert bytes_of(tmp_path) == before

@@ -52,6 +52,8 @@ def test_a_table_is_read_back_selected_and_run_again(tmp_path):
     assert np.isnan(table.column("spread_bound")).all()
     with pytest.raises(smc.ScenarioError, match="did you mean 'classical'"):
         table.select(law="clasical")
+    with pytest.raises(smc.ScenarioError, match="unknown plant of this table 3"):
+        table.select(plant=3)  # pyright: ignore[reportArgumentType]
     with pytest.raises(smc.ScenarioError, match="unknown column"):
         table.column("itea")
     with pytest.raises(smc.ScenarioError, match="has no row 8"):

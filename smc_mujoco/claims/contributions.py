@@ -69,8 +69,10 @@ def never_chatters(runs: Runs) -> list[Check | Beside]:
         gains = runs.law(plant, OURS).gains
         limit = critical_delay(find_plant(plant), gains["lam"], gains["k1"], control_period=1e-3)
         found += [
-            check(f"{plant}: largest TV rate / lambda, at {period:g} ms and {delay} ms late", rate, "<", SILENT),
-            Beside(f"{plant}: delay at which the loop becomes unstable, 1 ms, linear theory, s", limit),
+            check(f"{plant}: largest TV rate / lambda, 1/s", rate, "<", SILENT),
+            Beside(f"{plant}: that is at a control period of, ms", float(period)),
+            Beside(f"{plant}: and a delay of, ms", float(delay)),
+            Beside(f"{plant}: delay from which the loop is unstable at 1 ms, linear theory, ms", 1e3 * limit),
         ]
     return found
 

@@ -45,7 +45,9 @@ def overview(claims: Sequence[Claim]) -> Table:
     for claim in claims:
         marks = [_mark(claim.verdicts[name]) for name in sets] if len(sets) > 1 else []
         one = claim.decisive(sets[-1])
-        verdict = Text(claim.verdict + (", flips" if claim.flips else ""), style=COLOURS[claim.verdict])
+        verdict = _mark(claim.verdict) + Text(
+            f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict]
+        )
         table.add_row(claim.id, Text(claim.text), verdict, *marks, Text(sentence(one) if one else claim.note))
     return table
 
@@ -77,9 +79,10 @@ def _checks(claim: Claim, name: str, verdict: str) -> Table:
     table.add_column(no_wrap=True)
     for one in claim.checks(name):
         mark = Text("✓", style=COLOURS[SUPPORTED]) if one.holds else Text("✗", style=COLOURS[REFUTED])
-        table.add_row(mark, Text(one.what), number(one.value), f"{one.relation} {number(one.limit)}")
+        limit = f"{one.relation} {number(one.limit, one.what)}"
+        table.add_row(mark, Text(one.what), number(one.value, one.what), limit)
     for what, value in claim.beside[name].items():
-        table.add_row("", Text(what, style="dim"), Text(number(value), style="dim"), "")
+        table.add_row("", Text(what, style="dim"), Text(number(value, what), style="dim"), "")
     return table
 
 
@@ -88,19 +91,19 @@ def tally(claims: Sequence[Claim]) -> Text:
     counts = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
     flips = sum(claim.flips for claim in claims)
     parts = [f"{MARKS[verdict]} {count} {verdict}" for verdict, count in counts.items() if count]
-    return Text(", ".join(parts) + (f" ({flips} of them depend on the gains)" if flips else ""))
+    return Text(", ".join(parts) + (f" ({flips} of them depend{'s' * (flips == 1)} on the gains)" if flips else ""))
 
 
 def sentence(one: Check) -> str:
-    """A check in a line; what is missed says not."""
-    return f"{one.what} {number(one.value)}, {'' if one.holds else 'not '}{one.relation} {number(one.limit)}"
+    """A check in a line: what was found, and what the claim asks for."""
+    return f"{one.what} = {number(one.value, one.what)} (asked: {one.relation} {number(one.limit, one.what)})"
 
 
-def number(value: float) -> str:
-    """Three significant digits; "never" for inf, "none" for NaN."""
+def number(value: float, what: str = "") -> str:
+    """Three significant digits; "none" for NaN, and for a time that is infinite "never"."""
     if math.isnan(value):
         return "none"
-    return "never" if value == math.inf else f"{value:.3g}"
+    return "never" if value == math.inf and "time" in what else f"{value:.3g}"
 
 
 def _mark(verdict: str) -> Text:

@@ -7,11 +7,12 @@ less is better it is inf of a run that does not settle. "Slower" is a larger set
 
 from smc_mujoco.claims import claim
 from smc_mujoco.claims.compare import HOSMC, OURS, RIVALS, Table, alike, overshoot, scores, slower
-from smc_mujoco.claims.evidence import Check, Runs, check
+from smc_mujoco.claims.evidence import Beside, Check, Runs, check
 from smc_mujoco.paper import LAWS
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"
 CONDITIONED = "conditioned_super_twisting"
+MODERATE = (2.0, 15.0)  # %
 
 
 @claim(
@@ -61,15 +62,16 @@ def larger_undershoot(runs: Runs) -> list[Check]:
     "31",
     "Van der Pol: moderate undershoot",
     where="Van der Pol oscillator",
-    measured="overshoot, nominal",
+    measured="overshoot, nominal, as its distance from that range",
     holds_if="2 to 15 %",
 )
-def moderate_undershoot(runs: Runs) -> list[Check]:
-    """Overshoot of the paper's law between two bounds: one check a bound."""
-    got = scores(runs, [VAN_DER_POL], [OURS])
+def moderate_undershoot(runs: Runs) -> list[Check | Beside]:
+    """By how much the paper's law's overshoot misses the range: one check, as every number meets one of its ends."""
+    over = overshoot(scores(runs, [VAN_DER_POL], [OURS])[VAN_DER_POL, OURS])
+    outside = max(MODERATE[0] - over, over - MODERATE[1], 0.0)
     return [
-        _overshoot(VAN_DER_POL, OURS, got, ">=", 2.0, ", at least"),
-        _overshoot(VAN_DER_POL, OURS, got, "<=", 15.0, ", at most"),
+        check(f"{VAN_DER_POL}: overshoot of {OURS}, percentage points outside 2 to 15 %", outside, "<=", 0.0),
+        Beside(f"{VAN_DER_POL}: overshoot of {OURS}, %", over),
     ]
 
 
@@ -81,7 +83,8 @@ def moderate_undershoot(runs: Runs) -> list[Check]:
     holds_if="largest",
     note="Where plain super-twisting meets the actuator's bound its integral winds up, and the swing measures that "
     "rather than the method; conditioned super-twisting, the same law without wind-up, stands beside it, and only "
-    "if both are the largest is the claim supported.",
+    "if both are the largest is the claim supported. Largest is largest, also among swings of less than 0.1 % of |x0|, "
+    "which no figure shows.",
 )
 def largest_oscillation(runs: Runs) -> list[Check]:
     """Overshoot of super-twisting, plain and conditioned, against the largest of the paper's three other laws."""
@@ -121,6 +124,7 @@ def classical_slower(runs: Runs) -> list[Check]:
     where="Duffing oscillator",
     measured="settling time and overshoot against the best of the three other laws, nominal",
     holds_if="first or within 10 % of first, in both",
+    note="Where a rival does not overshoot at all, within 10 % of first is not to overshoot either.",
 )
 def fast_and_minimal(runs: Runs) -> list[Check]:
     """Settling time and overshoot of the paper's law over the best rival's: first is below 1, near it at most 1.1."""
@@ -140,11 +144,13 @@ def fast_and_minimal(runs: Runs) -> list[Check]:
     where="Duffing oscillator",
     measured="settling time against the paper's law, nominal",
     holds_if="within 25 % of the paper's law's, both",
+    note="The paper's sentence likens them to its own law; read as like each other, the number beside would decide.",
 )
-def similar(runs: Runs) -> list[Check]:
+def similar(runs: Runs) -> list[Check | Beside]:
     """Settling times of the adaptive law and super-twisting against the paper's law, to which the paper likens them."""
     got = scores(runs, [DUFFING], [OURS, "adaptive", HOSMC])
-    return [alike(DUFFING, law, OURS, got, 0.25) for law in ("adaptive", HOSMC)]
+    each = alike(DUFFING, HOSMC, "adaptive", got, 0.25)
+    return [*(alike(DUFFING, law, OURS, got, 0.25) for law in ("adaptive", HOSMC)), Beside(each.what, each.value)]
 
 
 @claim(
@@ -160,10 +166,10 @@ def classical_deviates(runs: Runs) -> list[Check]:
     return [slower(DUFFING, "classical", got), _above(DUFFING, "classical", OURS, got)]
 
 
-def _overshoot(plant: str, law: str, got: Table, relation: str, limit: float, how: str = "") -> Check:
+def _overshoot(plant: str, law: str, got: Table, relation: str, limit: float) -> Check:
     """A law's overshoot against a limit; to stay below one it must settle."""
     value = overshoot(got[plant, law]) if relation in ("<", "<=") else got[plant, law]["overshoot"]
-    return check(f"{plant}: overshoot of {law}, %{how}", value, relation, limit)
+    return check(f"{plant}: overshoot of {law}, %", value, relation, limit)
 
 
 def _above(plant: str, law: str, other: str, got: Table) -> Check:

@@ -81,15 +81,19 @@ def global_(runs: Runs) -> list[Check | Beside]:
     Beside them the same with the lambda of the set.
     """
     starts = [(a, b) for a in SPREAD for b in RATES]
-    starts = starts[::4] if runs.quick else starts
+    starts = starts[1::3] if runs.quick else starts  # those at rest
     cells = [(name, share) for name in PLANTS if limit(runs, name) > 0.0 for share in RATIOS]
     lams = [(name, share * limit(runs, name)) for name, share in cells]
     own = [(name, runs.law(name, OURS).gains["lam"]) for name in PLANTS]
     shares = converging(runs, [*lams, *own], starts)
-    told = [f"{name}: share that converges, lambda {lam:.4g}" for name, lam in (*lams, *own)]
+    told = [f"{name}: share that converges at {share:g} of the smallest lambda" for name, share in cells]
     return [
-        *(check(f"{told[i]}, {share:g} of the smallest", shares[i], ">=", 1.0) for i, (_, share) in enumerate(cells)),
-        *(Beside(f"{told[i]} of the set", shares[i]) for i in range(len(cells), len(shares))),
+        *(check(what, share, ">=", 1.0) for what, share in zip(told, shares, strict=False)),
+        *(Beside(f"{name}: smallest lambda", limit(runs, name)) for name in PLANTS),
+        *(
+            Beside(f"{name}: share at the set's lambda", share)
+            for name, share in zip(PLANTS, shares[len(cells) :], strict=True)
+        ),
     ]
 
 

@@ -1,8 +1,8 @@
 """Laws made of laws: with other gains, with the command reversed, or through an input gain that varies with x.
 
-A channel's input gain g(x) multiplies its command. A law whose command is multiplied by g at each sample is therefore
-the law on that plant, exactly so but for g's change within a control period, during which the command is held. That is
-how runs are made on plants that the library does not have.
+A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
+multiplied by g at each sample is therefore the law on that plant, exactly so but for g's change within a control
+period, during which the command is held, where |g| <= 1. So are runs made on plants that the library does not have.
 """
 
 import dataclasses
@@ -35,7 +35,7 @@ def squeezed(law: Component) -> Component:
 
 
 def through(law: Component, gain: Callable[[float], float], name: str) -> Component:
-    """The law with its command multiplied by gain(x), x as measured; named after it."""
+    """The law with its command, bounded as the actuator bounds it, times gain(x), x as measured; named after it."""
     return dataclasses.replace(law, name=f"{law.name}_{name}", function=_multiplied(law.function, gain))
 
 
@@ -61,6 +61,6 @@ def _multiplied(function: Callable, gain: Callable[[float], float]) -> Callable:
 
     def multiplied(y, gains, memory):
         u, s = body(y, gains, memory)
-        return factor(y.x) * u, s
+        return factor(y.x) * min(max(u, -y.limit), y.limit), s
 
     return multiplied

@@ -29,18 +29,20 @@ def basin(
         with loading():
             from rich.console import Console
 
-            from smc_mujoco import basin as maps
+            from smc_mujoco.basin import CONVERGES, DOES_NOT, UNDECIDED
+            from smc_mujoco.basin import basin as search
             from smc_mujoco.commands.bar import bar
             from smc_mujoco.draw import region
+            from smc_mujoco.files import ended
 
         clock, console = Clock(), Console()
         if out:
             region.checked(out)
+        if json:
+            ended(json, ".json")
         with clock("in all"), bar(f"{law} on {plant}") as report:
-            found = maps.basin(
-                plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=report
-            )
-        counts = [int((found.outcome == kind).sum()) for kind in (maps.CONVERGES, maps.DOES_NOT, maps.UNDECIDED)]
+            found = search(plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=report)
+        counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
         console.print(f"{law} on {plant}: {100 * found.share:.3g} % of the states converge", highlight=False)
         said = "{} converge, {} do not, {} undecided".format(*counts)
         said += f" after {duration:g} s; gains {gains!r}, {clock.spent['in all']:.0f} s"

@@ -1,5 +1,6 @@
 """smc-mujoco bench: the study's grid, computed so that nothing is lost, to a table and a leaderboard."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +18,7 @@ def bench(
     conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="How many starts and noises; default 20.")] = None,
     gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
-    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10; a jump needs over 5.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
@@ -44,9 +45,9 @@ def bench(
         chosen = QUICK if quick else FULL
         with clock("in all"):
             scenarios = grid(
-                _names(plants) or chosen.plants,
-                _names(laws) or chosen.laws,
-                _names(conditions) or chosen.conditions,
+                _names(plants, chosen.plants),
+                _names(laws, chosen.laws),
+                _names(conditions, chosen.conditions),
                 seeds or chosen.seeds,
                 gains,
                 chosen.duration if duration is None else duration,
@@ -59,6 +60,6 @@ def bench(
         console.print(f"wrote {out / 'results.parquet'}", soft_wrap=True, highlight=False)
 
 
-def _names(text: str | None) -> list[str]:
-    """The names in a,b."""
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
+def _names(text: str | None, default: Sequence[str]) -> Sequence[str]:
+    """The names in a,b; the default if none is given."""
+    return default if text is None else [name.strip() for name in text.split(",") if name.strip()]

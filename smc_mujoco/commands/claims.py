@@ -51,5 +51,5 @@ def claims(
             print(text)
         else:
             show.tell(found, console, full=bool(ids))
-            where = f"; wrote {out}" if out else ""
+            where = "; quick: coarser grids than the claims say" * quick + (f"; wrote {out}" if out else "")
             console.print(f"{clock.spent['in all']:.0f} s{where}", style="dim", soft_wrap=True, highlight=False)

@@ -45,22 +45,26 @@ def margins(
             from rich.console import Console
 
             from smc_mujoco import gains as sets
-            from smc_mujoco import margins as search
             from smc_mujoco import paper
             from smc_mujoco.commands.bar import bar
+            from smc_mujoco.files import ended
+            from smc_mujoco.margins import KINDS, save
+            from smc_mujoco.margins import margins as search
 
         clock, console = Clock(), Console()
+        if json:
+            ended(json, ".json")
         chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
         names = _names(laws) or (paper.LAWS if quick else sets.LAWS)
-        kind = _names(kinds) or (QUICK["kinds"] if quick else search.KINDS)
+        kind = _names(kinds) or (QUICK["kinds"] if quick else KINDS)
         with clock("in all"), bar("margins") as report:
-            found = search.margins(chosen, names, kind, gains, quick, threads, report)
+            found = search(chosen, names, kind, gains, quick, threads, report)
         for name in kind:
             console.print(table(name, [margin for margin in found if margin.kind == name]))
-        said = f"{len(found)} margins, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"
         console.print(said, style="dim", soft_wrap=True, highlight=False)
         if json:
-            console.print(f"wrote {search.save(found, json)}", soft_wrap=True, highlight=False)
+            console.print(f"wrote {save(found, json)}", soft_wrap=True, highlight=False)
 
 
 def table(kind: str, found: "list[Margin]") -> "Table":

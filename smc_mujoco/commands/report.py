@@ -16,7 +16,7 @@ def report(
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
-    """Compute the whole study and write it as one HTML file: which controller, where, how sure.
+    """Compute the whole study, in some 20 minutes, and write it as one HTML file: which controller, where, how sure.
 
     The grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; films. The file
     OUT/report.html needs no network and no other file; the data lie beside it. Stopped and started again, the command

@@ -9,9 +9,11 @@ from typing import Any
 from smc_mujoco import gains as sets
 from smc_mujoco import paper, tuned
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.law import laws
+from smc_mujoco.objective import Objective
 from smc_mujoco.report import scores, words
 from smc_mujoco.report.findings import About, Gains
-from smc_mujoco.report.plan import GAINS, Plan
+from smc_mujoco.report.plan import FULL, GAINS, Plan
 from smc_mujoco.table import Table
 
 SHOWN = ("plotly", "pyarrow", "scipy")  # versions told beside those that each run records
@@ -28,6 +30,7 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
         duration=plan.duration,
         gains_set=GAINS,
         settings=settings(plan, table),
+        limits=limits(plan),
         conditions=conditions(plan),
         versions=run,
         gains=tuple(row for name in sets.SETS for row in gains(plan, name)),
@@ -39,9 +42,15 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
 def settings(plan: Plan, table: Table) -> dict[str, str]:
     """The grid and the rest in words."""
     across, up = plan.points
+    looked = Objective()
+    tuned_on = ", ".join(words.condition(name) for name in looked.conditions)
     return {
         "grid": f"{len(plan.plants)} plants × {len(plan.conditions)} conditions × {len(plan.laws)} laws × {plan.seeds} "
         f"seeds = {len(table)} runs of {plan.duration:g} s, of which {scores.failed(table)} failed",
+        "seeds": f"0 to {plan.seeds - 1}; seed 0 starts at the plant’s own x0, every other within 20 % of it, all laws "
+        "alike",
+        "gains": f"set {GAINS}, listed below; found on {tuned_on} from x0 in runs of {looked.duration:g} s; all other "
+        "conditions are new to them",
         "bound on u": f"|u| ≤ {paper.U_MAX:g} N·m or N, the same for every law",
         "control period": f"{1e3 * paper.CONTROL_PERIOD:g} ms; physics in RK4 steps of 1 ms, with real parts in "
         "implicitfast steps of 0.25 ms",
@@ -52,6 +61,23 @@ def settings(plan: Plan, table: Table) -> dict[str, str]:
         "claims": "quick: coarser grids, one set of gains" if plan.quick else "in full, every set of gains",
         "statistics": "seeds are the sample; conditions and plants are fixed",
     }
+
+
+def limits(plan: Plan) -> tuple[str, ...]:
+    """What was not done, and so is not told."""
+    left = [words.condition(name) for name in FULL.conditions if name not in plan.conditions]
+    found = [
+        "Nothing was tried on hardware: all of it is simulation, of the plants’ equations and of models of friction, "
+        "actuators and sensors.",
+        "Velocity is measured but where a condition has an encoder; what estimators cost is not compared here.",
+        f"{len(plan.laws)} of the package’s {len(laws())} laws, with one bound on u and one control period: under "
+        "others the order may be another.",
+        "Seeds vary the start and the noise. What else varies, the plant’s parameters among it, does so by condition.",
+        "The answer over all runs weighs every condition alike, as no application does: see the tables by condition.",
+        "Tuning sees runs from x0 alone. A law whose best gains there use little of the bound on u, as a small "
+        "switching gain does, has smaller margins and regions than the bound would allow it.",
+    ]
+    return (*found, f"Left out by this plan: {', '.join(left)}.") if left else tuple(found)
 
 
 def conditions(plan: Plan) -> dict[str, str]:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from smc_mujoco.ranking import ROUNDING
 from smc_mujoco.report import words
 from smc_mujoco.report.findings import Findings, Place, Score
 
@@ -24,7 +25,10 @@ class Standing(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """A comparison that the paper's law loses by more than the noise: medians, and its own over the best."""
+    """A comparison that the paper's law loses by more than the noise: medians, and its own over the best.
+
+    `times` is a lower bound where the best is less than what rounding leaves of zero, see `rounded`.
+    """
 
     metric: str
     plant: str
@@ -33,6 +37,11 @@ class Loss(NamedTuple):
     rival: float
     law: str
     times: float
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the best is zero but for rounding."""
+        return self.rival < ROUNDING
 
 
 class Open(NamedTuple):
@@ -82,7 +91,7 @@ def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
-            times = own.median / best.median if best.median > 0 else math.inf
+            times = own.median / max(best.median, ROUNDING)
             lost.append(Loss(metric, plant, condition, own.median, best.median, best.law, times))
     return sorted(lost, key=lambda loss: -loss.times)
 
@@ -112,6 +121,7 @@ def paragraph(findings: Findings, metrics: Sequence[str] = words.HEADLINE) -> li
     leads = [Sentence(words.ASKS[m].capitalize(), _leads(m, places[m], standing[m])) for m in metrics]
     rest = [
         _sure(undecided(found, metrics), findings.about.seeds),
+        *_settled(findings),
         *_paper(standing, losses(found, metrics)),
         *_claims(findings),
     ]
@@ -151,7 +161,24 @@ def _leads(metric: str, places: Sequence[Place], standing: Sequence[Standing]) -
 
 
 def _sure(found: Open, seeds: int) -> str:
-    return f"In {found.open} of {found.of} comparisons, of {seeds} seeds each, no single winner can be declared."
+    return (
+        f"In {found.open} of {found.of} comparisons, of {seeds} seeds each and each tested by itself, no single winner "
+        "can be declared."
+    )
+
+
+def _settled(findings: Findings) -> list[str]:
+    """What share of runs settles, for who does not may be calm all the same, and how many runs failed."""
+    share = {place.law: place.median for place in overall(findings, "settles")}
+    if not share:
+        return []
+    least, most = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
+    told = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
+    if f"{share[least]:.2f}" != f"{share[most]:.2f}":
+        told = f"Of {words.law(least)}’s runs {100 * share[least]:.0f} % settle, the fewest; one that does "
+        told += "not may be calm all the same"
+    about = findings.about
+    return [f"{told}. {about.failed or 'None'} of {about.runs} runs failed."]
 
 
 def _paper(standing: dict[str, list[Standing]], lost: Sequence[Loss]) -> list[str]:
@@ -160,7 +187,8 @@ def _paper(standing: dict[str, list[Standing]], lost: Sequence[Loss]) -> list[st
     if not shown:
         return []
     of = next(row.of for row in own.values() if row)
-    beaten = f"; it is beaten in {len(lost)} comparisons, listed below" if lost else ""
+    beaten = f"; it is beaten in {len(lost)} comparisons, listed below, in half of them by a factor of " if lost else ""
+    beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
     return [
         f"The paper’s observer-free law leads, or is level with what leads, in {_joined(shown)}, "
         f"of {of} cells each{beaten}."

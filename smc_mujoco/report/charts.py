@@ -1,6 +1,6 @@
 """Charts of numbers: medians with intervals, fronts of error against effort, margins, curves over time.
 
-What cannot stand on an axis (inf, or less than a logarithm shows) stands at its end as an open triangle.
+What cannot stand on an axis (inf, or less than a logarithm shows) stands at its end as a triangle.
 """
 
 import math
@@ -16,6 +16,9 @@ from smc_mujoco.report.words import style
 
 if TYPE_CHECKING:
     from smc_mujoco.margins import Margin
+
+# Of logarithmic axes; plotly writes powers a quarter larger than it is told.
+POWERS: dict[str, Any] = {"exponentformat": "power", "tickfont": AXIS["tickfont"] | {"size": 9}}
 
 
 def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> Figure:
@@ -35,7 +38,7 @@ def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str
             heading(panel, words.metric(metric)) | {"text": f"{words.metric(metric)}, {unit}", "font": {"size": 11}}
         )
         x = {"type": "log" if ends[0] else "linear", "range": _range(ends), "nticks": 4}
-        x |= {"dtick": _decades(ends), "exponentformat": "power"} if ends[0] else {}
+        x |= {"dtick": _decades(ends)} | POWERS if ends[0] else {}
         y = {"categoryarray": [words.escape(words.law(law)) for law in reversed(laws)], "categoryorder": "array"}
         y |= {"dtick": 1, "showticklabels": k % len(plants) == 0, "tickfont": {"size": 11.5, "color": style.INK}}
         layout |= axes(panel, x, y | {"range": [-0.6, len(laws) - 0.4], "showgrid": False})
@@ -55,10 +58,10 @@ def _decades(ends: tuple[bool, float, float]) -> int:
 def _whisker(score: Score, end: str, ends: tuple[bool, float, float]) -> dict[str, Any]:
     """A law's point with its interval, on the panel with this ending."""
     logarithmic, low, high = ends
-    inner = (low * 1.15, high / 1.2) if logarithmic else (low, high * 0.97)
+    off = (high / low) ** 0.035 if logarithmic else 1.0  # off the ends, clear of the labels
+    inner = (low * off, high / off) if logarithmic else (low, high * 0.97)
     at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, score.low, score.high))
-    symbol = "triangle-right-open" if score.median > inner[1] else "triangle-left-open"
-    inside = inner[0] <= score.median <= inner[1]
+    symbol = "triangle-right" if score.median > inner[1] else "triangle-left" if score.median < inner[0] else "circle"
     colour = words.colour(score.law)
     text = f"{words.number(score.median)} {words.unit(score.metric, score.plant)}"
     spread = words.interval(score.median, score.low, score.high)
@@ -82,7 +85,7 @@ def _whisker(score: Score, end: str, ends: tuple[bool, float, float]) -> dict[st
         "marker": {
             "size": 9,
             "color": colour,
-            "symbol": ("circle" if score.best else "circle-open") if inside else symbol,
+            "symbol": symbol if score.best else f"{symbol}-open",
             "line": {"width": 2, "color": colour},
         },
         "hovertemplate": f"<b>{words.escape(words.law(score.law))}</b><br>{text}"
@@ -92,7 +95,7 @@ def _whisker(score: Score, end: str, ends: tuple[bool, float, float]) -> dict[st
 
 
 def fronts(found: Sequence[Front], plants: Sequence[str]) -> Figure:
-    """Tracking against variation: a panel a plant, a line a law; a dot where the study's gains are."""
+    """Tracking against variation: a panel a plant, a staircase a law; a dot where the study's gains are."""
     grid = panels(1, len(plants), (0.035, 0))
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": titles(grid, [words.plant(plant) for plant in plants])}
@@ -103,16 +106,16 @@ def fronts(found: Sequence[Front], plants: Sequence[str]) -> Figure:
         own = [f for f in found if f.plant == plant]
         across = _span([v for f in own for v in (*f.variation, f.chosen[1])], 1e-3)
         up = _span([v for f in own for v in (*f.tracking, f.chosen[0])], None)
-        x = {"type": "log", "title": AXIS["title"] | {"text": "variation, 1/s"}, "exponentformat": "power"}
-        y = {"type": "log", "exponentformat": "power", "dtick": 1}
+        x = {"type": "log", "title": AXIS["title"] | {"text": "variation, 1/s"}} | POWERS
+        y = {"type": "log", "dtick": 1} | POWERS
         x |= {"range": across, "dtick": max(1, math.ceil((across[1] - across[0]) / 4)), "tickangle": 0}
         if panel[0] == "":
             y["title"] = AXIS["title"] | {"text": "tracking, s²"}
         layout |= axes(panel, x, y | {"range": up})
     data += [_key(law) for law in laws]
-    layout |= {"margin": {"l": 60, "r": 12, "t": 82, "b": 54}}
-    layout |= {"legend": {"orientation": "h", "x": 0, "y": 1.13, "yanchor": "bottom", "font": {"size": 12}}}
-    return figure(data, layout, 400, legend=True)
+    layout |= {"margin": {"l": 60, "r": 12, "t": 104, "b": 54}}
+    layout |= {"legend": {"orientation": "h", "x": 0, "y": 1.2, "yanchor": "bottom", "font": {"size": 12}}}
+    return figure(data, layout, 422, legend=True)
 
 
 def _span(values: Sequence[float], least: float | None) -> list[float]:
@@ -142,10 +145,12 @@ def _front(front: Front, end: str) -> list[dict[str, Any]]:
     colour, name = words.colour(front.law), words.escape(words.law(front.law))
     common = {"type": "scatter", "xaxis": f"x{end}", "yaxis": f"y{end}", "legendgroup": front.law, "showlegend": False}
     told = f"<b>{name}</b><br>variation %{{x:.3g}} 1/s<br>tracking %{{y:.3g}} s²<extra></extra>"
-    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5}, "marker": {"size": 4, "color": colour}}
+    across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # for steps to the right
+    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5, "shape": "hv"}}
+    line["marker"] = {"size": 4, "color": colour}
     dot = {"mode": "markers", "marker": {"size": 12, "color": colour, "line": {"width": 2, "color": "#FFFFFF"}}}
     return [
-        common | line | {"x": rounded(front.variation), "y": rounded(front.tracking), "hovertemplate": told},
+        common | line | {"x": rounded(across), "y": rounded(up), "hovertemplate": told},
         common | dot | {"x": [front.chosen[1]], "y": [front.chosen[0]], "hovertemplate": "The study's gains: " + told},
     ]
 

@@ -138,6 +138,7 @@ class About:
       duration: of a run, s.
       gains_set: with which grid, margins and maps were made.
       settings: what -> value, in words.
+      limits: what was not done, a sentence each.
       conditions: condition -> the Scenario fields that it sets, in words.
       versions: package -> version.
       gains: of every set.
@@ -152,6 +153,7 @@ class About:
     duration: float
     gains_set: str
     settings: Mapping[str, str]
+    limits: tuple[str, ...]
     conditions: Mapping[str, str]
     versions: Mapping[str, str]
     gains: tuple[Gains, ...]

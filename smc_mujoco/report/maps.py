@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.draw import region
+from smc_mujoco.plant import catalogue as plants
 from smc_mujoco.report import words
 from smc_mujoco.report.findings import Field
 from smc_mujoco.report.panels import AXIS, Figure, axes, figure, heading, packed, panels, rounded, titles
@@ -95,8 +96,9 @@ def fields(found: Sequence[Field]) -> Figure:
         few = {"x": rounded(field.x[::4]), "y": rounded(field.v[::4]), "z": [rounded(r, 3) for r in field.s[::4, ::4]]}
         ink = {"colorscale": [[0, style.INK], [1, style.INK]], "line": {"width": 1.5, "color": style.INK}}
         data.append({"type": "contour", "contours": ZERO, "hoverinfo": "skip"} | few | at | ink)
-        x = {"title": AXIS["title"] | {"text": "x"}, "showgrid": False, "nticks": 4}
+        unit = plants()[field.plant].unit if field.plant in plants() else ""
+        x = {"title": AXIS["title"] | {"text": f"x, {unit}"}, "showgrid": False, "nticks": 4}
         y = {"showgrid": False, "nticks": 5}
-        y |= {"title": AXIS["title"] | {"text": "x′"}} if panel[0] == "" else {}
+        y |= {"title": AXIS["title"] | {"text": "x′, rad/s or m/s"}} if panel[0] == "" else {}
         layout |= axes(panel, x, y)
     return figure(data, layout | {"margin": {"l": 48, "r": 8, "t": 38, "b": 44}}, 246)

@@ -9,6 +9,7 @@ are data URIs. A content security policy in the file forbids everything that is 
 import base64
 import functools
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -105,6 +106,7 @@ def claims(findings: Findings) -> dict[str, Any]:
         "sets": sets,
         "counts": {name: n for name, n in answer.counts(findings).items() if n},
         "checks": functools.partial(checks, sets),
+        "decided": functools.partial(decided, findings.about.gains_set),
         "beside": functools.partial(beside, sets),
         "fields": maps.fields(findings.fields) if findings.fields else None,
         "rising": rises,
@@ -124,6 +126,16 @@ def checks(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
     return sorted(rows, key=lambda row: all(check is None or check.holds for check in row.checks))
 
 
+def decided(gains: str, claim: Any) -> SimpleNamespace | None:
+    """The check that decides a claim under these gains, or under the first that it was judged with."""
+    name = gains if gains in claim.numbers else next(iter(claim.numbers), "")
+    one = claim.decisive(name) if name else None
+    if one is None:
+        return None
+    limit = f"{words.pretty(one.relation)} {words.number(one.limit)}"
+    return SimpleNamespace(gains=name, what=one.what, value=one.value, limit=limit, holds=one.holds)
+
+
 def beside(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
     """What was found beside a claim's checks: a row each, a value a set of gains or None."""
     found = [claim.beside.get(name, {}) for name in sets]
@@ -133,8 +145,10 @@ def beside(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
 
 def link(what: str) -> str:
     """The definition of the metric that a check names, else of what a verdict is."""
-    known = sorted((metric.name for metric in catalogue_of_metrics()), key=len, reverse=True)
-    return next((f"metric-{name}" for name in known if name in what), "verdict")
+    names = {called: m.name for m in catalogue_of_metrics() for called in (m.name, words.metric(m.name))}
+    known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+    found = re.search(rf"(?<!\w)({known})(?!\w)", what)
+    return f"metric-{names[found[1]]}" if found else "verdict"
 
 
 def tradeoffs(findings: Findings) -> dict[str, Any]:

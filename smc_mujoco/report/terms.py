@@ -45,14 +45,17 @@ STATISTICS = (
         "best, or level with the best",
         "No other law of the cell is better by more than the noise: a permutation test over whole seeds, corrected"
         " for the number of laws, does not reject at 95 % that no law is better. One such law alone is the winner;"
-        " where there are several, none is declared. Fewer than six seeds can decide nothing.",
+        " where there are several, none is declared. Fewer than six seeds can decide nothing. Values that differ by "
+        "less than 1e-9 in SI units, or by 1e-6 of themselves, are ties. Each comparison is tested by itself: of a "
+        "hundred, a few may name a winner by chance.",
     ),
     Term(
         "rank",
         "rank, place",
         "In each run, the law with the lowest value has rank 1, and so on; ties share the mean of their ranks, and"
         " so do runs that never get there. Mean rank is over all runs that the laws share; the place orders the "
-        "laws by it, with a 95 % interval by bootstrap over the seeds.",
+        "laws by it, with a 95 % interval by bootstrap over the seeds. Ranks count how often a law is ahead, not by "
+        "how much; every plant and condition of the grid weighs the same.",
     ),
     Term(
         "settles",
@@ -67,7 +70,8 @@ STATISTICS = (
     Term(
         "ratio",
         "times",
-        "The law’s median over that of the best law; less is better in every metric here.",
+        "The law’s median over that of the best law, or over 1e-9 in SI units where that is less, which is told by "
+        "“>”; less is better in every metric here.",
     ),
     Term(
         "verdict",
@@ -80,7 +84,8 @@ STATISTICS = (
         "lyapunov",
         "where V rises",
         "The points of a grid on the state plane at which V′ = s s′ > 0 and |s| > 1e-6, u neither saturated nor "
-        "sampled, with the plant’s exact f and g; their share in percent.",
+        "sampled, with the plant’s exact f and g; their share in percent. The plane is that of one joint, the others "
+        "of a network in the same state: |x| up to twice the largest |x0|, |x′| up to k1 times that.",
     ),
     Term(
         "tracking",
@@ -142,9 +147,9 @@ def _about_margins() -> dict[str, str]:
 
 
 def definitions() -> list[Metric]:
-    """Every metric with its docstring."""
+    """Every metric with its docstring, in people's signs."""
     found = []
     for metric in metrics():
         parts = words.definition(metric.name).split("\n\n")
-        found.append(Metric(metric.name, tuple(" ".join(part.split()) for part in parts)))
+        found.append(Metric(metric.name, tuple(words.pretty(" ".join(part.split())) for part in parts)))
     return found

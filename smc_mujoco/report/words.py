@@ -18,7 +18,10 @@ HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
 COLUMNS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
 METRICS = {
     "settling_time": "settling time",
+    "ise": "ISE",
+    "iae": "IAE",
     "itae": "ITAE",
+    "tv": "TV",
     "tv_rate": "TV rate",
     "max_u": "max |u|",
     "ultimate_bound": "ultimate bound",
@@ -134,7 +137,8 @@ SIGNS |= {"Vdot": "V′", "xdot": "x′"}
 
 def pretty(text: str) -> str:
     """A sentence of the audit, which is written in letters of a keyboard, with signs and names as people write them."""
-    text = re.sub("|".join(map(re.escape, sorted(SIGNS, key=len, reverse=True))), lambda m: SIGNS[m[0]], text)
+    signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
+    text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
     names = {name: plant(name) for name in plants()} | {name: name_.lower() for name, name_ in style.NAMES.items()}
     named = "|".join(sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True))
     return re.sub(rf"\b({named})\b(?!_)", lambda m: names[m[1]], text)

@@ -5,7 +5,10 @@
 
   // charts, one after another so that the page answers meanwhile
   const plots = all(".plot");
-  const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const config = {
+    displaylogo: false, responsive: true, showSendToCloud: false, // no network, not even at a click
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+  };
   const draw = (plot) => {
     if (plot.dataset.drawn) return;
     plot.dataset.drawn = "yes";
@@ -57,6 +60,15 @@
   };
   for (const pick of all("select[data-table]")) pick.addEventListener("change", () => filter(pick.dataset.table));
   for (const id of new Set(all("select[data-table]").map((pick) => pick.dataset.table))) filter(id);
+
+  // what scrolls is reached by the keyboard
+  for (const box of all(".wide, .chart")) {
+    if (box.scrollHeight <= box.clientHeight + 1 && box.scrollWidth <= box.clientWidth + 1) continue;
+    const name = box.querySelector("caption, figcaption");
+    box.tabIndex = 0;
+    box.setAttribute("role", "region");
+    if (name) box.setAttribute("aria-label", name.textContent.trim());
+  }
 
   // one of several panels
   const press = (group, chosen) => group.forEach((b) => b.setAttribute("aria-pressed", String(b === chosen)));
