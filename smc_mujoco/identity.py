@@ -88,13 +88,13 @@ def _compared(data: dict[str, Any]) -> str:
 def _conditions(plant: Plant, duration: float) -> dict[str, str]:
     """What runs of a plant look like in the paper's conditions -> their names, the nominal one first."""
     found: dict[str, str] = {}
-    for name, fields in paper.CONDITIONS.items():
+    for name in paper.CONDITIONS:
         try:
-            given = fields(plant.name) if callable(fields) else fields
+            given = paper.fields(name, plant.name, duration)
             common = {"plant": plant, "law": "none", "duration": duration}
             chosen: dict[str, Any] = common | {"control_period": paper.CONTROL_PERIOD, "u_max": paper.U_MAX} | given
             scenario = Scenario(**chosen)
-        except (KeyError, ScenarioError):  # it is not for this plant, or for runs as short as this
+        except ScenarioError:  # it is not for this plant, or for runs as short as this
             continue
         found.setdefault(_compared(described(scenario)), name)
     return found

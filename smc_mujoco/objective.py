@@ -13,7 +13,6 @@ that does not fail, and less the later it fails.
 
 import dataclasses
 import functools
-from typing import Any
 
 import numpy as np
 
@@ -67,7 +66,8 @@ class Objective:
         """One run for each condition; every candidate sees the same noise."""
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, seed=seed, **common)
-        return [dataclasses.replace(first, **_fields(condition, first.plant.name)) for condition in self.conditions]
+        plant = first.plant.name
+        return [dataclasses.replace(first, **paper.fields(name, plant, self.duration)) for name in self.conditions]
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
         """Tracking and variation of a candidate's runs, each summed over them; J = tracking + weight variation."""
@@ -81,14 +81,6 @@ class Objective:
         start = float(np.abs(trace.x[0]).sum())
         tracking = min(metrics.itae(trace) / start, FAILED)
         return tracking, metrics.tv(trace) / (self.u_max * self.duration)
-
-
-def _fields(condition: str, plant: str) -> dict[str, Any]:
-    fields = paper.CONDITIONS[condition]
-    if not callable(fields):
-        return fields
-    find(f"plant of the paper's study, which {condition!r} is for,", plant, paper.GAINS)
-    return fields(plant)
 
 
 @functools.cache

@@ -54,12 +54,12 @@ SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
 
-def _jump(factors: dict[str, dict[str, float]]) -> Callable[[str], dict]:
-    return lambda plant: {"disturbance": SINE, "jump": Jump(time=DURATION / 2, factors=factors[plant])}
+def _jump(factors: dict[str, dict[str, float]]) -> Callable[[str, float], dict]:
+    return lambda plant, half: {"disturbance": SINE, "jump": Jump(time=half, factors=factors[plant])}
 
 
-# Condition -> the Scenario fields that it sets, or a function of the plant's name that gives them.
-Conditions = Mapping[str, dict[str, Any] | Callable[[str], dict[str, Any]]]
+# Condition -> the Scenario fields that it sets, or how they follow from the plant's name and half the duration.
+Conditions = Mapping[str, dict[str, Any] | Callable[[str, float], dict[str, Any]]]
 
 # What real machines do. 0.1 N m or N of friction is u_max / 60, the gap a worn gear's, the lag a hydraulic valve's, the
 # counts, per revolution or metre, an inexpensive encoder's; the pulse, as strong as u_max, throws what can be thrown.
@@ -71,7 +71,7 @@ REALISTIC: Conditions = {
     "dc_motor": {"actuator": DCMotor()},
     "backlash": {"actuator": Backlash(0.01)},
     "encoder": {"sensor": Encoder(counts=4096)},
-    "contact": lambda plant: {"contact": CONTACTS[plant], "disturbance": Pulse(6.0, time=5.0, width=0.2)},
+    "contact": lambda plant, half: {"contact": CONTACTS[plant], "disturbance": Pulse(6.0, time=half, width=0.2)},
 }
 
 CONDITIONS: Conditions = {
@@ -79,8 +79,8 @@ CONDITIONS: Conditions = {
     "noise": {"noise": SENSOR_NOISE},
     "sine": {"disturbance": SINE},
     "constant": {"disturbance": Constant(0.2)},
-    "step": {"disturbance": Step(0.2, time=5.0)},
-    "pulse": {"disturbance": Pulse(2.0, time=5.0, width=0.1)},
+    "step": lambda plant, half: {"disturbance": Step(0.2, time=half)},
+    "pulse": lambda plant, half: {"disturbance": Pulse(2.0, time=half, width=0.1)},
     "process_noise": {"disturbance": OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
     **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)},
     "light": {"mismatch": {"mass": 0.7}},
@@ -92,6 +92,19 @@ CONDITIONS: Conditions = {
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
     **REALISTIC,
 }
+
+
+def fields(condition: str, plant: str, duration: float = DURATION) -> dict[str, Any]:
+    """The Scenario fields that a condition sets, in runs of that duration; what happens once does so at half time.
+
+    Raises:
+      ScenarioError: a condition or plant that the study does not have.
+    """
+    found = find("condition of the paper's study", condition, CONDITIONS)
+    if not callable(found):
+        return found
+    find(f"plant of the paper's study, which {condition!r} is for,", plant, GAINS)
+    return found(plant, duration / 2)
 
 
 def scenario(
@@ -119,9 +132,8 @@ def scenario(
             raise unknown("field of a Scenario", name, FIELDS)
     find("plant of the paper's study", plant, GAINS)
     found = sets.law(plant, law_name, "default" if law_name == "none" else gains)
-    fields = find("condition of the paper's study", condition, CONDITIONS)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
-    conditioned = fields(plant) if callable(fields) else fields
+    conditioned = fields(condition, plant, duration)
     return Scenario(**({"plant": plant, "law": found} | common | conditioned | dict(changes)))
 
 

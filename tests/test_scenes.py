@@ -235,7 +235,7 @@ def stated(plant: str, condition: str) -> dict:
 
 
 def test_the_study_has_these_conditions_and_no_other():
-    assert set(smc.paper.CONDITIONS) == {*CONDITIONS, *JUMPS}
+    assert set(smc.paper.CONDITIONS) == {*CONDITIONS, *JUMPS, *smc.paper.REALISTIC}
 
 
 @pytest.mark.parametrize("condition", [*CONDITIONS, *JUMPS])
@@ -298,3 +298,13 @@ def test_the_jump_scene_jumps_mildly_and_hard_at_half_time():
     declared = scenes.read(FOLDER / "parameter_jump.py").conditions
     jumps = {name: {scenario.jump for scenario in runs.values()} for name, runs in declared.items()}
     assert jumps == {"mild": {smc.Jump(5.0, {"mass": 2.0})}, "hard": {smc.Jump(5.0, {"mass": 25.912})}}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_what_happens_once_happens_at_half_time(plant):
+    for duration in (10.0, 4.0):
+        jumping = smc.paper.scenario(plant, "observer_free", "jump_mild", duration=duration)
+        assert jumping.jump.time == duration / 2
+        for condition in ("step", "pulse", "contact"):
+            (signal,) = smc.paper.scenario(plant, "observer_free", condition, duration=duration).disturbance
+            assert signal.time == duration / 2

@@ -18,7 +18,7 @@ def bench(
     conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="How many starts and noises; default 20.")] = None,
     gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
-    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10; a jump needs over 5.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[

@@ -84,14 +84,9 @@ def conditions(plan: Plan) -> dict[str, str]:
     """Condition -> the fields of a Scenario that it sets, in words."""
     found = {}
     for name in plan.conditions:
-        fields = paper.CONDITIONS[name]
-        if callable(fields):
-            each = {words.plant(plant): _fields(fields(plant)) for plant in plan.plants}
-            same = len(set(each.values())) == 1
-            text = next(iter(each.values())) if same else "; ".join(f"{plant}: {told}" for plant, told in each.items())
-        else:
-            text = _fields(fields)
-        found[name] = text
+        each = {words.plant(p): _fields(paper.fields(name, p, plan.duration)) for p in plan.plants}
+        same = len(set(each.values())) == 1
+        found[name] = next(iter(each.values())) if same else "; ".join(f"{p}: {told}" for p, told in each.items())
     return found
 
 
