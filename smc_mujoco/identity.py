@@ -5,7 +5,7 @@ import hashlib
 import json
 from typing import Any
 
-from smc_mujoco import fingerprint, paper, record
+from smc_mujoco import fingerprint, paper, record, source
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
@@ -13,6 +13,7 @@ from smc_mujoco.scenario import Scenario
 OURS = "smc_mujoco."
 # Of a description: what tells no condition from another, for it is of the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions")
+TELL = ("claims", "draw", "testing", "tuned_gains")  # folders that say something of runs, and change none
 LONGEST = 60  # characters of a condition's name
 
 
@@ -24,7 +25,10 @@ def described(scenario: Scenario) -> dict[str, Any]:
 
 
 def key(scenario: Scenario) -> str:
-    """A hash of all that decides what a run does: its scenario, the code of its parts, versions; 32 hex digits."""
+    """A hash of all that decides what a run does: its scenario, the code of its parts and of the package, versions.
+
+    32 hex digits.
+    """
     return _key(scenario, described(scenario))
 
 
@@ -53,7 +57,7 @@ def condition(scenario: Scenario) -> str:
 
 
 def _key(scenario: Scenario, data: dict[str, Any]) -> str:
-    text = json.dumps([data, _codes(scenario)], sort_keys=True)
+    text = json.dumps([data, _codes(scenario), source.code(*TELL)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import fingerprint, paper, record
+from smc_mujoco import fingerprint, paper, record, source
 from smc_mujoco.study import condition, grid, key
 
 ROOT = Path(__file__).parents[1]
@@ -189,3 +190,22 @@ def test_an_object_that_changed_is_another():
     before = fingerprint.of(policy)
     policy.weight = 2.0
     assert fingerprint.of(policy) != before
+
+
+def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(monkeypatch, tmp_path):
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=1.0)
+    package = tmp_path / "smc_mujoco"
+    shutil.copytree(source.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains"))
+    monkeypatch.setattr(source, "PACKAGE", package)
+
+    def now() -> str:
+        source.code.cache_clear()
+        return key(scenario)
+
+    same = now()
+    (package / "report" / "words.py").write_text("# other words")
+    (package / "claims" / "abstract.py").write_text("# other claims")
+    assert now() == same
+    (package / "harness.py").write_text("# another loop")
+    assert now() != same
+    source.code.cache_clear()

@@ -384,11 +384,6 @@ def test_a_stage_that_was_killed_leaves_nothing_behind_and_one_with_other_argume
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_report_depends_on_the_code_of_what_runs_but_not_on_how_it_is_shown():
-    assert kept.code() == kept.code()
-    assert len(kept.code()) == 64
-
-
 def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings, monkeypatch):
     monkeypatch.setattr(gl, "missing", lambda: "no film: nothing renders here: install a renderer")
     without = stages.find(dataclasses.replace(TINY, filmed=1), folder, None, Bars(False))

@@ -6,19 +6,16 @@ A file's name ends in a hash of what it depends on: the arguments, the package's
 the packages below. What depends on anything else is computed anew.
 """
 
-import functools
 import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-import smc_mujoco
+from smc_mujoco import source
 from smc_mujoco.tuned import versions
 
 T = TypeVar("T")
-PACKAGE = Path(smc_mujoco.__file__).parent
-SHOWS = ("report", "commands")  # folders that say how results are shown, not what they are
 
 
 def kept(
@@ -30,7 +27,7 @@ def kept(
       path: of the file; before its ending the hash is put.
       depends: what the result depends on beside the code, JSON-able.
     """
-    text = json.dumps([depends, code(), versions()], sort_keys=True, default=str)
+    text = json.dumps([depends, source.code(), versions()], sort_keys=True, default=str)
     own = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
     if not own.exists():
         found = make()
@@ -38,15 +35,3 @@ def kept(
             old.unlink()
         save(found, own)
     return load(own)
-
-
-@functools.cache
-def code() -> str:
-    """A hash of all that decides what runs do."""
-    digest = hashlib.sha256()
-    models = PACKAGE / "models" if (PACKAGE / "models").is_dir() else PACKAGE.parent / "models"
-    files = [path for path in PACKAGE.rglob("*") if path.relative_to(PACKAGE).parts[0] not in SHOWS]
-    for path in sorted([*files, *models.rglob("*")]):
-        if path.suffix in (".py", ".xml", ".json"):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
