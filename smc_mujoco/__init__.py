@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from smc_mujoco.actuators import RateLimit as RateLimit
     from smc_mujoco.backlash import Backlash as Backlash
     from smc_mujoco.basin import basin as basin
+    from smc_mujoco.c.export import law_to_c as law_to_c
+    from smc_mujoco.c.load import law_from_c as law_from_c
     from smc_mujoco.claims import Claim as Claim
     from smc_mujoco.claims import claims as claims
     from smc_mujoco.cli import play as play
@@ -90,6 +92,8 @@ _HOMES = {
     "actuators": ("DCMotor", "Lag", "RateLimit"),
     "backlash": ("Backlash",),
     "basin": ("basin",),
+    "c.export": ("law_to_c",),
+    "c.load": ("law_from_c",),
     "claims": ("Claim", "claims"),
     "cli": ("play",),
     "component": ("GainWarning",),

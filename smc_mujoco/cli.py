@@ -1,4 +1,4 @@
-"""The command line: smc-mujoco list | laws | run | show | tune, here, and bench | margins | basin | claims | report."""
+"""The command line: smc-mujoco list | laws | run | show | tune, here, and the commands of `commands`."""
 
 import sys
 import warnings
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.commands import basin, bench, claims, margins, report
+from smc_mujoco.commands import basin, bench, check_c, claims, export_c, margins, report
 from smc_mujoco.terminal import Clock, loading, mendable
 
 app = typer.Typer(
@@ -191,3 +191,5 @@ def tune(
 
 for command in (bench.bench, margins.margins, basin.basin, claims.claims, report.report):
     app.command()(command)
+app.command("check-c")(check_c.check_c)
+app.command("export-c")(export_c.export_c)

@@ -48,6 +48,17 @@ def call(typingctx, address, inputs, parameters, memory, outputs):
 
 
 @intrinsic
+def call_int(typingctx, address, inputs, parameters, memory, outputs):
+    """`call` for a C function that returns an int: the rest of the register it comes in is not its own."""
+
+    def codegen(context, builder, signature, args):
+        function = ir.FunctionType(ir.IntType(32), [ir.IntType(64)] * 4).as_pointer()
+        return builder.sext(builder.call(builder.inttoptr(args[0], function), args[1:]), ir.IntType(64))
+
+    return types.int64(*[types.intp] * 5), codegen
+
+
+@intrinsic
 def attempt(typingctx, body, arguments):
     """(whether body(*arguments) returned, what it returned): an exception ends as False, not in Python."""
     resolved = body.get_call_type(typingctx, tuple(arguments), {})
@@ -96,6 +107,12 @@ class Function:
         except Exception as error:  # numba raises many kinds; each means the same to the caller
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address
+
+
+class AtAddress:
+    """What is a C function of the callback's type already; `address` is where it lies, as long as this lives."""
+
+    address: int
 
 
 # How the lines of numba's errors begin that say where it was, not what it did not like.

@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 from numba import carray
 
-from smc_mujoco.compiled import Function, NotCompilable, attempt, jit, loader, named, pointer
+from smc_mujoco.compiled import AtAddress, Function, NotCompilable, attempt, jit, loader, named, pointer
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import Reading
@@ -117,12 +117,14 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
     return Function(native)
 
 
-def component(c: Component) -> Function:
-    """A law, a surface or an estimator, compiled.
+def component(c: Component) -> Function | AtAddress:
+    """A law, a surface or an estimator, compiled; one that is in C already as it is.
 
     Raises:
       NotCompilable: with its name and the compiler's reason.
     """
+    if isinstance(c.function, AtAddress):
+        return c.function
     compiler = {"law": law, "surface": law, "estimator": estimator}[c.kind]
     return _named(f"{c.kind} {c.name!r}", compiler, c.function, tuple(c.gains), c.memory)
 

@@ -73,7 +73,8 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
-    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|svg|png))"', block)) | set(re.findall(r'study\(.*"(\w+)"', block))
+    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|svg|png|c))"', block))
+    wanted |= set(re.findall(r'study\(.*"(\w+)"', block))
     written = {path.name for path in tmp_path.iterdir()} - {"block.py"}
     assert wanted <= written
     assert bool(written) == bool(wanted or end)

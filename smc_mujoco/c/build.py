@@ -1,0 +1,148 @@
+"""C compiled with the system's compiler into a library of this process; what the compiler says, in one sentence."""
+
+import atexit
+import contextlib
+import functools
+import itertools
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from smc_mujoco.c.trial import BEYOND
+from smc_mujoco.errors import ScenarioError, shown
+
+HERE = Path(__file__).parent
+HEADER = HERE / "smc_law.h"
+INPUTS = 21  # numbers in a measurement, as in law.Measurement
+PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+# The same arithmetic as compiled Python: no products and sums fused into one rounding.
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+WRONG = ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")  # are errors, not warnings
+ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<said>.*)$", re.MULTILINE)
+WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
+
+
+class Late(Exception):
+    """A command was ended after its time."""
+
+
+@functools.cache
+def folder() -> Path:
+    """A folder for what is compiled, until the process ends.
+
+    Not less: the loader takes a library for one that it has where a deleted file's number is used again.
+    """
+    made = tempfile.mkdtemp(prefix="smc_mujoco-")
+    atexit.register(_remove, made, os.getpid())
+    return Path(made)
+
+
+def _remove(made: str, owner: int) -> None:
+    if os.getpid() == owner:  # a forked child leaves its parent's files
+        shutil.rmtree(made, ignore_errors=True)
+
+
+_count = itertools.count()
+
+
+def fresh(suffix: str) -> Path:
+    """A file name that nothing had before."""
+    return folder() / f"{os.getpid()}-{next(_count)}{suffix}"
+
+
+def compiler() -> list[str]:
+    """The command of the C compiler: $CC, or cc."""
+    said = os.environ.get("CC", "")
+    try:
+        return shlex.split(said) or ["cc"]
+    except ValueError:  # a quotation without an end: there is no such program
+        return [said]
+
+
+def timed(command: Sequence[str], timeout: float, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """A command that ends in time, with every process that it started.
+
+    Raises:
+      Late: it did not.
+      OSError: there is no such program.
+    """
+    process = subprocess.Popen(
+        command,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        env=os.environ | {"LC_ALL": "C"},
+        start_new_session=True,
+    )
+    try:
+        said = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        raise Late from None
+    finally:
+        if process.stdout and not process.stdout.closed:  # it runs, or another that it left behind
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    return subprocess.CompletedProcess(command, process.returncode, *said)
+
+
+def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
+    """A C file, and the glue that calls `symbol` in it, as a shared library; and the compiler's warnings.
+
+    Raises:
+      ScenarioError: there is no compiler, it needs too long, or it finds an error.
+    """
+    if set('"\\\n') & set(str(source.resolve())):
+        raise ScenarioError(
+            f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
+        )
+    target, command = fresh(".so"), compiler()
+    strict = [f"-Werror={name}" for name in WRONG]
+    given = [f'-DSMC_SOURCE="{source.resolve()}"', f"-DSMC_SYMBOL={symbol}", f"-DSMC_INPUTS={INPUTS}"]
+    given += [f"-DSMC_BEYOND={BEYOND}", "-I", str(HERE)]
+    line = [*command, *FLAGS, *strict, *given, str(HERE / "glue.c"), "-o", str(target), *flags, "-lm"]
+    try:
+        done = timed(line, timeout)
+    except Late:
+        raise ScenarioError(
+            f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
+        ) from None
+    except OSError:
+        raise ScenarioError(
+            f"{source.name} cannot be compiled, as there is no C compiler {command[0]!r}: install one, or set CC"
+        ) from None
+    if done.returncode or not target.exists():
+        raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
+    return target, WARNING.findall(done.stderr)
+
+
+def undefined(source: str, symbol: str) -> str:
+    """The sentence for a law without its function."""
+    return f"{source} has no function {symbol}: define {PROTOTYPE.replace('smc_law(', symbol + '(')}"
+
+
+def _sentence(source: Path, symbol: str, command: str, said: str) -> str:
+    """What the compiler did not like first, and the cure."""
+    error, prototype = ERROR.search(said), PROTOTYPE.replace("smc_law(", symbol + "(")
+    what = error["said"] if error else ""
+    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", said):
+        return undefined(source.name, symbol)
+    if error is None or error["line"] is None:  # of the linker, or of the command
+        words = [line for line in said.splitlines() if line.strip()] or ["it says nothing"]
+        telling = [line for line in words if re.search(r"ndefined|cannot find|error:", line)] or words
+        return f"{source.name} does not compile, {command} says: {telling[0].strip()}; mend it, or give other flags="
+    if f"'{symbol}'" in what or Path(error["file"]).name == "glue.c":
+        return f"{source.name} has another {symbol} than smc_mujoco calls: it must be {prototype}"
+    where = (
+        f"line {error['line']}" if Path(error["file"]).name == source.name else f"{error['file']}, line {error['line']}"
+    )
+    return f"{source.name} does not compile: {where}, {what}; mend it"

@@ -1,0 +1,46 @@
+/* The law, whatever its smc_real, as the callback calls laws: inputs, parameters, memory, outputs, all of doubles.
+ * Compiled with the law itself, in one unit, so that a law of another type is a compiler's error. For the law's names,
+ * macros among them, there is no header of C's own here, and every name begins with smc_.
+ */
+#include SMC_SOURCE
+#include "smc_law.h"
+
+extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
+long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out);
+
+int smc_mujoco_gains = 0, smc_mujoco_memory = 0;
+/* a struct of other fields than smc_law.h's is an error here */
+typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
+
+long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
+{
+    int (*const smc_called)(const smc_measurement *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;
+    int smc_i;
+    smc_out[0] = smc_out[1] = __builtin_nan(""); /* what a law leaves out ends its run */
+    if (sizeof(smc_real) == sizeof(double)) {
+        return smc_called((const void *)smc_in, (const void *)smc_gains, (void *)smc_memory, (void *)smc_out);
+    } else {
+        enum { SMC_PLAY = 16 }; /* numbers around the law's own, to see whether it writes there */
+        const smc_real smc_guard = (smc_real)-7.25;
+        smc_real smc_g[smc_mujoco_gains + SMC_PLAY], smc_fenced[smc_mujoco_memory + 2 * SMC_PLAY];
+        smc_real smc_given[SMC_INPUTS], smc_found[2 + 2 * SMC_PLAY];
+        smc_real *const smc_m = smc_fenced + SMC_PLAY, *const smc_o = smc_found + SMC_PLAY;
+        long long smc_code;
+        for (smc_i = 0; smc_i < SMC_INPUTS; smc_i++) smc_given[smc_i] = (smc_real)smc_in[smc_i];
+        for (smc_i = 0; smc_i < smc_mujoco_gains; smc_i++) smc_g[smc_i] = (smc_real)smc_gains[smc_i];
+        for (smc_i = 0; smc_i < smc_mujoco_memory; smc_i++) smc_m[smc_i] = (smc_real)smc_memory[smc_i];
+        for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
+            smc_g[smc_mujoco_gains + smc_i] = (smc_real)smc_out[0];
+            smc_fenced[smc_i] = smc_m[smc_mujoco_memory + smc_i] = smc_found[smc_i] = smc_o[2 + smc_i] = smc_guard;
+        }
+        smc_o[0] = smc_o[1] = (smc_real)smc_out[0];
+        smc_code = smc_called((const void *)smc_given, smc_g, smc_m, smc_o);
+        for (smc_i = 0; smc_i < smc_mujoco_memory; smc_i++) smc_memory[smc_i] = (double)smc_m[smc_i];
+        smc_out[0] = (double)smc_o[0], smc_out[1] = (double)smc_o[1];
+        for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
+            if (smc_found[smc_i] != smc_guard || smc_o[2 + smc_i] != smc_guard) smc_code = SMC_BEYOND + 1;
+            if (smc_fenced[smc_i] != smc_guard || smc_m[smc_mujoco_memory + smc_i] != smc_guard) return SMC_BEYOND;
+        }
+        return smc_code;
+    }
+}

@@ -1,0 +1,407 @@
+"""Laws of one's own in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
+
+import os
+import pickle
+import re
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco import cli, plain
+from smc_mujoco.c import build
+from smc_mujoco.law import Measurement
+
+pytestmark = pytest.mark.skipif(
+    subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
+    reason="there is no C compiler here",
+)
+
+DOCS = Path(smc.__file__).parents[1] / "docs" / "c.md"
+MINE, HEADER = re.findall(r"^```c\n(.*?)^```$", DOCS.read_text(), re.MULTILINE | re.DOTALL)
+CALLED = "has another smc_law than smc_mujoco calls: it must be"
+TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+FIELDS = ("x", "v", "u", "applied", "s")
+
+
+def law(body: str, more: str = "") -> str:
+    """A C file with a law of this body."""
+    quiet = "(void)y; (void)gains; (void)memory;"
+    return f'#include "smc_law.h"\n{more}\n{TYPE}\n{{\n    {quiet}\n    out[1] = y->e;\n    {body}\n    return 0;\n}}\n'
+
+
+FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
+WAITS = law("out[0] = -y->e;", "int smc_setup(void) { volatile int on = 1; while (on) { } return 0; }")
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Write a C file, and give its path."""
+
+    def written(text: str, name: str = "my_law.c") -> Path:
+        (tmp_path / name).write_text(text)
+        return tmp_path / name
+
+    return written
+
+
+@pytest.fixture
+def call(capsys):
+    """Run the command line in this process: (exit code, stdout, stderr)."""
+
+    def called(*words: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            cli.main([str(word) for word in words])
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return called
+
+
+def scenario(law: object, plant: str = "duffing", **more: object) -> smc.Scenario:
+    common = {"duration": 0.3, "noise": smc.Noise(0.01, 0.05), "disturbance": smc.Sine(0.5, 7.0)}
+    return smc.Scenario(plant=plant, law=law, **common | more)
+
+
+def same(one: smc.Trace, other: smc.Trace) -> bool:
+    return all(np.array_equal(getattr(one, f), getattr(other, f)) for f in FIELDS)
+
+
+# the same traces
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "pendulum_network"])
+def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file, plant):
+    mine = smc.law_from_c(file(MINE))
+    fast, theirs = smc.run([scenario(law, plant) for law in (mine(lam=5.0), smc.law("observer_free", lam=5.0))])
+    assert fast.failure is None
+    assert same(fast, theirs)
+    assert same(fast, plain.run(fast.scenario))
+
+
+def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
+    mine = smc.law_from_c(file(MINE))
+    sweep = [scenario(mine(lam=lam), seed=seed, duration=0.1) for lam in (2.0, 6.0) for seed in range(4)]
+    one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)  # a PlainLoopWarning would be an error
+    assert all(same(a, b) for a, b in zip(one, two, strict=True))
+
+
+def test_memory_is_the_channel_s_own_and_zero_at_the_start(file):
+    counts = law("memory[1] += 1.0; out[0] = 0.0; out[1] = memory[1] + 1000.0 * gains[0];")
+    mine = smc.law_from_c(file(counts), gains={"k": 2.0}, memory=2, isolate=True)
+    trace = smc.run(scenario(mine(), "pendulum_network", duration=0.01))
+    assert trace.s.tolist() == [[2001.0 + k] * trace.s.shape[1] for k in range(11)]
+
+
+def test_every_number_of_the_measurement_is_where_the_header_says(file):
+    total = " + ".join(f"{i}.0 * y->{name}" for i, name in enumerate(Measurement._fields) if name != "limit")
+
+    @smc.law_function
+    def summed(y, gains, memory):
+        return (
+            0.0 * y.t + 1.0 * y.dt + 2.0 * y.x + 3.0 * y.v + 4.0 * y.e + 5.0 * y.de + 6.0 * y.r + 7.0 * y.dr
+            + 8.0 * y.ddr + 9.0 * y.f + 10.0 * y.g + 11.0 * y.a + 13.0 * y.model + 14.0 * y.surfaced + 15.0 * y.s
+            + 16.0 * y.eq + 17.0 * y.q + 18.0 * y.dq + 19.0 * y.fq + 20.0 * y.gq
+        ), y.limit  # fmt: skip
+
+    more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
+    mine = smc.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
+    theirs = smc.law_function(plants=("cart_pole",))(summed.function)
+    assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
+
+
+def test_single_precision_is_single_within_and_double_without(file):
+    single = smc.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
+    fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])
+    assert np.array_equal(fast.s, fast.s.astype(np.float32))
+    assert 0.0 < np.abs(fast.x - exact.x).max() < 1e-6
+    assert same(fast, plain.run(fast.scenario))
+
+
+def test_state_in_single_precision_is_kept(file):
+    mine = smc.law_from_c(
+        file("#define SMC_REAL float\n" + law("memory[0] += 0.1f; out[0] = 0.0f; out[1] = memory[0];"))
+    )
+    expected = np.cumsum(np.full(31, 0.1, np.float32), dtype=np.float32)
+    assert np.array_equal(smc.run(scenario(mine, duration=0.03)).s[:, 0], expected)
+
+
+# libraries, other files, other processes
+
+
+def test_a_shared_library_is_taken_as_it_is_and_anew_where_it_was_built_again(file, tmp_path):
+    target = tmp_path / "my_law.so"
+    traces = []
+    for gain in (1.0, 2.0):
+        source = file(law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("), "built.c")
+        line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+        subprocess.run(line, check=True)
+        mine = smc.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
+        traces.append(smc.run(scenario(mine, noise=None)))
+        assert same(traces[-1], plain.run(traces[-1].scenario))
+    assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
+
+
+def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
+    """The rest of the register holds what it likes."""
+    target = tmp_path / "my_law.so"
+    source = file(law("out[0] = -y->e;").replace("    return 0;", "    return (int)(((long long)gains[0] << 32));"))
+    line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    subprocess.run(line, check=True)
+    assert smc.run(scenario(smc.law_from_c(target, gains={"k": 3.0}))).failure is None
+
+
+def test_other_files_and_flags_come_along(file, tmp_path):
+    other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
+    mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
+    trace = smc.run(scenario(smc.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None))
+    assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
+
+
+def test_set_up_is_called_before_the_first_run(file):
+    text = law("out[0] = table[3];", "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }")
+    assert (smc.run(scenario(smc.law_from_c(file(text)))).u == 0.25).all()
+
+
+def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
+    mine = smc.law_from_c(file(MINE), name="squash")
+    trace = smc.load(smc.run(scenario(mine(lam=4.0))).save(tmp_path / "a.npz"))
+    assert str(trace.scenario.law) == "squash(lam=4, k1=2.5)"
+    with pytest.raises(smc.ScenarioError, match="law 'squash' came from a file without its code"):
+        smc.run(trace.scenario)
+
+
+def test_a_scenario_with_it_can_be_pickled(file):
+    first = scenario(smc.law_from_c(file(MINE))(lam=4.0))
+    again = pickle.loads(pickle.dumps(first))
+    assert again.law.gains == first.law.gains
+    assert same(*smc.run([first, again]))
+
+
+# mistakes
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
+        (law("out[0] = y->position;"), "has no member named 'position'"),
+        ('#include "nowhere.h"\n' + MINE, "does not compile: line 1, nowhere.h: No such file"),
+        ("int smc_law(double e, double de) { return e + de; }", f"{CALLED} {TYPE}"),
+        (MINE.replace("int smc_law(", "double smc_law("), f"{CALLED} {TYPE}"),
+        (HEADER.replace("smc_real gq;", ""), "has another smc_law than smc_mujoco calls"),
+        ("int my_law(void) { return 0; }", f"has no function smc_law: define {TYPE}"),
+        (law("out[0] = other(y->e);", "double other(double);"), "cannot be loaded (my_law.c: undefined symbol: other)"),
+        (law("out[0] = other(y->e);", "double other(double);\n/* -Wl,-z,defs */"), "undefined reference to `other'"),
+        (law("out[0] = other(y->e);"), "implicit declaration of function 'other'"),
+        (MINE.replace("k1=2.5", "k1"), "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers"),
+        (MINE.replace("k1=2.5", "lam=2"), "my_law.c's smc_law_gains is 'lam=6,lam=2': give lam once"),
+        (MINE + "const int smc_law_degree = 5;", "degree is 5: give a whole number from 1 to 3"),
+        (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
+        (law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"), "ended the process with exit code 7"),
+        (FALLS, "my_law.c: smc_setup died of SIGSEGV (Segmentation fault)"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
+    flags = re.findall(r"/\* (-Wl\S+) \*/", text)
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
+        smc.law_from_c(file(text), flags=flags)
+    assert "\n" not in str(error.value)
+
+
+def test_a_set_up_or_a_loading_that_never_ends_is_ended(file):
+    starts = "__attribute__((constructor)) static void start(void) { volatile int on = 1; while (on) { } }"
+    for text, words in ((WAITS, "smc_setup did not end within 0.5 s"), (law("", starts), "loading did not end")):
+        with pytest.raises(smc.ScenarioError, match=words):
+            smc.law_from_c(file(text), timeout=0.5)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);", "smc_law died of SIGSEGV (Seg"),
+        ("if (y->e > 100.0) __builtin_trap(); out[0] = 0;", "smc_law died of SIG"),
+        ("volatile int on = 1; while (on) { } out[0] = 0;", "smc_law did not end within 1 s"),
+        ("out[0] = y->e / (y->t - y->t);", "smc_law returned u = inf, s = 1.00"),
+        ("out[0] = 0.0; return 4;", "smc_law returned 4 at t = 0, e = 1"),
+        ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[9] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[100] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
+        ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the two numbers of out"),
+        ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the two numbers of out"),
+        ("out[2] = y->e; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the two numbers of out"),
+        ("out[0] = -gains[1] * y->e;", "smc_law returned u = nan"),  # it has one gain
+        ("out[0] = -gains[1] * y->e; /* of floats */", "smc_law returned u = nan"),
+        ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
+        ("static double z; out[0] = z += y->e;", "smc_law gave two answers to one measurement"),
+        ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
+        ("out[1] = 0.0;", "smc_law returned u = nan"),
+    ],
+)  # fmt: skip
+def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
+    timeout = 1.0 if "did not end" in words else 30.0
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
+        smc.law_from_c(
+            file("#define SMC_REAL float\n" * ("of floats" in body) + law(body)),
+            gains={"k": 3.0},
+            isolate=True,
+            timeout=timeout,
+        )
+    assert "\n" not in str(error.value)
+
+
+def test_the_processes_of_a_trial_that_never_ends_are_gone(file, tmp_path):
+    told = tmp_path / "pid"
+    text = (
+        '#include <stdio.h>\n#include <unistd.h>\nint smc_setup(void) { FILE *f = fopen("%s", "w"); fprintf(f, "%%d", '
+    )
+    text = (text + "(int)getpid()); fclose(f); for (;;) sleep(1); }") % told
+    with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
+        smc.law_from_c(file(law("out[0] = 0;", text)), timeout=1.0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(told.read_text()), 0)
+
+
+def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
+    told = tmp_path / "pid"
+    with pytest.raises(build.Late):
+        build.timed(["sh", "-c", f"sleep 60 & echo $! > '{told}'"], 0.3)
+    for _ in range(200):  # until whoever inherits orphans has taken note
+        state = Path(f"/proc/{told.read_text().strip()}/stat")
+        if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
+            return
+        time.sleep(0.01)
+    pytest.fail("it still runs")
+
+
+def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
+    late = smc.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
+    code = smc.law_from_c(file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine")
+    first, third = smc.run([scenario(law) for law in (late, "observer_free")])
+    second = smc.run(scenario(code))
+    assert first.failure is not None
+    assert re.match(r"law 'my_law' returned u = -?inf, s = .* in channel 0, at t = 0.101 s", first.failure)
+    assert second.failure == "law 'mine' raised ArithmeticError (smc_law returned -5) in channel 0, at t = 0.101 s"
+    assert third.failure is None
+
+
+def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
+    silent = file(law("out[0] = 0.0;").replace("    out[1] = y->e;\n", ""))
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(silent), "-o", str(tmp_path / "a.so")]
+    subprocess.run(line, check=True)
+    for source in (silent, tmp_path / "a.so"):
+        trace = smc.run(scenario(smc.law_from_c(source)))
+        assert (trace.failure or "").endswith("returned u = 0.0, s = nan in channel 0, at t = 0 s")
+
+
+def test_names_of_the_law_may_be_those_of_headers_that_it_does_not_include(file):
+    more = [
+        "static double gamma = 2.0, y0 = 3.0;",
+        "typedef struct { int a; } int64_t;",
+        "#define i g",
+        "#define g 9.81",
+    ]
+    taken = law("out[0] = y0 * gamma;", "\n".join(more))
+    assert (smc.run(scenario(smc.law_from_c(file(taken)))).u == 6.0).all()
+
+
+def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeypatch):
+    slow = tmp_path / "slowcc"
+    slow.write_text("#!/bin/sh\nsleep 60\n")
+    slow.chmod(slow.stat().st_mode | stat.S_IXUSR)
+    for compiler, words in (
+        ("nocc", "as there is no C compiler 'nocc': install one, or set CC"),
+        (str(slow), "more than 0.5 s to compile"),
+        ("cc '", 'as there is no C compiler "cc \'": install one, or set CC'),
+        ("false", "my_law.c does not compile, false says: it says nothing"),
+    ):
+        monkeypatch.setenv("CC", compiler)
+        with pytest.raises(smc.ScenarioError, match=words):
+            smc.law_from_c(file(MINE), timeout=0.5)
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "words"),
+    [
+        ("nowhere.c", {}, "there is no file nowhere.c"),
+        ("my_law.py", {}, "cannot take a law from 'my_law.py': give a .c file"),
+        (3, {}, "cannot take a law from 3"),
+        (None, {"gains": {"k2": 1.0}}, "unknown gain of my_law.c 'k2': choose from k1, lam"),
+        (None, {"gains": 3}, "gains is 3: give names"),
+        (None, {"memory": 0}, "memory is 0"),
+        (None, {"timeout": 0}, "timeout is 0"),
+        (None, {"symbol": "a b"}, "symbol is 'a b': give the name of a C function"),
+        (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
+        (None, {"flags": "-O3"}, "flags is '-O3': give several"),
+        (None, {"flags": None}, "flags is None: give several"),
+        (None, {"name": "a\nb"}, "name is 'a\\nb': give a word"),
+        (None, {"degree": 4}, "degree is 4: give a whole number from 1 to 3"),
+    ],
+)
+def test_wrong_arguments_are_one_sentence(file, source, more, words):
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)):
+        smc.law_from_c(file(MINE) if source is None else source, **more)
+
+
+def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("shutil.copy", refuse)  # nothing is forbidden to root
+    with pytest.raises(smc.ScenarioError, match=r"my_law\.so cannot be read \(Permission denied\): give one"):
+        smc.law_from_c(file("", "my_law.so"))
+
+
+def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
+    with pytest.raises(smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"):
+        smc.law_from_c(file("junk", "junk.so"))
+    source = file("#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n")
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(tmp_path / "a.so")]
+    subprocess.run(line, check=True)
+    with pytest.raises(smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"):
+        smc.law_from_c(tmp_path / "a.so")
+
+
+# the header, the documentation, the command
+
+
+def test_the_docs_show_the_header_and_a_law_that_passes(file):
+    text = build.HEADER.read_text()
+    assert text[text.index("#ifndef") :] == HEADER
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    assert smc.law_from_c(file(MINE), flags=strict, isolate=True).doc == "u = -lam tanh(s), s = de + k1 e."
+
+
+def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
+    (struct,) = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
+    assert tuple(re.findall(r"smc_real (\w+);", struct)) == Measurement._fields
+    assert len(Measurement._fields) == build.INPUTS
+
+
+def test_check_c_says_what_it_found(call, file):
+    code, out, err = call("check-c", file(MINE.replace("(void)memory;", "int unused;")), "--gains", "lam=5")
+    assert (code, err) == (0, "")
+    assert "warning: unused variable 'unused'" in out
+    assert out.splitlines()[-1] == "my_law.c: smc_law passes; gains lam = 5, k1 = 2.5; memory 8"
+    code, out, err = call("check-c", file(FALLS))
+    assert (code, out) == (2, "")
+    assert err.startswith("smc-mujoco: my_law.c: smc_setup died of SIGSEGV")
+    assert len(err.splitlines()) == 1
+
+
+def test_nothing_is_left_behind(file):
+    code = f"import smc_mujoco as smc; smc.law_from_c({str(file(MINE))!r})\n"
+    code += "from smc_mujoco.c import build; print(build.folder())"
+    root = str(Path(smc.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": root}, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip()
+    assert not Path(done.stdout.strip()).exists()
