@@ -88,6 +88,31 @@ def test_a_scene_runs_from_the_wheel_in_any_folder(binaries, tmp_path):
     assert any(path.is_file() for path in out.rglob("*"))
 
 
+LAWS = """
+import pytest
+import smc_mujoco as smc
+@pytest.mark.parametrize("phi", [0.3, 2.0])
+def test_my_law_settles(step_response, phi):
+    r = step_response("inverted_pendulum", smc.law("boundary_layer", k=6, c=8, phi=phi), step=0.2, duration=2.0)
+    assert r.settling_time < 0.6 and r.overshoot < 20
+"""
+
+
+def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(binaries, tmp_path):
+    (tmp_path / "test_law.py").write_text(LAWS)
+    plain = {name: "" for name in CLEAN if name.startswith("PYTEST_")}
+    options = ("-p", "no:cacheprovider", "-W", "error", "--smc-out=failed", "--strict-markers")
+    done = run(binaries / "python", "-m", "pytest", *options, cwd=tmp_path, **plain)
+    assert done.returncode == 1, done.stderr
+    assert "1 failed, 1 passed" in done.stdout
+    assert "FAILED test_law.py::test_my_law_settles[2.0] - assert (inf < 0.6" in done.stdout
+    assert "inverted_pendulum under boundary_layer(k=6, c=8, phi=2), step 0.2 rad" in done.stdout
+    assert re.findall(r"^(\S+) .*  (< \S+) +(\w+)$", done.stdout, re.MULTILINE) == [("settling_time", "< 0.6", "NO")]
+    (figure,) = re.findall(r"^figure: (.*)$", done.stdout, re.MULTILINE)
+    assert Path(figure).parent == tmp_path / "failed"
+    assert Path(figure).stat().st_size > 1000
+
+
 @pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock"])
 def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
     text = (ROOT / name).read_text()

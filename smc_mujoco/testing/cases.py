@@ -1,0 +1,48 @@
+"""The marker's cases: plants and conditions of the study as arguments of a test."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from smc_mujoco import paper
+from smc_mujoco.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.plant import catalogue as plants
+
+EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
+
+
+def cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
+    """Argument of a test, `plant` or `condition` -> the names that it takes in turn.
+
+    Args:
+      given, named: the marker's arguments by position and by name. Without plants: every plant of the study; without
+        conditions: nominal.
+      arguments: names of the test's arguments.
+
+    Raises:
+      ScenarioError: a plant or condition that is not there, or an argument that the test does not take.
+    """
+    if given:
+        raise ScenarioError(f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}")
+    for name in named:
+        if name not in ("plants", "conditions"):
+            raise unknown("argument of marker smc", name, ("plants", "conditions"))
+    wanted = {
+        "plant": _names("plant", named.get("plants", list(paper.GAINS)), plants()),
+        "condition": _names("condition", named.get("conditions", ["nominal"]), paper.CONDITIONS),
+    }
+    for argument, plural in (("plant", "plants"), ("condition", "conditions")):
+        if argument not in arguments and plural in named:
+            raise ScenarioError(f"marker smc gives {plural} and the test takes no {argument}: add the argument")
+    taken = {argument: names for argument, names in wanted.items() if argument in arguments}
+    if not taken:
+        raise ScenarioError("marker smc is on a test that takes neither plant nor condition: add the arguments")
+    return taken
+
+
+def _names(kind: str, value: object, known: Mapping[str, object]) -> list[str]:
+    """Names that are known, from one or several."""
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list | tuple) or not names:
+        raise ScenarioError(f"{kind}s of marker smc is {shown(value)}: give names, as in {EXAMPLE}")
+    for name in names:
+        find(kind, name, known)
+    return list(names)

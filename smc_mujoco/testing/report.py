@@ -1,0 +1,52 @@
+"""What a failing test reports of its step responses: a table of metrics, a figure, and a film where one is wanted."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from smc_mujoco import gl
+from smc_mujoco.scene import slug
+from smc_mujoco.testing.response import StepResponse
+from smc_mujoco.trace import Trace
+
+LONGEST = 150  # characters of a file's name, which most file systems bound at 255
+
+
+def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
+    """Tables of all responses, then the files that show them: one figure and one film for each plant.
+
+    Args:
+      test: its node id, of which the files' names are made.
+      folder: where the files go; it is made.
+    """
+    parts = [f"{response}\n{response.table()}" for response in responses]
+    plants: dict[str, list[Trace]] = {}
+    for response in responses:
+        plants.setdefault(response.scenario.plant.name, []).append(response.trace)
+    files = []
+    for plant, traces in plants.items():
+        name = slug(test)[-LONGEST:].lstrip("_") + (f"-{plant}" if len(plants) > 1 else "")
+        title = test.rpartition("::")[2]
+        files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
+        if video:
+            files.append(gl.missing() or _shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
+    return "\n\n".join([*parts, "\n".join(dict.fromkeys(files))])
+
+
+def _shown(what: str, make: Callable[[], Path]) -> str:
+    """A line with the file that `make` wrote, or with why there is none."""
+    try:
+        return f"{what}: {make()}"
+    except Exception as error:  # a picture must not hide why the test failed
+        return f"no {what}: {error}"
+
+
+def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
+    from smc_mujoco.draw.figure import figure
+
+    return next(file for file in figure(traces, path, title=title) if file.suffix == ".png")
+
+
+def _film(traces: Sequence[Trace], path: Path) -> Path:
+    from smc_mujoco.draw.video import film
+
+    return film(traces, path)

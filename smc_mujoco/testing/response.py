@@ -1,0 +1,176 @@
+"""A step response: a run from rest to a step of the reference, with every metric as an attribute."""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+
+from smc_mujoco import paper
+from smc_mujoco.component import Component, Template
+from smc_mujoco.errors import ScenarioError, find, number, shown, unknown
+from smc_mujoco.measure import CATALOGUE
+from smc_mujoco.metrics import score
+from smc_mujoco.plant import Plant
+from smc_mujoco.run import run
+from smc_mujoco.scenario import Scenario
+from smc_mujoco.signals import Step
+from smc_mujoco.testing.limits import Limit, Value, answer, bound, table, told
+from smc_mujoco.testing.sentence import mendable
+from smc_mujoco.trace import Trace
+
+TOLD = ("settling_time", "overshoot", "tv_rate")  # of the metrics, in one line
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StepResponse:
+    """What a law made of a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
+
+    A run that failed has no metrics: to ask for one is a ScenarioError that says when and why it failed.
+
+    Attributes:
+      trace: the Trace of the run; `scenario` is its Scenario, `failure` what went wrong in it, or None.
+      step: height of the step, rad or m.
+      condition: of the study, in which it was run.
+      limits: what the test has asked of the metrics so far.
+    """
+
+    trace: Trace
+    step: float
+    condition: str = "nominal"
+    limits: list[Limit] = dataclasses.field(default_factory=list)
+
+    @property
+    def scenario(self) -> Scenario:
+        """All that defines the run."""
+        return self.trace.scenario
+
+    @property
+    def failure(self) -> str | None:
+        """Why the run ended early, in a sentence, or None."""
+        return self.trace.failure
+
+    @functools.cached_property
+    def metrics(self) -> Mapping[str, float]:
+        """Every metric by name.
+
+        Raises:
+          ScenarioError: the run failed.
+        """
+        return {name: Value(value, name, self.limits) for name, value in score(self.trace).items()}
+
+    @mendable
+    def __getattr__(self, name: str) -> float:
+        __tracebackhide__ = True  # of the AttributeError
+        if name.startswith("_") or name == "trace":  # what copying and inspecting ask for
+            raise AttributeError(name)
+        if name in CATALOGUE and name in self.metrics:
+            return self.metrics[name]
+        raise AttributeError(str(self._unknown(name)))
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *CATALOGUE})
+
+    def __str__(self) -> str:
+        plant, where = self.scenario.plant, "" if self.condition == "nominal" else f", {self.condition}"
+        return f"{plant.name} under {self.scenario.law}, step {self.step:g} {plant.unit}{where}"
+
+    def __repr__(self) -> str:
+        how = f"failed, {self.failure}"
+        if self.failure is None:
+            how = ", ".join(f"{name} {self._told(name)}" for name in TOLD)
+        return f"StepResponse({self}: {how})"
+
+    def unit(self, name: str) -> str:
+        """The unit of a metric."""
+        return CATALOGUE[name].unit_for(self.scenario.plant.unit)
+
+    def _told(self, name: str) -> str:
+        return told(self.metrics[name], self.unit(name))
+
+    def _unknown(self, name: str) -> ScenarioError:
+        if name in CATALOGUE:
+            return ScenarioError(f"{name} compares channels and {self.scenario.plant.name} has one: give n >= 2")
+        return unknown("metric", name, CATALOGUE)
+
+    def tells(self, name: str) -> bool:
+        """Whether a metric says something of this run: some are of realistic mechanisms alone."""
+        return self.scenario.realistic or not CATALOGUE[name].realistic
+
+    def named(self, names: Mapping[str, object]) -> None:
+        """Raise ScenarioError for names that are no metrics of this run."""
+        for name in names:
+            if name not in CATALOGUE or (CATALOGUE[name].network and self.trace.x.shape[1] < 2):
+                raise self._unknown(name)
+
+    @mendable
+    def check(self, **limits: float | tuple[float, float]) -> None:
+        """Assert limits on metrics, all of them: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
+
+        Args:
+          limits: metric -> the most that it may be, or (least, most), in the metric's unit.
+
+        Raises:
+          AssertionError: a limit is missed, or the run failed; the message is a table of all the limits.
+          ScenarioError: no such metric, or no such limit.
+        """
+        __tracebackhide__ = True
+        if not limits:
+            raise ScenarioError("check has no limits: give metrics with the most they may be, as settling_time=0.6")
+        self.named(limits)
+        if self.failure is not None:
+            raise AssertionError(f"{self}: {self.failure}")
+        asked = [bound(name, float(self.metrics[name]), wanted) for name, wanted in limits.items()]
+        self.limits.extend(asked)
+        missed = [limit for limit in asked if not limit.kept]
+        if missed:
+            words = "; ".join(f"{name} is {self._told(name)}, not {words}" for name, words, _ in missed)
+            raise AssertionError(f"{words} ({self})\n{self.table(list(limits))}")
+
+    def table(self, names: list[str] | None = None) -> str:
+        """Metric, value, limit and whether it is kept; of all metrics that say something of this run, or of those."""
+        if self.failure is not None:
+            return f"failed: {self.failure}"
+        asked = {limit.metric for limit in self.limits}
+        listed = names or [name for name in self.metrics if name in asked or self.tells(name)]
+        rows = []
+        for name in listed:
+            of = list(dict.fromkeys(limit for limit in self.limits if limit.metric == name))
+            kept = answer(all(limit.kept for limit in of)) if of else ""
+            rows.append((name, self._told(name), ", ".join(limit.words for limit in of), kept))
+        return table(("metric", "value", "limit", "ok"), rows)
+
+
+def respond(
+    plant: Plant | str,
+    law: Component | Template | str,
+    step: float,
+    condition: str = "nominal",
+    fields: Mapping[str, object] | None = None,
+) -> StepResponse:
+    """Run a law from rest at 0 to a step of the reference at t = 0.
+
+    Args:
+      step: its height, rad or m.
+      condition: one of the study's, in `smc.paper.CONDITIONS`.
+      fields: Scenario field -> value, over those of the condition; x0 may be among them.
+
+    Raises:
+      ScenarioError: anything out of its range, in one sentence.
+    """
+    given = dict(fields or {})
+    for name in given:
+        if name not in paper.FIELDS:
+            raise unknown("field of a Scenario", name, paper.FIELDS)
+    if "reference" in given:
+        raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, for it is the step of {step}")
+    if isinstance(law, Callable) and not isinstance(law, Template):
+        raise ScenarioError(f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function")
+    height = number("step", step)
+    if height == 0.0:
+        raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
+    of_study = find("condition of the paper's study", condition, paper.CONDITIONS)
+    if callable(of_study):
+        name = plant.name if isinstance(plant, Plant) else plant
+        find("plant of the paper's study", name, paper.GAINS)
+        of_study = of_study(str(name))
+    whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
+    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=condition)
