@@ -168,7 +168,11 @@ def tune(
             from rich.console import Console
 
             from smc_mujoco import tuned, tuning
+            from smc_mujoco.files import writable
 
+        for file in (out, front):
+            if file:
+                writable(file)
         path, clock, console = out and tuned.checked(out), Clock(), Console()
         with clock("tuning"):
             found = tuning.tune(plant, law, budget, seed, objective, threads, progress=True)

@@ -17,6 +17,20 @@ def ended(path: str | os.PathLike, ending: str) -> Path:
     return path
 
 
+def writable(path: str | os.PathLike) -> None:
+    """Raise ScenarioError for a file that cannot be written, before minutes go by."""
+    path = Path(path)
+    if path.is_dir():
+        raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        why = error.strerror or error
+        raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside `path`, with its ending, that takes its place when the block ends well, else goes away.

@@ -103,7 +103,9 @@ def fields(condition: str, plant: str, duration: float = DURATION) -> dict[str, 
     found = find("condition of the paper's study", condition, CONDITIONS)
     if not callable(found):
         return found
-    find(f"plant of the paper's study, which {condition!r} is for,", plant, GAINS)
+    if plant not in GAINS:
+        cure = f"choose another condition, or a plant of the study: {', '.join(PLANTS)}"
+        raise ScenarioError(f"condition {condition!r} has no numbers for plant {plant!r}: {cure}")
     return found(plant, duration / 2)
 
 

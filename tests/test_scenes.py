@@ -304,6 +304,7 @@ def test_the_jump_scene_jumps_mildly_and_hard_at_half_time():
 def test_what_happens_once_happens_at_half_time(plant):
     for duration in (10.0, 4.0):
         jumping = smc.paper.scenario(plant, "observer_free", "jump_mild", duration=duration)
+        assert jumping.jump is not None
         assert jumping.jump.time == duration / 2
         for condition in ("step", "pulse", "contact"):
             (signal,) = smc.paper.scenario(plant, "observer_free", condition, duration=duration).disturbance

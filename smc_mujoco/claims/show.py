@@ -14,7 +14,6 @@ from rich.text import Text
 from smc_mujoco import __version__
 from smc_mujoco.claims.checks import Check
 from smc_mujoco.claims.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, VERDICTS, Claim
-from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 
 # Told by shape as well as by colour, of a palette for the colour-blind.
@@ -113,13 +112,6 @@ def _mark(verdict: str) -> Text:
 def document(claims: Sequence[Claim]) -> str:
     """The claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
     return json.dumps({"smc_mujoco": __version__, "claims": [claim.plain() for claim in claims]}, indent=1)
-
-
-def writable(path: Path) -> None:
-    """Refuse a file that cannot be written before minutes go by: a folder of that name, or one that cannot be made."""
-    if path.is_dir():
-        raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
-    path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def write(text: str, path: Path) -> None:

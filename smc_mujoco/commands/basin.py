@@ -33,13 +33,14 @@ def basin(
             from smc_mujoco.basin import basin as search
             from smc_mujoco.commands.bar import bar
             from smc_mujoco.draw import region
-            from smc_mujoco.files import ended
+            from smc_mujoco.files import ended, writable
 
         clock, console = Clock(), Console()
         if out:
             region.checked(out)
+            writable(out)
         if json:
-            ended(json, ".json")
+            writable(ended(json, ".json"))
         with clock("in all"), bar(f"{law} on {plant}") as report:
             found = search(plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=report)
         counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]

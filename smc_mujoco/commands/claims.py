@@ -35,13 +35,14 @@ def claims(
             from rich.console import Console
 
             from smc_mujoco.claims import audit, show
+            from smc_mujoco.files import writable
             from smc_mujoco.table import Table
 
         clock, console = Clock(), Console()
         names = None if gains is None else [name.strip() for name in gains.split(",") if name.strip()]
         known = None if table is None else Table.read(table)
         if out:
-            show.writable(out)
+            writable(out)
         with clock("in all"):
             found = audit.watched(known, ids or None, names, quick, threads)
         text = show.document(found)

@@ -47,13 +47,13 @@ def margins(
             from smc_mujoco import gains as sets
             from smc_mujoco import paper
             from smc_mujoco.commands.bar import bar
-            from smc_mujoco.files import ended
+            from smc_mujoco.files import ended, writable
             from smc_mujoco.margins import KINDS, save
             from smc_mujoco.margins import margins as search
 
         clock, console = Clock(), Console()
         if json:
-            ended(json, ".json")
+            writable(ended(json, ".json"))
         chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
         names = _names(laws) or (paper.LAWS if quick else sets.LAWS)
         kind = _names(kinds) or (QUICK["kinds"] if quick else KINDS)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from smc_mujoco import paper
 from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, find, number, shown, unknown
+from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.measure import CATALOGUE
 from smc_mujoco.metrics import score
 from smc_mujoco.plant import Plant
@@ -167,10 +167,7 @@ def respond(
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
-    of_study = find("condition of the paper's study", condition, paper.CONDITIONS)
-    if callable(of_study):
-        name = plant.name if isinstance(plant, Plant) else plant
-        find("plant of the paper's study", name, paper.GAINS)
-        of_study = of_study(str(name))
+    name = plant.name if isinstance(plant, Plant) else plant
+    of_study = paper.fields(condition, str(name), number("duration", given.get("duration", paper.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
     return StepResponse(trace=run(Scenario(**whole)), step=height, condition=condition)
