@@ -39,6 +39,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/realistic.py
 	$(BIN)/python benchmarks/laws.py
 	$(BIN)/python benchmarks/study.py --quick
+	$(BIN)/python benchmarks/agents.py --quick
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

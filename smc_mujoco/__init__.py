@@ -14,13 +14,14 @@ import sys
 import types
 from typing import TYPE_CHECKING
 
-from smc_mujoco import gl
+from smc_mujoco import gl, registration
 
 if TYPE_CHECKING:
     from smc_mujoco import paper as paper
     from smc_mujoco.actuators import DCMotor as DCMotor
     from smc_mujoco.actuators import Lag as Lag
     from smc_mujoco.actuators import RateLimit as RateLimit
+    from smc_mujoco.agents import agent as agent
     from smc_mujoco.backlash import Backlash as Backlash
     from smc_mujoco.basin import basin as basin
     from smc_mujoco.c.export import law_to_c as law_to_c
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from smc_mujoco.plant import Plant as Plant
     from smc_mujoco.plant import plant as plant
     from smc_mujoco.plant import plants as plants
+    from smc_mujoco.policies import policy as policy
     from smc_mujoco.references import MinimumJerk as MinimumJerk
     from smc_mujoco.references import Ramp as Ramp
     from smc_mujoco.report import report as report
@@ -90,6 +92,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "actuators": ("DCMotor", "Lag", "RateLimit"),
+    "agents": ("agent",),
     "backlash": ("Backlash",),
     "basin": ("basin",),
     "c.export": ("law_to_c",),
@@ -112,6 +115,7 @@ _HOMES = {
     "metrics": ("score",),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),
+    "policies": ("policy",),
     "references": ("MinimumJerk", "Ramp"),
     "report": ("report",),
     "run": ("PlainLoopWarning", "run", "stream"),
@@ -154,3 +158,6 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*_HOME, "__doc__", "__version__"})
+
+
+registration.attend()  # gymnasium.make("smc_mujoco:Duffing-v0") imports this package, and expects it to be known then

@@ -62,6 +62,8 @@ def test_there_is_something_to_test():
 def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, block, tmp_path, monkeypatch):
     if "smc.still" in block and gl.missing():
         pytest.skip(gl.missing())
+    if "import gymnasium" in block:
+        pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(sys, "path", sys.path[:])

@@ -1,0 +1,110 @@
+"""Plants as gymnasium environments.
+
+    environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
+
+An observation is positions and velocities, and for `track` r, r', r'', one after another; an action is the command of
+the driven channels, in parts of u_max. An episode is truncated at the scenario's duration, and terminated where the
+plant leaves the finite world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium import spaces
+
+from smc_mujoco import registration
+from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.harness import WORLD
+from smc_mujoco.plant import Plant
+from smc_mujoco.setting import Setting, setting
+
+registration.register()  # for who imports this module alone
+
+
+def action_space(found: Setting) -> spaces.Box:
+    """Commands of the driven channels, in parts of u_max."""
+    return spaces.Box(-1.0, 1.0, found.shape, np.float64)
+
+
+def observation_space(found: Setting) -> spaces.Box:
+    """The finite world."""
+    return spaces.Box(-WORLD, WORLD, (found.size,), np.float64)
+
+
+def bounded(observation: np.ndarray) -> np.ndarray:
+    """An observation from outside the finite world as one of the space: the last of its episode."""
+    return np.clip(np.nan_to_num(observation, nan=WORLD, posinf=WORLD, neginf=-WORLD), -WORLD, WORLD)
+
+
+class PlantEnv(gymnasium.Env):
+    """One plant with a task.
+
+    Attributes:
+      setting: the plant with its task.
+      data: the simulation's state.
+      sample: control samples since the episode began.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
+
+    def __init__(
+        self,
+        plant: Plant | str,
+        task: str = "regulate",
+        changes: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
+    ):
+        """Arguments as of `setting.setting`; `reset` takes options x0 and v0.
+
+        Raises:
+          ScenarioError: what `setting` raises, or another render_mode.
+        """
+        if render_mode not in (None, "rgb_array"):
+            raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
+        self.setting, self.render_mode, self.sample = setting(plant, task, changes), render_mode, 0
+        self.metadata = self.metadata | {"render_fps": round(1.0 / self.setting.scenario.control_period)}
+        self.data = mujoco.MjData(self.setting.model)
+        self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
+        self.renderer: mujoco.Renderer | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Draw a start, or take it from options x0 and v0; the observation, and no more to tell."""
+        super().reset(seed=seed)
+        x, v = self.setting.draw(self.np_random, options)
+        mujoco.mj_resetData(self.setting.model, self.data)
+        self.setting.place(self.data.qpos, self.data.qvel, x, v)
+        self.sample = 0
+        return self.setting.observe(x, v, 0), {}
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """One control period under an action: observation, reward, terminated, truncated, and no more to tell."""
+        found, data = self.setting, self.data
+        data.ctrl[found.ctrl] = found.command(action)
+        mujoco.mj_step(found.model, data, found.scenario.steps)
+        self.sample += 1
+        x, v = data.qpos[found.qpos], data.qvel[found.qvel]
+        observation, truncated = found.observe(x, v, self.sample), self.sample >= found.scenario.samples
+        if found.lost(x, v):
+            return bounded(observation), 0.0, True, truncated, {}
+        return observation, float(found.reward(x, v, self.sample)), False, truncated, {}
+
+    def render(self) -> np.ndarray | None:
+        """What the plant's own camera sees, (height, width, 3), with render_mode "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        if self.renderer is None:
+            self.renderer = mujoco.Renderer(self.setting.model)
+        mujoco.mj_forward(self.setting.model, self.data)
+        self.renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
+        return self.renderer.render()
+
+    def close(self) -> None:
+        """Give the renderer back."""
+        if self.renderer is not None:
+            self.renderer.close()
+            self.renderer = None

@@ -1,0 +1,149 @@
+"""Tasks for agents: what is asked of a plant, where episodes start, and what is rewarded.
+
+    reward = T(rms(e)) (4 + T(rms(w) / 5)) / 5,    T(a) = 10^(-a^2)
+
+in [0, 1], rms over the channels. T is dm_control's tolerance about 0 with margin 1 (Tassa et al., DeepMind Control
+Suite, 2018), and the form is its cart-pole's; the margins, 1 (rad or m) for e and 5 (per second) for w, are chosen.
+
+    task          e                                          w                  an episode starts with |x| up to
+    regulate      x                                          x'                 the plant's x0
+    track         x - r in driven channels, x in others      x' - r', x'        the plant's x0
+    swing_up      1 - cos x of toppling hinges, x of others  x'                 hanging within 0.1 rad, 0 in others
+    synchronise   x - the channels' mean                     x' - its mean      the largest of the plant's x0
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.callback import uninstalled
+from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.part import joint_ids
+from smc_mujoco.plant import Plant, Values
+from smc_mujoco.plant import plant as find_plant
+from smc_mujoco.signals import Sine
+
+LN10 = math.log(10.0)
+CALM = 5.0  # rad/s or m/s, the margin of w: chosen
+ASIDE = 0.1  # rad, how far from hanging a swing-up begins: chosen
+WEAK = 0.5  # u_max of a swing-up, in torques that hold the pendulum level: chosen, so that one push is not enough
+WAY = Sine(amplitude=0.5, omega=1.0)  # rad or m, what `track` follows unless told: chosen
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Task:
+    """What an agent is to do.
+
+    Attributes:
+      fits: whether a plant has this task.
+      spread: plant -> the lowest and the highest start of its channels, (n,) each.
+      errors: (x, v, r, which) -> e and w; x and v are (..., n), r the reference and its derivatives, (..., 3).
+      which: plant -> the channels that the task singles out, (n,) of bool.
+      fields: plant -> Scenario fields that it sets unless told.
+      moving: whether it follows a reference, which is then part of the observation.
+    """
+
+    fits: Callable[[Plant], bool]
+    spread: Callable[[Plant], Pair]
+    errors: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Pair]
+    which: Callable[[Plant], np.ndarray] = lambda plant: np.ones(plant.n, bool)
+    fields: Callable[[Plant], dict[str, Any]] = lambda plant: {}
+    moving: bool = False
+
+
+def reward(e: np.ndarray, w: np.ndarray) -> Any:
+    """The reward for errors e and w, (..., n) each."""
+    rate = -LN10 / e.shape[-1]
+    return np.exp(rate * np.vecdot(e, e)) * (0.8 + 0.2 * np.exp(rate / CALM**2 * np.vecdot(w, w)))
+
+
+def tasks(plant: Plant | str) -> list[str]:
+    """Names of the tasks that a plant has."""
+    kind = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(kind, Plant):
+        raise ScenarioError(f"plant is {shown(plant)}: give smc.plant(...) or one of the names smc.plants() lists")
+    return [name for name, task in TASKS.items() if task.fits(kind)]
+
+
+@functools.lru_cache(maxsize=64)
+def toppling(plant: Plant) -> np.ndarray:
+    """Which channels fall further when they lean: hinges for which x = 0 is unstable, (n,) of bool."""
+    with uninstalled():
+        model = plant.load()
+    hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
+    lean = 0.1 * hinged
+    f = [plant.nominal(lean, 0.0 * lean, i, Values(**plant.parameters))[0] for i in range(plant.n)]
+    return hinged & (np.array(f) > 0.0)
+
+
+def driven(plant: Plant) -> np.ndarray:
+    """Which channels have an actuator, (n,) of bool."""
+    return np.arange(plant.n) < plant.driven
+
+
+def _within_start(plant: Plant) -> Pair:
+    most = np.abs(plant.x0)
+    return -most, most
+
+
+def _hanging(plant: Plant) -> Pair:
+    down = toppling(plant)
+    return (math.pi - ASIDE) * down, (math.pi + ASIDE) * down
+
+
+def _apart(plant: Plant) -> Pair:
+    most = np.full(plant.n, max(np.abs(plant.x0)))
+    return -most, most
+
+
+def _weak(plant: Plant) -> dict[str, Any]:
+    """Torques too weak to push the pendulums up at once; a cart keeps its force, its pole has none to be weak."""
+    if plant.free:
+        return {}
+    level, p = np.full(plant.n, math.pi / 2), Values(**plant.parameters)
+    f, g = plant.nominal(level, 0.0 * level, 0, p)
+    return {"u_max": WEAK * abs(f / g)}
+
+
+def _regulate(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+    return x, v
+
+
+def _track(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+    return x - r[..., :1] * which, v - r[..., 1:2] * which
+
+
+def _swing_up(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+    return np.where(which, 1.0 - np.cos(x), x), v
+
+
+def _synchronise(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+    return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
+
+
+TASKS = {
+    "regulate": Task(fits=lambda plant: True, spread=_within_start, errors=_regulate),
+    "track": Task(
+        fits=lambda plant: True,
+        spread=_within_start,
+        errors=_track,
+        which=driven,
+        fields=lambda plant: {"reference": WAY},
+        moving=True,
+    ),
+    "swing_up": Task(
+        fits=lambda plant: bool(toppling(plant).any()),
+        spread=_hanging,
+        errors=_swing_up,
+        which=toppling,
+        fields=_weak,
+    ),
+    "synchronise": Task(fits=lambda plant: plant.network, spread=_apart, errors=_synchronise),
+}
