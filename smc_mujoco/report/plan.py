@@ -33,7 +33,7 @@ class Plan:
     plants: tuple[str, ...] = paper.PLANTS
     laws: tuple[str, ...] = gains.LAWS
     conditions: tuple[str, ...] = tuple(GRID.conditions)
-    seeds: int = GRID.seeds
+    seeds: int = 12  # chosen: enough to tell laws apart, and 20 minutes are enough for all
     duration: float = paper.DURATION
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
     basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol")
