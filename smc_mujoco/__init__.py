@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from smc_mujoco.margins import margins as margins
     from smc_mujoco.mechanism import deviation as deviation
     from smc_mujoco.metrics import score as score
+    from smc_mujoco.own_model import Channel as Channel
+    from smc_mujoco.own_model import plant_from as plant_from
     from smc_mujoco.plant import Plant as Plant
     from smc_mujoco.plant import plant as plant
     from smc_mujoco.plant import plants as plants
@@ -113,6 +115,7 @@ _HOMES = {
     "margins": ("margins",),
     "mechanism": ("deviation",),
     "metrics": ("score",),
+    "own_model": ("Channel", "plant_from"),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),
     "policies": ("policy",),

@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco import sensors
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.frozen import frozen
-from smc_mujoco.part import ROTOR, Part, joint_ids
+from smc_mujoco.part import ROTOR, START, Part, joint_ids
 from smc_mujoco.plant import Field, array, ready
 from smc_mujoco.scenario import Scenario
 
@@ -84,6 +84,8 @@ def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """qpos and qvel at t = 0: every channel at x0 and v0, its rotor with it, the rest where the model has it."""
     qpos, qvel = compiled.qpos0.copy(), np.zeros(compiled.nv)
+    if (key := mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)) >= 0:
+        qpos, qvel = compiled.key_qpos[key].copy(), compiled.key_qvel[key].copy()
     for joint, x, v in zip(joint_ids(compiled), scenario.x0, scenario.v0, strict=True):
         rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):

@@ -50,7 +50,7 @@ def mark() -> float:
 def harness():
     """The compiled callback void(const mjModel*, mjData*), from numba's cache on disk where there is one."""
     at, ours = layout.offsets(), mark()
-    nuserdata, qpos, qvel, ctrl, xfrc, userdata, sensors, tips, anchors, actuators, constraints = at
+    nuserdata, qpos, qvel, ctrl, applied, xfrc, userdata, sensors, tips, anchors, actuators, constraints = at
 
     def control(model, data):
         if integers(model + nuserdata)[0] < HEADER:
@@ -71,6 +71,7 @@ def harness():
             carray(pointer(integers(data + anchors)[0]), (1 << 40,)),
             carray(pointer(integers(data + actuators)[0]), (1 << 40,)),
             carray(pointer(integers(data + constraints)[0]), (1 << 40,)),
+            carray(pointer(integers(data + applied)[0]), (1 << 40,)),
         )
 
     return _compiled(types.void(types.intp, types.intp), control)

@@ -5,27 +5,29 @@ import numpy as np
 
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.part import PASSIVE, drive_ids, joint_ids
+from smc_mujoco.plant import DIRECTLY
 
 # Columns of the channel table: addresses into qpos, qvel, sensordata (twice), ctrl and actuator_force; address into
 # xfrc_applied of a generalised force d and the sign with which it enters there; the same of a horizontal force on the
 # body, the components of xipos and xanchor between which its lever arm lies (-1 for a slide), and the address into
-# actuator_force of a friction (-1 without one). CTRL and FORCE are -1 where the channel has no actuator.
-QPOS, QVEL, X_SENSOR, V_SENSOR, CTRL, FORCE, XFRC, SIGN, PUSH, PUSH_SIGN, TIP, ANCHOR, FRICTION = range(13)
-COLUMNS = 13
+# actuator_force of a friction (-1 without one); and where disturbances act on the joint itself, as in own models, the
+# address into qfrc_applied (else -1). CTRL and FORCE are -1 where the channel has no actuator.
+QPOS, QVEL, X_SENSOR, V_SENSOR, CTRL, FORCE, XFRC, SIGN, PUSH, PUSH_SIGN, TIP, ANCHOR, FRICTION, DIRECT = range(14)
+COLUMNS = 14
 _SENSORS = {X_SENSOR: mujoco.mjtSensor.mjSENS_JOINTPOS, V_SENSOR: mujoco.mjtSensor.mjSENS_JOINTVEL}
 # Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis.
 _LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
-    """The channel table, (n, 13) int64: a row per actuator that takes commands, then one per joint only measured.
+    """The channel table, (n, 14) int64: a row per actuator that takes commands, then one per joint only measured.
 
     A disturbance d acts on the body that carries the joint, as a force along a slide's axis or a torque about a
     hinge's, so that its generalised force is d; a horizontal one acts on its centre of mass.
 
     Raises:
       ScenarioError: an actuator that drives no hinge or slide with gear 1, that lacks a position or velocity sensor, or
-        whose joint's axis lies along no world axis.
+        whose joint's axis lies along no world axis, which own models alone may have.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -44,7 +46,8 @@ def _row(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> 
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         raise ScenarioError(f"{name} is on no hinge or slide joint: give it one")
-    axis = data.xaxis[joint].round(12)
+    direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECTLY) >= 0
+    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # direct ones take any
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))
@@ -58,6 +61,7 @@ def _row(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> 
         direction, arm, sign = _LEVERS[component]
         row[PUSH], row[PUSH_SIGN] = 6 * body + direction, sign * row[SIGN]
         row[TIP], row[ANCHOR] = 3 * body + arm, 3 * joint + arm
+    row[DIRECT] = model.jnt_dofadr[joint] if direct else -1
     friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
     row[FRICTION] = -1 if friction < 0 else model.actuator_outadr[friction]
     for column, kind in _SENSORS.items():

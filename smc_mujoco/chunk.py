@@ -9,7 +9,7 @@ import numpy as np
 from smc_mujoco import assembly, callback, harness, native, plain, row, sensors
 from smc_mujoco.channels import COLUMNS, channels
 from smc_mujoco.component import Component
-from smc_mujoco.plant import array
+from smc_mujoco.plant import Coupled, Plant, array
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
@@ -20,6 +20,7 @@ with callback.uninstalled():  # this import compiles a model
 
 PERFECT = Encoder(counts=math.inf)
 SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
+FOREIGN_STEPS = 200  # of an own model: with its contacts MuJoCo takes 0.1 s and more a step once it has diverged
 FULL = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 OVERFLOWED = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 
@@ -32,16 +33,13 @@ def contents(scenario: Scenario) -> row.Contents:
     Raises:
       NotCompilable: the law, the estimator, a signal or the plant's nominal model is not for numba.
     """
-    nominal = scenario.plant.parameters
     sensor = scenario.sensor or PERFECT
     return row.Contents(
         law=_component(scenario.law),
         model=scenario.model == "nominal",
         surface=scenario.surface and _component(scenario.surface),
         estimator=_component(scenario.velocity),
-        nominal=row.Part(
-            address=native.nominal(scenario.plant.nominal, tuple(nominal)).address, values=tuple(nominal.values())
-        ),
+        nominal=_nominal(scenario.plant),
         reference=_signal(scenario.reference),
         disturbances=[_signal(d, scenario.stream(i)) for i, d in enumerate(scenario.disturbance)],
         n=scenario.plant.n,
@@ -71,9 +69,9 @@ class Chunk:
         self.scenarios = scenarios
         self.logs = [np.empty((row.LOGS, first.samples + 1, first.plant.n)) for _ in scenarios]
         self.table = np.empty((first.plant.n, COLUMNS), np.int64)
+        self.contents = [contents(scenario) for scenario in scenarios]  # whose addresses the rows hold
         rows = [
-            row.pack(contents(scenario), callback.mark(), self.table, log)
-            for scenario, log in zip(scenarios, self.logs, strict=True)
+            row.pack(said, callback.mark(), self.table, log) for said, log in zip(self.contents, self.logs, strict=True)
         ]
         self.compiled = assembly.model(scenarios, nuserdata=max(map(len, rows)))
         self.model = assembly.numbered(self.compiled, first)
@@ -134,7 +132,8 @@ class Chunk:
         """Step the simulations that still run, in slices, so that progress shows and Ctrl-C is heard."""
         size = len(self.scenarios) * self.first.plant.n
         while steps:
-            count = min(steps, max(1, SLICE_STEPS // size))
+            most = FOREIGN_STEPS if self.first.plant.direct else SLICE_STEPS // size
+            count = min(steps, max(1, most))
             self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count))
             report(count * size)
             steps -= count
@@ -152,11 +151,12 @@ class Chunk:
 
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
+        scenario = self.scenarios[i]
         failure, step = int(self.rows[i, row.FAILURE]), int(self.rows[i, row.FAILED_STEP])
         reason = None if failure == row.FINE else self.reason(i, failure)
-        if reason is None and self.model.npair and self.overflowed(i):
+        if reason is None and (self.model.npair or scenario.plant.direct) and self.overflowed(i):
             reason, step = OVERFLOWED, 0
-        return from_log(self.scenarios[i], self.logs[i], step, reason)
+        return from_log(scenario, self.logs[i], step, reason)
 
     def overflowed(self, i: int) -> bool:
         """Whether MuJoCo left out contacts of simulation i because its memory for them was full."""
@@ -182,6 +182,14 @@ class Chunk:
             row.DISTURBANCE_RAISED: "a disturbance raised an exception",
             row.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[failure]
+
+
+def _nominal(plant: Plant) -> row.Part:
+    if isinstance(plant.nominal, Coupled):
+        own = plant.nominal.native(plant.parameters)
+        return row.Part(address=own.address, values=own.values, kept=own)
+    names, values = tuple(plant.parameters), tuple(plant.parameters.values())
+    return row.Part(address=native.nominal(plant.nominal, names).address, values=values)
 
 
 def _component(c: Component) -> row.Part:

@@ -51,6 +51,11 @@ def check_signals(s: "Scenario") -> None:
             raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more")
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
+    if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
+        raise ScenarioError(
+            f"disturbance {shown(forces[0])} pushes a body, and those of {s.plant.name}, a model of yours, act on its "
+            "joints: give another signal"
+        )
     if s.reference.cartesian:
         raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
     if s.reference.random:
@@ -61,6 +66,8 @@ def check_law(s: "Scenario") -> None:
     """The law is for this plant, and its surface for this law."""
     if s.law.plants and s.plant.name not in s.law.plants:
         raise ScenarioError(f"law {s.law.name!r} is for {', '.join(s.law.plants)} alone, not for {s.plant.name}")
+    if s.model == "nominal" and s.plant.unmodelled:
+        raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
     if s.surface is not None and s.law.degree > 1:
         raise ScenarioError(
             f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "

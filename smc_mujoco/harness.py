@@ -21,7 +21,7 @@ from smc_mujoco import channels as column
 from smc_mujoco import noise
 from smc_mujoco import row as slot
 from smc_mujoco.compiled import call, integers, pointer
-from smc_mujoco.forces import disturb, disturbance, weigh
+from smc_mujoco.forces import clear, disturb, disturbance, weigh
 
 WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
 LEFT = 1.0 - 1e-8  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
@@ -149,6 +149,7 @@ def _decide(base, row, table, log, k):
         if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and asked < HUGE):
             return slot.NOT_FINITE
         row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
+        row[int(row[slot.STATE]) + 2 + 3 * n + i] = u
     return slot.FINE
 
 
@@ -174,7 +175,7 @@ def _apply(row, table, ctrl, step):
 
 
 @njit(error_model="numpy")
-def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators, constraints):
+def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators, constraints, joints):
     """One callback of one simulation."""
     calls, n = int(row[slot.CALLS]), int(row[slot.CHANNELS])
     row[slot.CALLS] = calls + 1
@@ -198,18 +199,18 @@ def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators
         _apply(row, table, ctrl, step)
     if row[slot.SIGNAL_COUNT] != 0.0 and failure == slot.FINE:
         fraction = 0.0 if stage == 0 else (LEFT if stage == 3 else 0.5)
-        failure = disturb(base, row, table, xfrc, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
+        failure = disturb(base, row, table, xfrc, joints, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
     if failure != slot.FINE:
         row[slot.FAILURE], row[slot.FAILED_STEP] = failure, step
+        clear(row, table, xfrc, joints)
         for i in range(n):
-            xfrc[table[i, column.XFRC]], xfrc[table[i, column.PUSH]] = 0.0, 0.0
             if table[i, column.CTRL] >= 0:
                 ctrl[table[i, column.CTRL]] = 0.0
     elif sampling:
         for i in range(n):
             log[0, k, i], log[1, k, i] = qpos[table[i, column.QPOS]], qvel[table[i, column.QVEL]]
             log[3, k, i] = ctrl[table[i, column.CTRL]] / row[slot.SCALE] if table[i, column.CTRL] >= 0 else 0.0
-            log[5, k, i] = disturbance(table, i, xfrc, tips, anchors)
+            log[5, k, i] = disturbance(table, i, xfrc, joints, tips, anchors)
             at = int(row[slot.FORCES]) + 2 * i
             log[7, k, i], log[8, k, i] = row[at] / row[slot.STEPS], row[at + 1] / row[slot.STEPS]
             row[at], row[at + 1] = 0.0, 0.0

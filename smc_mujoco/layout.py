@@ -39,6 +39,7 @@ class Offsets(NamedTuple):
     qpos: int
     qvel: int
     ctrl: int
+    qfrc_applied: int
     xfrc_applied: int
     userdata: int
     sensordata: int

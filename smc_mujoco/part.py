@@ -18,6 +18,7 @@ import numpy as np
 from smc_mujoco.plant import Field
 
 PASSIVE, ROTOR = "passive:", "rotor:"
+START = "smc:start"  # a keyframe in which the joints without a channel start
 
 
 @dataclasses.dataclass(frozen=True)

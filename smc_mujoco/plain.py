@@ -12,28 +12,13 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import assembly, noise, sensors
+from smc_mujoco import channels as column
 from smc_mujoco.callback import installed
-from smc_mujoco.channels import (
-    ANCHOR,
-    CTRL,
-    FORCE,
-    FRICTION,
-    PUSH,
-    PUSH_SIGN,
-    QPOS,
-    QVEL,
-    SIGN,
-    TIP,
-    V_SENSOR,
-    X_SENSOR,
-    XFRC,
-    channels,
-)  # fmt: skip
 from smc_mujoco.estimators import Reading
 from smc_mujoco.guarded import Failure, estimated, guarded, named, numbers, signalled, surfaced
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
-from smc_mujoco.plant import Values
+from smc_mujoco.plant import Coupled, Values
 from smc_mujoco.remade import remade
 from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
@@ -73,7 +58,7 @@ class Loop:
         self.compiled = assembly.model([scenario])
         self.model = assembly.numbered(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
-        self.table = channels(self.model)
+        self.table = column.channels(self.model)
         self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
         if self.model.nhistory:
             sensors.remember(self.model, self.data)
@@ -82,10 +67,13 @@ class Loop:
         self.surface = scenario.surface and remade(scenario.surface.function, as_written)
         self.surface_memory = [np.zeros(scenario.surface.memory if scenario.surface else 0) for _ in range(n)]
         self.nominal = Values(**scenario.plant.parameters)
+        if isinstance(scenario.plant.nominal, Coupled):  # compiles, while there is no Python callback
+            scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.nominal)
         self.memory = [np.zeros(scenario.law.memory) for _ in range(n)]
         self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
+        self.latest = np.zeros(n)  # the last command of each channel
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
         self.held = np.zeros((n, 2))  # the last readings that arrived
         self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
@@ -113,8 +101,10 @@ class Loop:
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.disturb(data, t)
             if stage == 0 and within == 0:
-                x, v = data.qpos[self.table[:, QPOS]], data.qvel[self.table[:, QVEL]]
-                applied = np.where(self.table[:, CTRL] >= 0, data.ctrl[self.table[:, CTRL]] / self.scale, 0.0)
+                x, v = data.qpos[self.table[:, column.QPOS]], data.qvel[self.table[:, column.QVEL]]
+                applied = np.where(
+                    self.table[:, column.CTRL] >= 0, data.ctrl[self.table[:, column.CTRL]] / self.scale, 0.0
+                )
                 self.log[:, k] = (
                     x,
                     v,
@@ -140,12 +130,14 @@ class Loop:
             self.commands.append(u)
         past = step - self.scenario.delay_steps
         if past >= 0:
-            driven = self.table[:, CTRL] >= 0
-            data.ctrl[self.table[driven, CTRL]] = (self.scale * self.commands[past // self.scenario.steps])[driven]
+            driven = self.table[:, column.CTRL] >= 0
+            data.ctrl[self.table[driven, column.CTRL]] = (self.scale * self.commands[past // self.scenario.steps])[
+                driven
+            ]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""
-        x, v = data.sensordata[self.table[:, X_SENSOR]], data.sensordata[self.table[:, V_SENSOR]]
+        x, v = data.sensordata[self.table[:, column.X_SENSOR]], data.sensordata[self.table[:, column.V_SENSOR]]
         estimator, j, sensor = self.scenario.velocity, k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((k * self.scenario.control_period - sensor.delay) / sensor.period + 1e-6))
@@ -165,7 +157,7 @@ class Loop:
         if sensor is None:
             return x, v
         x += sensor.bias
-        if q := sensor.quantum(self.table[i, TIP] >= 0):
+        if q := sensor.quantum(self.table[i, column.TIP] >= 0):
             x = q * math.floor(x / q + 0.5)
         if j > 0 and words(seed, i, noise.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.held[i, 0], self.held[i, 1]
@@ -179,7 +171,7 @@ class Loop:
         r, dr, ddr = signalled(scenario.reference, t)
         self.r[:] = r
         for i in range(len(x)):
-            if self.table[i, CTRL] < 0:  # only measured
+            if self.table[i, column.CTRL] < 0:  # only measured
                 u[i] = s[i] = self.r[i] = 0.0
                 continue
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
@@ -187,7 +179,7 @@ class Loop:
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
                 float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.u_max, float(scenario.model == "nominal"),
             )  # fmt: skip
-            if (j := i + int(np.sum(self.table[:, CTRL] >= 0))) < len(x):  # moves with it, without an actuator
+            if (j := i + int(np.sum(self.table[:, column.CTRL] >= 0))) < len(x):  # moves with it, without an actuator
                 fq, gq = self.model_at(x, v, j)
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
             if scenario.surface is not None:
@@ -195,6 +187,7 @@ class Loop:
                 y = y._replace(surfaced=1.0, **dict(zip(("s", "eq"), surfaced(scenario.surface, slid), strict=True)))
             out = guarded(law, self.law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
+            self.latest[i] = np.clip(u[i], -scenario.u_max, scenario.u_max)
             asked = min(abs(u[i]), scenario.u_max) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
@@ -204,6 +197,8 @@ class Loop:
         """Nominal f and g of channel i."""
         plant = self.scenario.plant
         try:
+            if isinstance(plant.nominal, Coupled):
+                return plant.nominal(x, v, i, self.nominal, self.latest)
             return plant.nominal(x, v, i, self.nominal)
         except Exception as error:
             raise Failure(f"the nominal model of {plant.name} raised {type(error).__name__} ({error})") from error
@@ -211,26 +206,32 @@ class Loop:
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Put the disturbances of time t on the bodies; their generalised forces, (n,)."""
         xfrc, table = data.xfrc_applied.ravel(), self.table
-        xfrc[table[:, XFRC]] = xfrc[table[:, PUSH]] = 0.0
+        xfrc[table[:, column.XFRC]] = xfrc[table[:, column.PUSH]] = 0.0
+        joints = np.zeros(len(table))  # those of an own model
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
             stream = self.scenario.stream(j)
             d = [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
-            matched = table[:, SIGN] * d * (table[:, CTRL] >= 0)  # where an actuator could answer it
-            xfrc[table[:, PUSH if signal.cartesian else XFRC]] += d if signal.cartesian else matched
-        d = table[:, SIGN] * xfrc[table[:, XFRC]]
-        hinged = table[:, TIP] >= 0
-        arm = data.xipos.ravel()[table[:, TIP]] - data.xanchor.ravel()[table[:, ANCHOR]]
-        d[hinged] += (table[:, PUSH_SIGN] * arm * xfrc[table[:, PUSH]])[hinged]
+            matched = table[:, column.SIGN] * d * (table[:, column.CTRL] >= 0)  # where an actuator could answer it
+            joints += matched
+            xfrc[table[:, column.PUSH if signal.cartesian else column.XFRC]] += d if signal.cartesian else matched
+        if self.scenario.plant.direct:
+            xfrc[table[:, column.XFRC]], data.qfrc_applied[table[:, column.DIRECT]] = 0.0, joints
+        d = joints if self.scenario.plant.direct else table[:, column.SIGN] * xfrc[table[:, column.XFRC]]
+        hinged = table[:, column.TIP] >= 0
+        arm = data.xipos.ravel()[table[:, column.TIP]] - data.xanchor.ravel()[table[:, column.ANCHOR]]
+        d[hinged] += (table[:, column.PUSH_SIGN] * arm * xfrc[table[:, column.PUSH]])[hinged]
         if not np.all(np.isfinite(d)):
             raise Failure("the disturbance became NaN or inf")
         return d
 
     def weigh(self, data: mujoco.MjData) -> None:
         """Add up what drives, and what friction and contacts, exerted on the joints in the last physics step."""
-        rubs = self.table[:, FRICTION] >= 0
-        self.acted[0] += np.where(self.table[:, FORCE] >= 0, data.actuator_force[self.table[:, FORCE]], 0.0)
-        self.acted[1] += data.qfrc_constraint[self.table[:, QVEL]]
-        self.acted[1, rubs] += data.actuator_force[self.table[rubs, FRICTION]]
+        rubs = self.table[:, column.FRICTION] >= 0
+        self.acted[0] += np.where(
+            self.table[:, column.FORCE] >= 0, data.actuator_force[self.table[:, column.FORCE]], 0.0
+        )
+        self.acted[1] += data.qfrc_constraint[self.table[:, column.QVEL]]
+        self.acted[1, rubs] += data.actuator_force[self.table[rubs, column.FRICTION]]
 
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:

@@ -6,6 +6,7 @@ the MJCF beside it (what MuJoCo simulates), `fields` (which model fields a param
 freedom: its actuator, its two sensors and its body are read off the compiled model.
 """
 
+import abc
 import dataclasses
 import functools
 import math
@@ -21,6 +22,7 @@ from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
 from smc_mujoco.frozen import frozen
 
+DIRECTLY = "smc:direct"  # a text in the MJCF of own models: disturbances act on their joints, not on bodies
 LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
@@ -48,6 +50,28 @@ class Nominal(Protocol):
     def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
 
 
+class Native(NamedTuple):
+    """A nominal model as a C function; what lies at the addresses among its values is kept alive."""
+
+    address: int
+    values: tuple[float, ...]
+    kept: tuple
+
+
+class Coupled(abc.ABC):
+    """Base of nominal models that come compiled, and in which what the other channels were told last counts too."""
+
+    @abc.abstractmethod
+    def __call__(
+        self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
+    ) -> tuple[float, float]:
+        """As Nominal, with the last commands u, (n,), of which that of channel i does not count; None: 0."""
+
+    @abc.abstractmethod
+    def native(self, parameters: Mapping[str, float]) -> Native:
+        """The same for the compiled path, for one simulation."""
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Plant:
     """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d).
@@ -68,6 +92,9 @@ class Plant:
       mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
       underactuated: whether channels without an actuator come after those with one.
       placed: parameter -> the value for which the obstacles of its contacts stand.
+      direct: whether disturbances act on its joints themselves, and not on the bodies that they carry.
+      smooth: whether its equation is without limits, contacts and dry friction of its own.
+      unmodelled: why there is no nominal model, or "".
     """
 
     name: str
@@ -85,6 +112,9 @@ class Plant:
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
     underactuated: bool = False
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    direct: bool = False
+    smooth: bool = True
+    unmodelled: str = ""
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed"):

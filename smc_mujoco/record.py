@@ -12,7 +12,9 @@ from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
+from smc_mujoco.own_model import OwnModel, restored
 from smc_mujoco.part import Part
+from smc_mujoco.plant import Plant
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.series import TimeSeries  # noqa: F401  # so that it is among the signals
@@ -29,8 +31,7 @@ def describe(scenario: Scenario) -> dict:
     return (
         {name: getattr(scenario, name) for name in PLAIN}
         | {
-            "plant": {"name": scenario.plant.name, "n": scenario.plant.n, "module": scenario.plant.build.__module__}
-            | dict(scenario.plant.parameters),
+            "plant": _plant(scenario.plant),
             "versions": dict(_versions()),
             "law": _component(scenario.law),
             "velocity": _component(scenario.velocity),
@@ -56,15 +57,12 @@ def _versions() -> dict[str, str]:
 
 def restore(data: dict) -> Scenario:
     """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code."""
-    plant = dict(data["plant"])
-    if plant.pop("module") != find_plant(plant["name"]).build.__module__:
-        raise ScenarioError(f"plant {plant['name']!r} is not the library's: run it where it is defined")
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     scenario = Scenario(
         **fields,
-        plant=find_plant(plant.pop("name"), **plant),
+        plant=_restore_plant(data["plant"]),
         law=_find(data["law"], "law", laws()),
         velocity=_find(data["velocity"], "estimator", estimators()),
         surface=data.get("surface") and _find(data["surface"], "surface", surfaces()),
@@ -76,6 +74,22 @@ def restore(data: dict) -> Scenario:
     )
     again = dataclasses.replace(scenario, **dict.fromkeys(data.get("left_out", ())))
     return again if again == scenario else scenario  # the defaults of another version stay what they were
+
+
+def _plant(plant: Plant) -> dict:
+    data = {"name": plant.name, "n": plant.n, "module": plant.build.__module__} | dict(plant.parameters)
+    return data | ({"mjcf": plant.build.about()} if isinstance(plant.build, OwnModel) else {})
+
+
+def _restore_plant(data: dict) -> Plant:
+    plant = dict(data)
+    name, module = plant.pop("name"), plant.pop("module")
+    if mjcf := plant.pop("mjcf", None):
+        del plant["n"]
+        return dataclasses.replace(restored(mjcf, name), parameters=plant)
+    if module != find_plant(name).build.__module__:
+        raise ScenarioError(f"plant {name!r} is not the library's: run it where it is defined")
+    return find_plant(name, **plant)
 
 
 def _component(c: Component) -> dict:

@@ -49,6 +49,7 @@ class Part:
     memory: int = 0
     stream: int = 0  # of random numbers; 0: it takes none, and is the same in every channel
     cartesian: bool = False  # a disturbance that is a horizontal force on the body, not a force on the joint
+    kept: object = None  # what must live as long as the row
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -86,7 +87,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     Args:
       c: its contents.
       mark: what tells it from any other userdata, `callback.mark()`.
-      table: the channel table, (n, 13) int64, which must outlive the run.
+      table: the channel table, (n, 14) int64, which must outlive the run.
       log: (LOGS, K + 1, n) float64, written at samples, which must outlive the run.
     """
     row = [0.0] * HEADER
@@ -122,7 +123,7 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     reserve(SIGNALS, SIGNAL_FIELDS * len(c.disturbances))
     reserve(INPUT, 24)
     reserve(OUTPUT, 4)
-    reserve(STATE, 2 + 3 * n)  # the nominal model's input, i, n, measured x, estimated v; and estimated acceleration
+    reserve(STATE, 2 + 4 * n)  # the nominal model's input: i, n, measured x, estimated v and acceleration, last u
     reserve(HELD, 2 * n)
     reserve(FORCES, 2 * n)
     for i, d in enumerate(c.disturbances):

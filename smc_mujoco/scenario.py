@@ -163,7 +163,8 @@ class Scenario:
     @property
     def realistic(self) -> bool:
         """Whether the mechanism is more than the plant's equation."""
-        return bool(self.friction or self.actuator or self.contact.kind != "none" or self.mechanism != "equation")
+        parts = self.friction or self.actuator or self.contact.kind != "none" or self.mechanism != "equation"
+        return bool(parts or not self.plant.smooth)
 
     @property
     def left_out(self) -> list[str]:

@@ -689,7 +689,7 @@ def mechanism(drive: str, joint: str = "slide", axis: str = "1 0 0") -> mujoco.M
 
 @pytest.mark.parametrize("joint", ["slide", "hinge"])
 def test_a_motor_of_gear_1_on_a_joint_makes_a_channel(joint):
-    assert channels(mechanism('joint="j"', joint)).shape == (1, 13)
+    assert channels(mechanism('joint="j"', joint)).shape == (1, 14)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the ra
 CHAIN = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
 LEAST = 0.05  # of the longest: shorter ones are not drawn
 SLENDER = 0.1  # thickest shaft of a short one, of its length
+LEVER = 1e-6  # m: a body centred on its hinge has no arc to lay an arrow along
 BAR = 0.1  # of the longest: the least range that gets a bar
 
 
@@ -95,10 +96,14 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joi
     if scene.ngeom >= scene.maxgeom:
         return
     body = handle(model, model.jnt_bodyid[joint])
+    if body < 0:
+        return
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
     if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
         arm = place - data.xanchor[joint]
         length = np.linalg.norm(arm)
+        if length < LEVER:
+            return
         reach, width, out = unit * HINGE * length, 0.16 * radius + 0.012 * unit, arm / length
         along, start = np.cross(data.xaxis[joint], out), radius + 1.6 * width
     else:
@@ -117,7 +122,8 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joi
 
 
 def handle(model: mujoco.MjModel, body: int) -> int:
-    """The geom of a moving body that carries its arrows: the first in the accent's material, else the first."""
+    """The geom of a moving body that carries its arrows: the first in the accent's material, the first, or -1."""
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
     named = (g for g in geoms if model.geom_matid[g] >= 0)
-    return next((g for g in named if model.mat(model.geom_matid[g]).name.endswith("accent")), geoms[0])
+    first = geoms[0] if geoms else -1
+    return next((g for g in named if model.mat(model.geom_matid[g]).name.endswith("accent")), first)

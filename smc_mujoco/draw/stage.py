@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import assembly
-from smc_mujoco.draw import arrows, camera, style
+from smc_mujoco.draw import arrows, camera, own, style
 from smc_mujoco.draw.state import shapes
 from smc_mujoco.part import ROTOR, joints
 from smc_mujoco.plant import model_path
@@ -37,7 +37,7 @@ class Stage:
 
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], room: camera.Room):
         scenarios = [small(trace.scenario) for trace in traces]
-        self.shown = [scenario.plant.n for scenario in scenarios]
+        self.shown, self.own = [scenario.plant.n for scenario in scenarios], scenarios[0].plant.direct
         self.model = compose(scenarios, size)
         self.data = mujoco.MjData(self.model)
         self.shapes = [shapes(scenario) for scenario in scenarios]
@@ -74,13 +74,14 @@ class Stage:
         self.dressed[k], single = now, self.shapes[k][now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
-            if name and name != "floor":
+            if name and name != "floor" and not self.own:
                 copy = self.model.geom(f"m{k}/{name}")
                 copy.pos, copy.size = single.geom_pos[geom], single.geom_size[geom]
 
     def paint(self, k: int, colour: str) -> None:
         """Colour the accent of machine k."""
-        self.model.mat(f"m{k}/accent").rgba[:3] = np.array(style.rgb(colour)) / 255
+        if not self.own:
+            self.model.mat(f"m{k}/accent").rgba[:3] = np.array(style.rgb(colour)) / 255
 
     def place(self, name: str) -> int | None:
         """Where a joint of that name lies in qpos; None if there is none."""
@@ -112,6 +113,8 @@ class Stage:
         """For each machine, the corners of its geoms' boxes over the poses of its trace, (points, 3) m."""
         model = self.model
         owner = [model.body(model.body_rootid[body]).name.partition("/")[0] for body in model.geom_bodyid]
+        if self.own:
+            owner = own.owners(model, [parts[0].model for parts in self.shapes])
         solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
         mine = [np.array([name == f"m{k}" for name in owner]) & solid for k in range(len(traces))]
         found = []
@@ -145,20 +148,25 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 def small(scenario: Scenario) -> Scenario:
     """The scenario with the channels that are shown."""
     plant = scenario.plant
-    if plant.n <= SHOWN:
+    if plant.n <= SHOWN or plant.direct:
         return scenario
     cut = dataclasses.replace(plant, n=SHOWN, x0=plant.x0[:SHOWN])
     return dataclasses.replace(scenario, plant=cut, x0=scenario.x0[:SHOWN], v0=scenario.v0[:SHOWN])
 
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
-    """Length of the rail, m: of what does not move, along x. A pendulum has none: inf."""
-    return np.inf if scenario.plant.unit == "rad" else float(2 * np.abs(still(model)[..., 0]).max())
+    """Length of the rail, m: of what does not move, along x. Pendulums and own models have none: inf."""
+    return (
+        np.inf
+        if scenario.plant.unit == "rad" or scenario.plant.direct
+        else float(2 * np.abs(still(model)[..., 0]).max())
+    )
 
 
 def arrow_unit(scenario: Scenario, length: float) -> float:
     """What arrows.draw scales the arrows of a machine by."""
-    return length if np.isfinite(length) else arrows.CHAIN if scenario.plant.n > 1 else 1.0
+    chain = scenario.plant.n > 1 and not scenario.plant.direct
+    return length if np.isfinite(length) else arrows.CHAIN if chain else 1.0
 
 
 def still(model: mujoco.MjModel) -> np.ndarray:
@@ -175,6 +183,9 @@ def lane(scenarios: Sequence[Scenario]) -> np.ndarray:
     Longer where machines that are more than their plant's equation would stand in each other's way.
     """
     plant = scenarios[0].plant
+    if plant.direct:
+        right = np.array(own.view(assembly.model(scenarios[:1]))[:3])
+        return plant.lane[0] * right
     look = assembly.spec(scenarios[:1]).camera("look")
     step, across = np.array(plant.lane), np.array(look.alt.xyaxes[:3])
     length, across = np.linalg.norm(step), across / np.linalg.norm(across)
@@ -202,10 +213,18 @@ def compose(scenarios: Sequence[Scenario], size: tuple[int, int]) -> mujoco.MjMo
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
     step = lane(scenarios)
     for k, scenario in enumerate(scenarios):
+        at = step * (k - (len(scenarios) - 1) / 2)
+        if scenario.plant.direct:
+            single = assembly.model([scenario])
+            data = mujoco.MjData(single)
+            settle(single, data)
+            place = spec.worldbody.add_frame(pos=at + np.array([0.0, 0.0, own.low(single, boxes(single, data))]))
+            spec.attach(own.machine(scenario, spec), frame=place, prefix=f"m{k}/")
+            continue
         machine = bare(assembly.spec([scenario]))
         if k == 0:
             spec.option, spec.compiler = machine.option, machine.compiler
-        place = spec.worldbody.add_frame(pos=step * (k - (len(scenarios) - 1) / 2))
+        place = spec.worldbody.add_frame(pos=at)
         place.attach_body(machine.body("machine"), f"m{k}/", "")
     spec.material("floor").emission = 0.13  # nearly the white of the page below
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)

@@ -1,0 +1,210 @@
+"""A plant from any MJCF: name the joints that are its channels, and the rest is found in the model.
+
+    arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
+    trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0), model="nominal"))
+
+A channel's command u is the force on its joint, N m or N: the joint's one motor is put there with gear 1, and with its
+control range times its gear as its limits. Position and velocity sensors are added; the model's own are taken off. Its
+other actuators stay, at ctrl = 0, and joints without a channel move as the model says. Integrator, step and start are
+the scenario's. Disturbances act on the joints themselves. Parameters are m, kg, the mass of all that moves, which
+scales all masses and inertias, and grav, m/s^2.
+"""
+
+import dataclasses
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco import mjcf
+from smc_mujoco.believed import Believed
+from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.motors import MOTOR, Motor, motor_of, put
+from smc_mujoco.own_channels import SIMPLE, Channel, check, given, starts
+from smc_mujoco.part import ROTOR, START
+from smc_mujoco.plant import DIRECTLY, Field, Plant, catalogue
+
+SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+
+
+class Drive(NamedTuple):
+    """A channel as found in the model."""
+
+    joint: str
+    motor: Motor
+    partner: str | None
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnModel:
+    """What builds the mechanism: n is not looked at, as the channels say it."""
+
+    path: str
+    sha256: str
+    keyframe: str | None
+    channels: tuple[tuple[str, Channel], ...]
+    drives: tuple[Drive, ...]
+
+    def __call__(self, n: int) -> mujoco.MjSpec:
+        """The model with a motor and two sensors a channel.
+
+        Raises:
+          ScenarioError: the file is gone, or another than it was.
+        """
+        spec = mjcf.read(Path(self.path))
+        if mjcf.digest(Path(self.path)) != self.sha256:
+            raise ScenarioError(f"{self.path}, or a file that it names, has changed: call smc.plant_from again")
+        for sensor in list(spec.sensors):
+            spec.delete(sensor)
+        put(spec, [(drive.joint, drive.motor) for drive in self.drives])
+        partners = [drive.partner for drive in self.drives if drive.partner]
+        for joint in [*(drive.joint for drive in self.drives), *partners]:
+            for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
+                spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
+        for key in list(spec.keys):
+            if key.name != self.keyframe or self.keyframe is None:
+                spec.delete(key)
+            else:
+                key.name, key.ctrl, key.act = START, [], []
+        spec.add_text(name=DIRECTLY, data="disturbances act on the joints")
+        spec.option.disableflags &= ~SENSORS
+        return spec
+
+    def about(self) -> dict:
+        """All that plant_from needs to make it again, as plain data."""
+        channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
+        return {"path": self.path, "sha256": self.sha256, "keyframe": self.keyframe, "channels": channels}
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnFields:
+    """The model fields that m and grav set: all masses and inertias, and gravity, in proportion to the model's."""
+
+    mass: float
+    gravity: float
+
+    def __call__(self, model, p):
+        scale = np.ones(model.nbody)
+        scale[[not model.body(i).name.startswith(ROTOR) for i in range(model.nbody)]] = p.m / self.mass
+        yield Field("body_mass", slice(None), model.body_mass * scale)
+        yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
+        if self.gravity:
+            yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
+
+
+def plant_from(
+    path: str | os.PathLike,
+    channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
+    name: str | None = None,
+    keyframe: str | None = None,
+) -> Plant:
+    """The MJCF file at `path` as a plant.
+
+    Args:
+      channels: joint -> Channel, or a dict of its fields, or None for what is found; or joints' names alone. Their
+        order is that of the plant's channels.
+      name: of the plant; default: the file's.
+      keyframe: one of the model's, by name, in which runs start; default: the model's initial state.
+
+    Raises:
+      ScenarioError: a file that cannot be read, or a joint, actuator or keyframe that is not there or does not serve.
+
+    Laws may have model="nominal" where all joints that move with the channels are channels or partners, and no equality
+    constraint holds any; `plant.unmodelled` says why not. Films show the model plainly, in its own colours.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"path is {shown(path)}: give the path of an MJCF file (.xml)")
+    file = Path(path).resolve()
+    model = mjcf.compiled(file, mjcf.read(file))
+    asked = given(channels)
+    partners = [channel.partner for _, channel in asked if channel.partner is not None]
+    check(file, model, asked, partners)
+    if keyframe is not None:
+        find(
+            f"keyframe of {file.name}", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name}
+        )
+    drives = tuple(Drive(joint, motor_of(file, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
+    build = OwnModel(str(file), mjcf.digest(file), keyframe, asked, drives)
+    joints = [*(joint for joint, _ in asked), *partners]
+    mass = float(model.body_mass[model.body_weldid != 0].sum())
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    fields = OwnFields(mass, gravity)
+    why_not = missing(model, joints, drives)
+    return Plant(
+        name=named(name, file),
+        parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
+        mass="m",
+        unit=SIMPLE[mujoco.mjtJoint(model.joint(joints[0]).type[0])],
+        x0=starts(model, joints, asked, keyframe),
+        n=len(joints),
+        sizes=(len(joints), len(joints)),
+        build=build,
+        fields=fields,
+        nominal=Believed(build, fields, why_not),
+        lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
+        underactuated=bool(partners),
+        direct=True,
+        smooth=smooth(model),
+        unmodelled=why_not,
+    )
+
+
+def named(name: str | None, file: Path) -> str:
+    """The plant's name; none of the library's, as laws, gains and conditions go by them."""
+    if name is None:
+        return file.stem if file.stem not in catalogue() else file.name
+    if not isinstance(name, str) or not name or name in catalogue():
+        raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
+    return name
+
+
+def smooth(model: mujoco.MjModel) -> bool:
+    """Whether the model can have no constraint: no limits, no dry friction, no contacts, nothing held together."""
+    flags = mujoco.mjtDisableBit
+    if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
+        return True
+    touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
+    limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
+    dry = np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss)
+    return not (
+        (touching and not model.opt.disableflags & flags.mjDSBL_CONTACT.value)
+        or (limited and not model.opt.disableflags & flags.mjDSBL_LIMIT.value)
+        or dry
+        or model.neq
+    )
+
+
+def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...]) -> str:
+    """Why there is no nominal model of the channels, or ""."""
+    if np.any(model.eq_active0):
+        return "equality constraints hold its joints together, and M^-1 knows of none: give a law without a model"
+    if model.nplugin or model.nflex:
+        return "it has plugins or flexible bodies: give a law without a model"
+    ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
+    idle = np.ones(model.nactuator, bool)
+    idle[[a for drive in drives for a in drive.motor.replaced]] = False
+    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
+    near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
+    for dof in near:
+        if dof not in ours:
+            joint = model.joint(model.dof_jntid[dof]).name
+            return (
+                f"joint {joint!r} moves with its channels and is not measured: "
+                f"make it a channel, or a partner with smc.Channel(partner={joint!r}), or give a law without a model"
+            )
+    return ""
+
+
+def restored(data: Mapping, name: str) -> Plant:
+    """The plant that `OwnModel.about` tells of.
+
+    Raises:
+      ScenarioError: the file is gone, or another than it was.
+    """
+    path = Path(data["path"])
+    if path.is_file() and mjcf.digest(path) != data["sha256"]:
+        raise ScenarioError(f"{path}, or a file that it names, is another than it was in the run: put that one back")
+    return plant_from(path, data["channels"], name=name, keyframe=data["keyframe"])
