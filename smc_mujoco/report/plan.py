@@ -36,7 +36,7 @@ class Plan:
     seeds: int = 12  # chosen: enough to tell laws apart, and 20 minutes are enough for all
     duration: float = paper.DURATION
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
-    basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol")
+    basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")
     basin_laws: tuple[str, ...] = paper.LAWS
     points: tuple[int, int] = (50, 50)
     region: float = paper.DURATION
