@@ -45,30 +45,6 @@ def choose() -> Choice:
     return Choice(wish=wish, backend=backend)
 
 
-class Again:
-    """A finder of modules that finds none: where one of the package is asked for, it chooses again."""
-
-    @staticmethod
-    def find_spec(name: str, path: object = None, target: object = None) -> None:
-        """None."""
-        if name.startswith("smc_mujoco."):
-            choose()
-
-
-def release() -> None:
-    """MUJOCO_GL as it was found, until more of the package is imported: for what only keeps it at hand, as pytest."""
-    if sys.platform != "linux" or "mujoco" in sys.modules:
-        return
-    if Again not in sys.meta_path:
-        sys.meta_path.insert(0, Again)
-    wish = choose().wish
-    choose.cache_clear()
-    if wish:
-        os.environ["MUJOCO_GL"] = wish
-    else:
-        os.environ.pop("MUJOCO_GL", None)
-
-
 def usable(backend: str) -> bool:
     """Whether `import mujoco` works with this backend."""
     if backend not in LIBRARIES:

@@ -5,7 +5,8 @@
         assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
 
 pytest loads this file in every session of whoever has the package installed (entry point `pytest11`). It therefore
-imports nothing heavy until a test uses a fixture or the marker, and a session that does not is as it would be without.
+imports nothing heavy until a test uses a fixture or the marker. As any import of the package does, it chooses MUJOCO_GL
+where that is unset and EGL works: a test's `import mujoco` comes after it and would find none.
 """
 
 from __future__ import annotations
@@ -17,12 +18,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
-from smc_mujoco import gl
-
 if TYPE_CHECKING:
     from smc_mujoco.testing.response import StepResponse
-
-gl.release()  # importing the package has chosen MUJOCO_GL, which tests that do not use it may want otherwise
 
 
 class Ledger(NamedTuple):

@@ -18,10 +18,13 @@ SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 
 @pytest.fixture(autouse=True)
 def nothing_left_behind():
-    yield
-    left = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
+    before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()  # dm_control has a warning handler of its own
     mujoco.set_mjcb_control(None)
     mujoco.set_mju_user_warning(None)
+    yield
+    left = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
+    mujoco.set_mjcb_control(before[0])
+    mujoco.set_mju_user_warning(before[1])
     assert left == (None, None)
 
 
