@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.commands import basin, bench, check_c, claims, export_c, margins, report
+from smc_mujoco.commands import basin, bench, check_c, claims, export_c, margins, report, view
 from smc_mujoco.terminal import Clock, loading, mendable
 
 app = typer.Typer(
@@ -91,11 +91,15 @@ def run(
     video: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers instead of the scene's.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    export: Annotated[
+        str | None,
+        typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat or parquet, beside its .npz."),
+    ] = None,
     timing: Annotated[bool, typer.Option("--timing", help="Say where the time went.")] = False,
 ) -> None:
     """Run a scene: print its scores; write its traces, figures and film.
 
-    Example: smc-mujoco run duffing --no-video --out results
+    Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
     """
     with mendable():
         clock = Clock()
@@ -104,13 +108,15 @@ def run(
 
             from smc_mujoco import scene as scenes
             from smc_mujoco import show
+            from smc_mujoco.trace import formats
 
+        exported = () if export is None else formats(export)
         path = scenes.find(name)
         scene = scenes.read(path)
         if seed is not None:
             scene = scene.seeded(seed)
         console = Console()
-        show.perform(scene, out or Path("videos") / path.stem, video, threads, clock, console)
+        show.perform(scene, out or Path("videos") / path.stem, video, threads, clock, console, exported)
         if timing:
             console.print(str(clock), style="dim", soft_wrap=True, highlight=False)
 
@@ -119,7 +125,9 @@ def run(
 def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file that `run` or Trace.save wrote.")],
     figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
-    export: Annotated[Path | None, typer.Option(help="Also write its columns, to a .csv or .mat file.")] = None,
+    export: Annotated[
+        Path | None, typer.Option(help="Also write its columns, to a .csv, .mat or .parquet file.")
+    ] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores."""
     with mendable():
@@ -193,7 +201,7 @@ def tune(
                 console.print(f"wrote {drawn}", soft_wrap=True, highlight=False)
 
 
-for command in (bench.bench, margins.margins, basin.basin, claims.claims, report.report):
+for command in (bench.bench, margins.margins, basin.basin, claims.claims, report.report, view.view):
     app.command()(command)
 app.command("check-c")(check_c.check_c)
 app.command("export-c")(export_c.export_c)

@@ -31,15 +31,9 @@ def run(scenario: Scenario) -> Trace:
     """One run in the plain loop."""
     with installed():
         loop = Loop(scenario)
-    total = scenario.samples * scenario.steps
     with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named
-        for step in range(total + 1):
-            if step == scenario.jump_step:
-                loop.set_parameters(step)
-            if step < total:
-                mujoco.mj_step(loop.model, loop.data)
-            else:
-                mujoco.mj_forward(loop.model, loop.data)
+        for step in range(loop.total + 1):
+            loop.step(step)
             if loop.failure:
                 break
     return from_log(scenario, loop.log, loop.failed_step, loop.failure)
@@ -62,6 +56,7 @@ class Loop:
         self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
         if self.model.nhistory:
             sensors.remember(self.model, self.data)
+        self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
         self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
         self.surface = scenario.surface and remade(scenario.surface.function, as_written)
@@ -81,6 +76,15 @@ class Loop:
         self.log = np.full((LOGS, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
+
+    def step(self, step: int) -> None:
+        """Physics step 0, 1, ..., with `control` installed; that after the last one only completes the log."""
+        if step == self.scenario.jump_step:
+            self.set_parameters(step)
+        if step < self.total:
+            mujoco.mj_step(self.model, self.data)
+        else:
+            mujoco.mj_forward(self.model, self.data)
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""
@@ -105,16 +109,8 @@ class Loop:
                 applied = np.where(
                     self.table[:, column.CTRL] >= 0, data.ctrl[self.table[:, column.CTRL]] / self.scale, 0.0
                 )
-                self.log[:, k] = (
-                    x,
-                    v,
-                    self.commands[-1],
-                    applied,
-                    self.s,
-                    d,
-                    self.r,
-                    *(self.acted / self.scenario.steps),
-                )
+                acted = self.acted / self.scenario.steps
+                self.log[:, k] = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
                 self.acted[:] = 0.0
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step

@@ -1,7 +1,7 @@
 """What the commands do: a scene from its declaration to files, a trace in the terminal, the catalogues."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -23,8 +23,19 @@ Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
 Timer = Callable[[str], AbstractContextManager[None]]
 
 
-def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Timer, console: Console) -> None:
-    """Run a scene: print its scores and answers, write its traces, figures and film to the folder `out`."""
+def perform(
+    scene: Scene,
+    out: Path,
+    video: bool,
+    threads: int | None,
+    clock: Timer,
+    console: Console,
+    export: Sequence[str] = (),
+) -> None:
+    """Run a scene: print its scores and answers, write its traces, figures and film to the folder `out`.
+
+    Each trace is written as .npz, and beside it in the formats of `export`.
+    """
     _writable(out)
     with clock("compiling"):
         compile_laws(scene)
@@ -38,7 +49,7 @@ def perform(scene: Scene, out: Path, video: bool, threads: int | None, clock: Ti
         console.print()
     tell(scene, traces, console)
     with clock("traces"):
-        written = save(traces, out)
+        written = save(traces, out, export)
     with clock("figures"):
         written += figures(scene, traces, out)
     if video:
@@ -89,13 +100,15 @@ def simulate(scene: Scene, threads: int | None) -> Traces:
     return found
 
 
-def save(traces: Traces, out: Path) -> list[Path]:
-    """One .npz a run."""
-    return [
-        trace.save(out / f"{slug(condition)}-{slug(label)}.npz")
-        for condition, runs in traces.items()
-        for label, trace in runs.items()
-    ]
+def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
+    """One .npz a run, and one file for each format of Trace.export."""
+    written: list[Path] = []
+    for condition, runs in traces.items():
+        for label, trace in runs.items():
+            name = f"{slug(condition)}-{slug(label)}"
+            written.append(trace.save(out / f"{name}.npz"))
+            written += [trace.export(out / f"{name}.{ending}") for ending in export]
+    return written
 
 
 def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:

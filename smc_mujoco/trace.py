@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco import record
-from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.files import replacing
 from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
@@ -75,32 +75,64 @@ class Trace:
             np.savez_compressed(file, about=np.array(about), **arrays)
         return path
 
+    def columns(self) -> dict[str, np.ndarray]:
+        """The arrays by channel: t, x, v, ... of a single one, t, x0, x1, ..., v0, ... of several."""
+        n = self.x.shape[1]
+        return {"t": self.t} | {
+            f"{name}{i}" if n > 1 else name: getattr(self, name)[:, i] for name in ARRAYS[1:] for i in range(n)
+        }
+
     def export(self, path: str | os.PathLike) -> Path:
-        """Write the columns t, x0, x1, ..., v0, ... to a .csv file, or the arrays to a .mat file (MATLAB 5).
+        """Write the `columns` to a .csv or a .parquet file, or the arrays to a .mat file (MATLAB 5).
+
+        The last two hold the scenario too, as JSON: a variable in the one, metadata of the schema in the other.
 
         Raises:
           ScenarioError: another ending.
         """
         path = Path(path)
-        if path.suffix == ".csv":
-            columns = {"t": self.t} | {
-                f"{name}{i}" if self.x.shape[1] > 1 else name: getattr(self, name)[:, i]
-                for name in ARRAYS[1:]
-                for i in range(self.x.shape[1])
-            }
-            table, header = np.column_stack(list(columns.values())), ",".join(columns)
-            with replacing(path) as file:
-                np.savetxt(file, table, "%.17g", ",", header=header, comments="")
-        elif path.suffix == ".mat":
-            from scipy.io import savemat
-
-            arrays = {name: getattr(self, name) for name in ARRAYS}
-            about = json.dumps(record.describe(self.scenario))
-            with replacing(path) as file:
-                savemat(file, arrays | {"scenario": about}, oned_as="column")
-        else:
-            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv or .mat")
+        if path.suffix not in _WRITERS:
+            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat or .parquet")
+        with replacing(path) as file:
+            _WRITERS[path.suffix](self, file)
         return path
+
+
+def _write_csv(trace: Trace, file: Path) -> None:
+    columns = trace.columns()
+    np.savetxt(file, np.column_stack(list(columns.values())), "%.17g", ",", header=",".join(columns), comments="")
+
+
+def _write_mat(trace: Trace, file: Path) -> None:
+    from scipy.io import savemat
+
+    about = json.dumps(record.describe(trace.scenario))
+    savemat(file, {name: getattr(trace, name) for name in ARRAYS} | {"scenario": about}, oned_as="column")
+
+
+def _write_parquet(trace: Trace, file: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    about = json.dumps(record.describe(trace.scenario))
+    with file.open("wb") as stream:  # whose errors say what is wrong as those of other files do
+        parquet.write_table(pa.table(trace.columns(), metadata={"scenario": about}), stream)
+
+
+_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}
+FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
+
+
+def formats(listed: str) -> tuple[str, ...]:
+    """The formats of Trace.export that a list such as "csv,mat" names.
+
+    Raises:
+      ScenarioError: it names none, or another one.
+    """
+    names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in listed.split(","))
+    for name in names:
+        find("format to export", name, dict.fromkeys(FORMATS))
+    return tuple(names)
 
 
 def _trace(fields: dict) -> Trace:

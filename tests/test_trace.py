@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from scipy.io import loadmat
 
 import smc_mujoco as smc
@@ -215,8 +216,8 @@ def test_a_trace_is_saved_under_npz_only(name, trace, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.npz", "a.txt", "a", "a.CSV", ".csv", "csv", "a.csv.gz", ""])
-def test_a_trace_is_exported_to_csv_and_mat_only(name, trace, tmp_path):
-    refused(lambda: trace.export(tmp_path / name if name else ""), ".csv or .mat")
+def test_a_trace_is_exported_to_csv_mat_and_parquet_only(name, trace, tmp_path):
+    refused(lambda: trace.export(tmp_path / name if name else ""), ".csv, .mat or .parquet")
     assert names(tmp_path) == []
 
 
@@ -250,6 +251,16 @@ def test_mat_holds_every_array_and_the_scenario(name, traces, tmp_path):
     for array in ARRAYS:
         np.testing.assert_array_equal(data[array].reshape(getattr(trace, array).shape), getattr(trace, array))
     assert json.loads(str(data["scenario"][0]))["plant"]["name"] == trace.scenario.plant.name
+
+
+@pytest.mark.parametrize("name", ["plain", "network", "diverged"])
+def test_parquet_holds_every_number_to_the_last_bit_and_the_scenario(name, traces, tmp_path):
+    trace = traces[name]
+    table = parquet.read_table(trace.export(tmp_path / "a.parquet"))
+    assert table.column_names == list(trace.columns())
+    for column, expected in trace.columns().items():
+        np.testing.assert_array_equal(table[column].to_numpy(), expected)
+    assert json.loads(table.schema.metadata[b"scenario"])["plant"]["name"] == trace.scenario.plant.name
 
 
 # what is no trace
@@ -355,6 +366,7 @@ WRITERS = {
     "npz": lambda trace, path: trace.save(path),
     "csv": lambda trace, path: trace.export(path),
     "mat": lambda trace, path: trace.export(path),
+    "parquet": lambda trace, path: trace.export(path),
 }
 
 

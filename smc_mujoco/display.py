@@ -1,0 +1,40 @@
+"""Whether a window can be opened here: asked before MuJoCo's viewer, which without one ends the whole process."""
+
+import os
+import subprocess
+import sys
+
+PROBE = """
+import glfw
+if not glfw.init():
+    raise SystemExit("GLFW cannot use it")
+glfw.window_hint(glfw.VISIBLE, False)
+if not glfw.create_window(64, 64, "", None, None):
+    raise SystemExit("it has no OpenGL")
+"""
+
+
+def missing() -> str | None:
+    """None when the viewer can open, else why not and what to do; opens a hidden window, in a process of its own."""
+    if sys.platform == "darwin" and getattr(sys.modules.get("mujoco.viewer"), "_MJPYTHON", None) is None:
+        return "no view: on macOS the viewer runs under MuJoCo's own interpreter: mjpython $(which smc-mujoco) view ..."
+    cure = "run it where there is a screen, or film the scene with smc-mujoco run"
+    named = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
+    if sys.platform == "linux" and not named:
+        return f"no view: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set): {cure}"
+    if error := probe():
+        where = ", ".join(f"{name}={os.environ[name]}" for name in named) or "the screen"
+        return f"no view: no window opens on {where} ({error}): {cure}"
+    return None
+
+
+def probe() -> str | None:
+    """None when a window with OpenGL opens, else how it failed."""
+    code = [sys.executable, "-W", "ignore", "-c", PROBE]
+    try:
+        done = subprocess.run(code, capture_output=True, text=True, timeout=60, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"a trial failed: {error}"
+    if done.returncode == 0:
+        return None
+    return (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
