@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test check report gains gallery bench lock setup
+.PHONY: help demo test check docs report gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -23,6 +23,11 @@ check: setup ## lint, format and types
 	$(BIN)/ruff format --check .
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
+
+docs: ## the documentation as a site, site/index.html
+	@./setup.sh requirements-docs.lock
+	@# this variable leaves out the theme's notice that it is maintained until May 2027
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict -f docs/site/mkdocs.yml
 
 report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
 	$(BIN)/smc-mujoco report
@@ -44,9 +49,9 @@ bench: ## speed, beside bare MuJoCo and other packages
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
 	$(LOCK) pyproject.toml --group test --group check -o requirements.lock
-	@# what requirements.lock has already is left out of the second one
-	$(LOCK) --group bench -c requirements.lock -o requirements-bench.lock \
-		$$(sed -n 's/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p' requirements.lock)
+	@# what requirements.lock has already is left out of the others, but for what it has for Windows alone
+	for group in bench docs; do $(LOCK) --group $$group -c requirements.lock -o requirements-$$group.lock \
+		$$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock) || exit; done
 
 setup:
 	@./setup.sh

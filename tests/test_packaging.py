@@ -113,7 +113,7 @@ def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(
     assert Path(figure).stat().st_size > 1000
 
 
-@pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock"])
+@pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock", "requirements-docs.lock"])
 def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
     text = (ROOT / name).read_text()
     assert "://" not in text

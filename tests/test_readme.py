@@ -11,19 +11,13 @@ from pathlib import Path
 
 import pytest
 import typer
+from pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco import cli, gl, scene, show
+from smc_mujoco import bounds, cli, gl, scene, show
 
-ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 README = PAGES[0].read_text()
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-
-
-def blocks(text: str, language: str) -> list[str]:
-    """The fenced blocks of one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def commands(text: str) -> list[str]:
@@ -66,18 +60,19 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.setattr(bounds, "SCALES", dict(bounds.SCALES))  # to which a page adds
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
-    with contextlib.redirect_stdout(io.TextIOWrapper(io.BytesIO(), "utf-8")) as said, played as end:
+    out = io.TextIOWrapper(io.BytesIO(), "utf-8")
+    with beside(page, tmp_path), contextlib.redirect_stdout(out) as said, played as end:
         runpy.run_path("block.py", run_name="__main__")
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
     wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|svg|png|c))"', block))
     wanted |= set(re.findall(r'study\(.*"(\w+)"', block))
-    written = {path.name for path in tmp_path.iterdir()} - {"block.py"}
+    written = {path.name for path in tmp_path.iterdir()} - {"block.py", *titled(page)}
     assert wanted <= written
     assert bool(written) == bool(wanted or end)
 
@@ -120,7 +115,8 @@ def test_files_that_command_lines_name_exist():
         word for _, line in LINES for word in re.findall(r"[\w./-]+\.(?:py|lock|sh)\b", line) if "NAME" not in word
     }
     assert named >= {"scenes/inverted_pendulum.py", "requirements.lock"}
-    assert [name for name in named if not (ROOT / name).is_file()] == []
+    told = {name for page in PAGES for name in titled(page)}  # to be written by the reader
+    assert [name for name in named - told if not (ROOT / name).is_file()] == []
 
 
 @pytest.mark.parametrize(("page", "link"), [pair for pair in LINKS if "://" not in pair[1]], ids=named)

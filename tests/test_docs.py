@@ -1,0 +1,111 @@
+"""docs/ as a site: every page is in its contents, its reference names every public name, and its tutorial is true."""
+
+import contextlib
+import importlib.metadata
+import io
+import os
+import re
+import runpy
+import subprocess
+import sys
+
+import pytest
+from pages import ROOT, beside, blocks, titled
+
+import smc_mujoco as smc
+from smc_mujoco import theory
+from smc_mujoco.metrics import metrics
+
+DOCS, CONFIGURATION = ROOT / "docs", ROOT / "docs" / "site" / "mkdocs.yml"
+TUTORIAL = DOCS / "tutorial.md"
+NAV = re.findall(r"^ +- (?:\w+: )?(\w+\.md)$", CONFIGURATION.read_text(), re.MULTILINE)
+INSTALLED = bool(importlib.metadata.entry_points(group="pytest11", name="smc_mujoco"))
+PLUGIN = ("-p", "no:cacheprovider", *(() if INSTALLED else ("-p", "smc_mujoco.pytest_plugin")))
+NUMBER = r"\d+(?:\.\d+)?"
+
+
+def test_the_contents_name_every_page_once():
+    assert sorted(NAV) == sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
+
+
+def test_the_reference_names_every_public_name_where_it_is_defined():
+    named = re.findall(r"^::: smc_mujoco\.(\S+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
+    homes = {home if name == home == "paper" else f"{home}.{name}" for name, home in smc._HOME.items()}
+    assert homes <= set(named)
+    assert len(named) == len(set(named))
+    assert {name for name in set(named) - homes if not name.startswith(("pytest_plugin.", "testing."))} == set()
+
+
+def test_the_mathematics_define_every_metric_in_the_order_of_tables():
+    text = (DOCS / "mathematics.md").read_text()
+    assert re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE) == [metric.name for metric in metrics()]
+
+
+def test_the_mathematics_have_every_plant():
+    assert {name for name in smc.plants() if name not in (DOCS / "mathematics.md").read_text()} == set()
+
+
+def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, monkeypatch):
+    page, seen = DOCS / "mathematics.md", 0
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(page.read_text(), "python"):
+        (tmp_path / "block.py").write_text(block)
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            runpy.run_path("block.py")
+        told = re.findall(rf"print\(.*\)  # ({NUMBER})", block)
+        printed = [re.findall(NUMBER, line)[0] for line in said.getvalue().splitlines()]
+        assert printed == told
+        seen += len(told)
+    assert seen >= 5
+
+
+def test_the_smallest_lambda_is_the_formula_that_the_mathematics_tell():
+    p = smc.plant("inverted_pendulum").parameters
+    assert theory.smallest_lam(smc.plant("inverted_pendulum"), 9.7) == pytest.approx(p["m"] * p["grav"] * p["l"] / 9.7)
+
+
+def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with beside(TUTORIAL, tmp_path), contextlib.redirect_stdout(io.StringIO()) as said:
+        runpy.run_path("compare.py", run_name="__main__")
+    (shown,) = blocks(TUTORIAL.read_text(), "text")
+    assert re.sub(rf" *{NUMBER}", "", said.getvalue()) == re.sub(rf" *{NUMBER}", "", shown)
+    numbers = [[float(word) for word in re.findall(NUMBER, text)] for text in (said.getvalue(), shown)]
+    assert len(numbers[0]) == 18
+    # another machine's tanh may move a chattering run's last digits
+    assert numbers[0] == pytest.approx(numbers[1], rel=0.02, abs=1.0)
+    assert numbers[0][::2] == pytest.approx(numbers[1][::2], abs=0.02)
+
+
+def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
+    for name, text in titled(TUTORIAL).items():
+        (tmp_path / name).write_text(text)
+        soft = text.replace('"width": 0.3', '"width": 3.0').replace("my_law", "soft_law")
+        (tmp_path / name.replace("my_law", "soft_law")).write_text(soft)
+    asked = ("test_my_law.py", "test_soft_law.py::test_it_settles", "--smc-out=failed")
+    done = subprocess.run(
+        [sys.executable, "-B", "-m", "pytest", *PLUGIN, *asked],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "1 failed, 7 passed" in done.stdout, done.stdout + done.stderr
+    assert re.search(r"^metric +value +limit", done.stdout, re.MULTILINE)
+    assert re.search(r"^settling_time +\S+ +< 0.6 +NO$", done.stdout, re.MULTILINE)
+    (figure,) = re.findall(r"^figure: (.*)$", done.stdout, re.MULTILINE)
+    assert (tmp_path / figure).is_file()
+
+
+def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path):
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: make docs does")
+    pytest.importorskip("mkdocstrings_handlers.python")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "-f", CONFIGURATION, "-d", tmp_path]
+    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+    built = {path.name: path.read_text() for path in tmp_path.glob("*.html")}
+    assert set(built) == {"404.html", *(name.replace(".md", ".html") for name in NAV)}
+    loaded = r"<(?:script|img|link|iframe)\b[^>]*(?:src|href)=\"?((?:https?:)?//[^\s\">]+)"
+    assert {name: found for name, text in built.items() if (found := re.findall(loaded, text))} == {}
