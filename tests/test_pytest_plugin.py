@@ -47,6 +47,12 @@ def _warm():
     assert response.max_u > 0
 
 
+@pytest.fixture(autouse=True)
+def at_a_terminal(monkeypatch):
+    """pytest cuts its summary short there, and does not where CI is set."""
+    monkeypatch.delenv("CI", raising=False)
+
+
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures cost half a second each; here only their names count."""
