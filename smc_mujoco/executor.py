@@ -21,8 +21,8 @@ from smc_mujoco.run import run, stream
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
-# Of a batch: physics steps times channels a thread, 5 to 12 s of a core; what its logs may take; how many runs.
-STEPS, LOG_STEPS, RUNS = 1_250_000, 3_500_000, 1000
+# Of a batch: physics steps times channels a thread, 2 to 5 s of a core; in all, for what logs and scores take; runs.
+STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 PLAIN = 40  # times slower than compiled laws is the plain loop, roughly
 ADDRESS = "dask://"
 

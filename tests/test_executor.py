@@ -54,7 +54,7 @@ def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():
 
 def test_what_does_not_compile_goes_in_small_batches():
     scenarios = [smc.Scenario(plant="duffing", law=slow(), seed=seed) for seed in range(4)]
-    assert [len(batch) for batch in executor.batches(scenarios, threads=2)] == [3, 1]
+    assert [len(batch) for batch in executor.batches(scenarios, threads=2)] == [1, 1, 1, 1]
 
 
 def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
