@@ -23,6 +23,7 @@ import smc_mujoco as smc
 from smc_mujoco import executor, paper
 from smc_mujoco.callback import installed
 from smc_mujoco.chunk import Chunk
+from smc_mujoco.run import cores
 from smc_mujoco.study import grid, study
 
 QUICK = "--quick" in sys.argv
@@ -55,7 +56,7 @@ def bare(scenarios: Sequence[smc.Scenario], threads: int) -> float:
 
 def main() -> None:
     """Print the ratio and the memory."""
-    threads, out = executor.cores(), Path(tempfile.mkdtemp())
+    threads, out = cores(), Path(tempfile.mkdtemp())
     study(grid(paper.PLANTS, paper.LAWS, CONDITIONS, 1, "study", duration=5.1), out / "compiled")
     studied = simulated = 0.0
     grids = slices()

@@ -140,7 +140,7 @@ def of(
     horizons = HORIZONS if early else HORIZONS[-1:]
     for i, part in enumerate(horizons):
         first = dataclasses.replace(base, duration=part * base.duration)
-        most = done + len(open_) * _steps(base) * sum(horizons[i:])
+        most = done + len(open_) * base.work * sum(horizons[i:])
         size, left = max(32, int(BATCH_BYTES / (72 * (first.samples + 1) * first.plant.n))), []
         for begin in range(0, len(open_), size):
             some = open_[begin : begin + size]
@@ -151,7 +151,7 @@ def of(
                     left.append(some[index])
                 else:
                     outcome[some[index]], decided_at[some[index]] = verdict, first.duration
-            done += len(cases) * _steps(first)
+            done += len(cases) * first.work
         open_ = left
     return Basin(
         plant=base.plant.name,
@@ -242,7 +242,3 @@ def _summed(report: Report, done: float, most: float) -> Callable[[int], None]:
         report(done, most)
 
     return told
-
-
-def _steps(scenario: Scenario) -> int:
-    return scenario.samples * scenario.steps * scenario.plant.n

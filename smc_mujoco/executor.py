@@ -7,21 +7,20 @@ outcome is the part of a table's row that only the run can tell: its scores and 
 batch in which the run was, nor on where that was computed.
 """
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-from smc_mujoco import assembly, plain
+from smc_mujoco import plain
 from smc_mujoco.chunk import Report, contents
 from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.metrics import score
-from smc_mujoco.run import run, stream
+from smc_mujoco.run import layout, run, stream
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
-# Of a batch: physics steps times channels a thread, 2 to 5 s of a core; in all, for what logs and scores take; runs.
+# Of a batch: `Scenario.work` a thread, 2 to 5 s of a core; in all, for what logs and scores take; runs.
 STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 PLAIN = 40  # times slower than compiled laws is the plain loop, roughly
 ADDRESS = "dask://"
@@ -29,11 +28,6 @@ ADDRESS = "dask://"
 Outcome = dict[str, Any]
 Batch = Sequence[Scenario]
 Finish = Callable[[Batch, Sequence[Trace]], None]
-
-
-def cost(scenario: Scenario) -> int:
-    """Physics steps times channels of a run."""
-    return scenario.samples * scenario.steps * scenario.plant.n
 
 
 def outcome(trace: Trace) -> Outcome:
@@ -51,11 +45,10 @@ def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Scenar
     """The scenarios, sorted into batches of one layout, each several seconds of work."""
     groups: dict[tuple, list[Scenario]] = {}
     for s in scenarios:
-        layout = assembly.structure(s), s.integrator, s.physics_step, s.control_period, s.samples, _compiles(s)
-        groups.setdefault(layout, []).append(s)
+        groups.setdefault((layout(s), _compiles(s)), []).append(s)
     most = min(STEPS * threads, LOG_STEPS)
-    for layout, group in groups.items():
-        each = max(1, cost(group[0])) * (1 if layout[-1] else PLAIN * threads)
+    for (_, compiles), group in groups.items():
+        each = max(1, group[0].work) * (1 if compiles else PLAIN * threads)
         size = max(1, min(RUNS, most // each))
         yield from (group[i : i + size] for i in range(0, len(group), size))
 
@@ -106,8 +99,3 @@ def checked(name: object) -> str:
     if isinstance(name, str) and name.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16:
         return name
     raise ScenarioError(f"executor is {shown(name)}: give 'local' or 'dask://HOST:PORT'")
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.executor import batches, cost
+from smc_mujoco.executor import batches
 from smc_mujoco.progress import counter
 from smc_mujoco.run import stream
 from smc_mujoco.scene import slug
@@ -51,7 +51,7 @@ def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) 
         row = table.data.slice(int(i), 1).to_pylist()[0]
         if not (file := path(folder, row)).exists():
             files[table.scenario(int(i))] = file
-    with counter(len(files), sum(map(cost, files)), progress) as counts:
+    with counter(len(files), sum(s.work for s in files), progress) as counts:
         for batch in batches(files, threads):
             for i, trace in stream(batch, threads, counts.stepped):
                 trace.save(files[batch[i]])

@@ -1,30 +1,76 @@
-"""A progress bar of a study: runs done, runs a second, time left."""
+"""Progress bars on stderr, for work that may take more than two seconds."""
 
 import contextlib
 import time
 from collections.abc import Iterator
 
 
-class Counter:
-    """Counts what is done; a bar may show it."""
+class Bar:
+    """What is told how far a piece of work is. This one shows nothing; `bar` gives those that do."""
 
-    def __init__(self, runs: int, steps: int):
-        self.total, self.all_steps = runs, steps
+    def advance(self, work: float) -> None:
+        """Some more work is done."""
+
+    def reached(self, done: float, whole: float) -> None:
+        """So much of the whole is done, for work whose whole is only known as it goes."""
+
+    def says(self, text: str) -> None:
+        """Another text beside the bar."""
+
+
+@contextlib.contextmanager
+def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
+    """A bar while the block lasts.
+
+    Args:
+      what: the text beside it.
+      whole: the work; None where `reached` will say it.
+      shown: False for a Bar that shows nothing.
+      counted: whether "3/60" stands there instead of a percentage.
+    """
+    if not shown:
+        yield Bar()
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    share = MofNCompleteColumn() if counted else TaskProgressColumn()
+    columns = TextColumn("{task.description}"), BarColumn(), share, TimeRemainingColumn()
+    console = Console(stderr=True)
+    hidden = not (console.is_terminal or console.is_jupyter)  # a log file gets no empty lines
+    with Progress(*columns, transient=True, console=console, speed_estimate_period=120, disable=hidden) as progress:
+        task, drawn = progress.add_task(what, total=whole), Bar()
+        drawn.advance = lambda work: progress.advance(task, work)
+        drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
+        drawn.says = lambda text: progress.update(task, description=text)
+        yield drawn
+
+
+class Counter:
+    """Counts a study's runs and steps, and has a bar say so: runs done, runs a second."""
+
+    def __init__(self, runs: int, steps: int, bar: Bar):
+        self.total, self.all_steps, self.bar = runs, steps, bar
         self.runs = self.steps = 0
         self.start = time.monotonic()
 
     def stepped(self, steps: int) -> None:
         """Some more simulated steps."""
         self.steps += steps
-        self.show()
+        self.bar.advance(steps)
+        self.bar.says(str(self))
 
     def finished(self, runs: int) -> None:
         """Some more runs, scored and written."""
         self.runs += runs
-        self.show()
-
-    def show(self) -> None:
-        """Nothing, without a bar."""
+        self.bar.says(str(self))
 
     def __str__(self) -> str:
         spent = time.monotonic() - self.start
@@ -35,14 +81,7 @@ class Counter:
 @contextlib.contextmanager
 def counter(runs: int, steps: int, shown: bool) -> Iterator[Counter]:
     """A Counter, with a bar on the terminal if that is wanted and there is something to do."""
-    counts = Counter(runs, steps)
-    if not (shown and runs):
-        yield counts
-        return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Progress(*columns, transient=True, speed_estimate_period=120) as bar:
-        task = bar.add_task(str(counts), total=steps)
-        counts.show = lambda: bar.update(task, completed=counts.steps, description=str(counts))
+    with bar("", steps, shown=shown and runs > 0) as drawn:
+        counts = Counter(runs, steps, drawn)
+        drawn.says(str(counts))
         yield counts

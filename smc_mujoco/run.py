@@ -6,7 +6,6 @@ does not compile takes the plain loop. The results do not depend on the number o
 else runs.
 """
 
-import contextlib
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,6 +15,7 @@ from smc_mujoco import assembly, callback, plain
 from smc_mujoco.chunk import Chunk, Report, contents
 from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError, shown, whole
+from smc_mujoco.progress import bar
 from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Recorded
@@ -55,8 +55,9 @@ def run(
     """
     many = [scenarios] if isinstance(scenarios, Scenario) else _listed(scenarios)
     found: list[Trace | None] = [None] * len(many)
-    with _bar(many, progress) as report:
-        for index, trace in stream(many, threads, report):
+    work = sum(s.work for s in many if isinstance(s, Scenario))
+    with bar(f"{len(many)} run{'s' * (len(many) != 1)}", work, shown=progress) as drawn:
+        for index, trace in stream(many, threads, drawn.advance):
             found[index] = trace
     traces = [trace for trace in found if trace is not None]
     return traces[0] if isinstance(scenarios, Scenario) else traces
@@ -67,14 +68,14 @@ def stream(
 ) -> Iterator[tuple[int, Trace]]:
     """Pairs (index, Trace), each as soon as its chunk is done; at no time is more than one chunk held here."""
     scenarios = _listed(scenarios)
-    threads = _threads(threads)
+    threads = cores(threads)
     groups: dict[tuple, list[int]] = {}
     slow: list[int] = []
     for index, scenario in enumerate(scenarios):
         _check(scenario)
         try:
             contents(scenario)  # compiles
-            groups.setdefault(_layout(scenario), []).append(index)
+            groups.setdefault(layout(scenario), []).append(index)
         except NotCompilable as error:
             warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
             slow.append(index)
@@ -87,7 +88,7 @@ def stream(
             yield from zip(chunk, traces, strict=True)
     for index in slow:
         yield index, plain.run(scenarios[index])
-        report(_steps(scenarios[index]))
+        report(scenarios[index].work)
 
 
 def _check(scenario: object) -> None:
@@ -102,7 +103,7 @@ def _check(scenario: object) -> None:
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
 
 
-def _layout(s: Scenario) -> tuple:
+def layout(s: Scenario) -> tuple:
     """What the simulations of a Batch must have in common."""
     return assembly.structure(s), s.integrator, s.physics_step, s.control_period, s.samples
 
@@ -131,32 +132,18 @@ def _bytes(s: Scenario) -> int:
     return int(8 * (LOGS * (s.samples + 1) * s.plant.n + 2 * row) + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
 
 
-def _steps(scenario: Scenario) -> int:
-    return scenario.samples * scenario.steps * scenario.plant.n
-
-
 def _listed(scenarios: object) -> list[Scenario]:
     if not isinstance(scenarios, Iterable):
         raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
     return list(scenarios)
 
 
-def _threads(threads: int | None) -> int:
+def cores(threads: int | None = None) -> int:
+    """How many simulations at once: `threads`, or else one for each core that this process may use.
+
+    Raises:
+      ScenarioError: no whole number from 1 to 1024.
+    """
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return whole("threads", threads, 1, 1024)
-
-
-@contextlib.contextmanager
-def _bar(scenarios: Sequence[Scenario], progress: bool) -> Iterator[Report]:
-    """A progress bar over simulated steps, or nothing."""
-    if not progress:
-        yield lambda steps: None
-        return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    total = sum(_steps(s) for s in scenarios if isinstance(s, Scenario))
-    with Progress(*columns, transient=True) as bar:
-        task = bar.add_task(f"{len(scenarios)} runs", total=total)
-        yield lambda steps: bar.advance(task, steps)

@@ -205,6 +205,11 @@ class Scenario:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)
 
+    @property
+    def work(self) -> int:
+        """Physics steps times channels: what a run costs, by which progress and batches are measured."""
+        return self.samples * self.steps * self.plant.n
+
     def stream(self, i: int) -> int:
         """The stream of random numbers of disturbance i, 0 for one that takes none."""
         random = [d.random for d in self.disturbance]

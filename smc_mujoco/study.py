@@ -23,6 +23,7 @@ from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
 from smc_mujoco.law import Law
 from smc_mujoco.progress import Counter, counter
+from smc_mujoco.run import cores
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.store import Store
 from smc_mujoco.table import Table
@@ -141,12 +142,12 @@ def study(
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     where = executors.checked(executor)
     find("choice of traces", traces, dict.fromkeys(keep.CHOICES))
-    threads = executors.cores() if threads is None else whole("threads", threads, 1, 1024)
+    threads = cores(threads)
     store = Store(Path(out))
     named = _named(scenarios)
     store.open(resume)
     missing = [scenario for name, scenario in named.items() if name not in store.where]
-    with counter(len(missing), sum(map(executors.cost, missing)), progress) as counts:
+    with counter(len(missing), sum(s.work for s in missing), progress) as counts:
         if where == "local":
             folder = keep.folder(out) if traces == "all" else None
             _compute(missing, store, threads, counts, folder)
@@ -186,7 +187,7 @@ def _send(scenarios: list[Scenario], store: Store, address: str, counts: Counter
 
     def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
         store.add([_row(s, outcome) for s, outcome in zip(batch, outcomes, strict=True)])
-        counts.stepped(sum(map(executors.cost, batch)))
+        counts.stepped(sum(s.work for s in batch))
         counts.finished(len(batch))
 
     cluster.remote(executors.batches(scenarios, 1), address, finish)

@@ -17,7 +17,7 @@ one and goes on: it is never worse. `objective` says what is minimised.
 import contextlib
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from smc_mujoco.errors import whole
 from smc_mujoco.objective import Objective
 from smc_mujoco.objective import objective as find_objective
 from smc_mujoco.plant import Plant
+from smc_mujoco.progress import bar
 from smc_mujoco.run import run
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.tuned import Evaluation, Tuned, compare, load, versions
@@ -74,8 +75,8 @@ def tune(
     scales = bounds.scales(plant, goal.u_max, cases[0].model == "nominal")
     start = bounds.box(law, scales)
     before = goal.terms(run(cases, threads))
-    with _bar(f"{law.name} on {plant.name}", budget, progress) as report:
-        ledger = _Ledger(goal, cases, tuple(start), budget, threads, report)
+    with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
+        ledger = _Ledger(goal, cases, tuple(start), budget, threads, drawn.advance)
         box = _search(ledger, start, seed)
     best = ledger.best
     return Tuned(
@@ -194,17 +195,3 @@ def _hypercube(box: bounds.Box, random: np.random.Generator) -> np.ndarray:
     unit = LatinHypercube(len(low), rng=random).random(MEMBERS)
     unit[0] = 0.5
     return low + (high - low) * unit
-
-
-@contextlib.contextmanager
-def _bar(what: str, total: int, progress: bool) -> Iterator[Report]:
-    """A progress bar over candidates, or nothing."""
-    if not progress:
-        yield lambda candidates: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda candidates: bar.advance(task, candidates)

@@ -44,7 +44,7 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
     assert sorted(map(id, scenarios)) == sorted(id(s) for batch in found for s in batch)
     for batch in found:
         assert len({(s.plant.name, s.integrator, s.physics_step) for s in batch}) == 1
-        assert len(batch) == 1 or sum(map(executor.cost, batch)) <= 2 * steps
+        assert len(batch) == 1 or sum(s.work for s in batch) <= 2 * steps
 
 
 def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():

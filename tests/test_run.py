@@ -128,10 +128,13 @@ def test_the_number_of_threads_changes_nothing(threads):
     assert all(map(same, smc.run(many, threads=threads), smc.run(many)))
 
 
-def test_progress_is_shown_and_changes_nothing(capfd):
+def test_progress_is_shown_on_a_terminal_and_changes_nothing(capfd, monkeypatch):
     many = [scenario(seed=seed) for seed in range(3)]
     assert all(map(same, smc.run(many, progress=True), smc.run(many)))
-    assert capfd.readouterr().err == ""
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes it for a terminal
+    smc.run(many, progress=True)
+    assert "3 runs" in capfd.readouterr().err
 
 
 # failures

@@ -31,9 +31,9 @@ def basin(
 
             from smc_mujoco.basin import CONVERGES, DOES_NOT, UNDECIDED
             from smc_mujoco.basin import basin as search
-            from smc_mujoco.commands.bar import bar
             from smc_mujoco.draw import region
             from smc_mujoco.files import ended, writable
+            from smc_mujoco.progress import bar
 
         clock, console = Clock(), Console()
         if out:
@@ -41,8 +41,10 @@ def basin(
             writable(out)
         if json:
             writable(ended(json, ".json"))
-        with clock("in all"), bar(f"{law} on {plant}") as report:
-            found = search(plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=report)
+        with clock("in all"), bar(f"{law} on {plant}") as drawn:
+            found = search(
+                plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=drawn.reached
+            )
         counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
         console.print(f"{law} on {plant}: {100 * found.share:.3g} % of the states converge", highlight=False)
         said = "{} converge, {} do not, {} undecided".format(*counts)

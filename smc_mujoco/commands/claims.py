@@ -34,8 +34,10 @@ def claims(
         with loading():
             from rich.console import Console
 
-            from smc_mujoco.claims import audit, show
+            from smc_mujoco.claims import claims as audit
+            from smc_mujoco.claims import evaluations, show
             from smc_mujoco.files import writable
+            from smc_mujoco.progress import bar
             from smc_mujoco.table import Table
 
         clock, console = Clock(), Console()
@@ -43,8 +45,8 @@ def claims(
         known = None if table is None else Table.read(table)
         if out:
             writable(out)
-        with clock("in all"):
-            found = audit.watched(known, ids or None, names, quick, threads)
+        with clock("in all"), bar("claims", evaluations(ids or None, names, quick), counted=True) as drawn:
+            found = audit(known, ids or None, names, quick, threads=threads, report=drawn.advance)
         text = show.document(found)
         if out:
             show.write(text, out)

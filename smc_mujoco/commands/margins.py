@@ -46,10 +46,10 @@ def margins(
 
             from smc_mujoco import gains as sets
             from smc_mujoco import paper
-            from smc_mujoco.commands.bar import bar
             from smc_mujoco.files import ended, writable
             from smc_mujoco.margins import KINDS, save
             from smc_mujoco.margins import margins as search
+            from smc_mujoco.progress import bar
 
         clock, console = Clock(), Console()
         if json:
@@ -57,8 +57,8 @@ def margins(
         chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
         names = _names(laws) or (paper.LAWS if quick else sets.LAWS)
         kind = _names(kinds) or (QUICK["kinds"] if quick else KINDS)
-        with clock("in all"), bar("margins") as report:
-            found = search(chosen, names, kind, gains, quick, threads, report)
+        with clock("in all"), bar("margins") as drawn:
+            found = search(chosen, names, kind, gains, quick, threads, drawn.reached)
         for name in kind:
             console.print(table(name, [margin for margin in found if margin.kind == name]))
         said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"

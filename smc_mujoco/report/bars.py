@@ -4,6 +4,8 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
+from smc_mujoco import progress
+
 Report = Callable[[float, float], None]  # told the work done and the whole
 
 
@@ -18,22 +20,8 @@ class Bars:
     def stage(self, name: str, what: str = "", bar: bool = True) -> Iterator[Report]:
         """A stage of the work; `bar` says whether it has one of its own."""
         start = time.monotonic()
-        with self._bar(f"{name}  {what}") if bar and self.shown else contextlib.nullcontext(_silent) as report:
-            yield report
+        with progress.bar(f"{name}  {what}", shown=bar and self.shown) as drawn:
+            yield drawn.reached
         self.spent[name] = time.monotonic() - start
         if self.shown:
             print(f"{name:11} {what:16} {self.spent[name]:6.0f} s", flush=True)
-
-    @contextlib.contextmanager
-    def _bar(self, text: str) -> Iterator[Report]:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-        with Progress(*columns, transient=True, console=Console(stderr=True), speed_estimate_period=120) as progress:
-            task = progress.add_task(text, total=None)
-            yield lambda done, total: progress.update(task, completed=done, total=total)
-
-
-def _silent(done: float, total: float) -> None:
-    """Nothing to be seen."""
