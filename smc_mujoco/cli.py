@@ -188,10 +188,12 @@ def tune(
         console.print(f"{found.definition}", soft_wrap=True, highlight=False)
         console.print(
             f"objective {found.objective:.4g} s², with the law's default gains {found.before:.4g}; "
-            f"{len(found.history)} sets of gains, seed {seed}, {clock.spent['tuning']:.1f} s",
+            f"{len(found.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {clock.spent['tuning']:.1f} s",
             soft_wrap=True,
             highlight=False,
         )
+        if found.objective > found.before:
+            console.print("no set of gains tried is better than the default ones: give a larger --budget")
         if path:
             console.print(f"wrote {found.save(path)}", soft_wrap=True, highlight=False)
         if front:

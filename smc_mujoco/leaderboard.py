@@ -183,7 +183,7 @@ def leaderboard_table(boards: Sequence[Board]) -> "Table":
     for group in dict.fromkeys(tuple(board.group.items()) for board in boards):
         own = {board.metric: board for board in boards if tuple(board.group.items()) == group}
         seeds = max(board.seeds for board in own.values())
-        size = f"{max(board.cells for board in own.values())} runs, {seeds} seed{'s' * (seeds > 1)}"
+        size = f"{max(board.cells for board in own.values())} runs,\n{seeds} seed{'s' * (seeds > 1)}"
         name = "\n".join(_folded(name) for _, name in group) or "all"
         table.add_row(Text(f"{name}\n", "bold").append(size, "dim not bold"))
         for law in sorted({entry.law for board in own.values() for entry in board.entries}):
@@ -196,7 +196,7 @@ def leaderboard_table(boards: Sequence[Board]) -> "Table":
     return table
 
 
-def _folded(name: str, width: int = 20) -> str:
+def _folded(name: str, width: int = 13) -> str:
     """A name on several lines, broken after underscores."""
     return "\n".join(textwrap.wrap(name.replace("_", "_ "), width)).replace("_ ", "_")
 
@@ -208,18 +208,19 @@ def _cell(board: Board | None, law: str) -> "Text":
     entry = next((e for e in board.entries if e.law == law), None) if board else None
     if board is None or entry is None:
         return Text("")
-    middle, low, high = (_number(value, board.metric) for value in entry.interval[:3])
+    middle = _number(entry.interval.median, board.metric)
+    low, high = (_number(value, board.metric, digits=2) for value in entry.interval[1:3])
     text = Text(f"{middle} " if middle else "", "bold" if entry.rank.best else "")
     text.append(f"#{entry.rank.median:g}").append("*" if entry.rank.best else " ")
-    return text.append(f"\n{low} – {high} " if low else "", "dim not bold")
+    return text.append(f"\n{low}–{high}" if low else "", "dim not bold")
 
 
-def _number(value: float, metric: str) -> str:
+def _number(value: float, metric: str, digits: int = 3) -> str:
     from smc_mujoco.tables import number
 
     if math.isnan(value):
         return ""
-    return f"{100 * value:.0f}" if metric == SETTLES else number(value)
+    return f"{100 * value:.0f}" if metric == SETTLES else number(value, digits)
 
 
 def _winner(board: Board | None) -> "Text":
@@ -231,5 +232,5 @@ def _winner(board: Board | None) -> "Text":
     if board is None:
         return Text("")
     if board.winner:
-        return Text("winner:\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
-    return Text(f"no winner:\n{board.why or f'{len(board.best)} of {len(board.entries)}*'}", "dim")
+        return Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
+    return Text(f"no winner\n{board.why or f'{len(board.best)} of {len(board.entries)}*'}", "dim")

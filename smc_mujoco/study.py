@@ -10,6 +10,7 @@ yours, and the versions of the packages. A run that is there is not run again; o
 
 import dataclasses
 import os
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -47,7 +48,7 @@ class Extent:
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
-QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=3, duration=5.0)
+QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=6, duration=5.0)
 MOST = 1_000_000  # runs of a grid, some kB each; chosen
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
 
@@ -147,6 +148,8 @@ def study(
     named = _named(scenarios)
     store.open(resume)
     missing = [scenario for name, scenario in named.items() if name not in store.where]
+    if progress and len(missing) < len(named):
+        print(f"{len(named) - len(missing)} of {len(named)} runs are in {store.parts}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
         if where == "local":
             folder = keep.folder(out) if traces == "all" else None

@@ -172,6 +172,13 @@ def test_a_finished_study_runs_nothing_and_ends_with_the_same_bytes(tmp_path, no
     assert bytes_of(tmp_path) == before
 
 
+def test_a_study_says_how_many_runs_were_there(tmp_path, capsys):
+    study(small(seeds=2), tmp_path, progress=True)
+    assert capsys.readouterr().err == ""
+    study(small(seeds=3), tmp_path, progress=True)
+    assert capsys.readouterr().err == f"8 of 12 runs are in {tmp_path / 'parts'}\n"
+
+
 def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     study(small(seeds=2), tmp_path)
     ran = []

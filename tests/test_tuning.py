@@ -261,6 +261,13 @@ def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
     assert f"{tuned.gains['k']:g}" in out
     assert f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; 3 sets" in out
     assert tuned.definition == Objective(weight=0.0)
+    assert ("no set of gains" in out) == (tuned.objective > tuned.before)
+
+
+def test_the_command_says_when_the_default_gains_are_better(call):
+    _, out, _ = call("duffing", "super_twisting", "--budget", "1")
+    assert "1 set of gains" in out
+    assert "no set of gains tried is better than the default ones: give a larger --budget" in out
 
 
 @pytest.mark.parametrize(

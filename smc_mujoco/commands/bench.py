@@ -11,7 +11,7 @@ from smc_mujoco.terminal import Clock, loading, mendable
 
 def bench(
     quick: Annotated[
-        bool, typer.Option("--quick", help="A fraction: 4 conditions, 3 seeds, 5 s a run; half a minute on 2 cores.")
+        bool, typer.Option("--quick", help="A fraction: 4 conditions, 6 seeds, 5 s a run; half a minute on 2 cores.")
     ] = False,
     plants: Annotated[str | None, typer.Option(help="Plants, as a,b; default the paper's five.")] = None,
     laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
