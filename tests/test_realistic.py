@@ -217,7 +217,7 @@ CONTACT_NUMBERS = [(name, contact) for name in smc.paper.GAINS for contact in sm
 
 def one_batch(scenarios):
     """Fail unless the scenarios share a layout, and run in one batch as they run alone, on any number of threads."""
-    assert len({runner._layout(s) for s in scenarios}) == 1
+    assert len({runner.layout(s) for s in scenarios}) == 1
     alone = [smc.run(s, threads=1) for s in scenarios]
     for threads in (1, 3):
         for a, b in zip(alone, smc.run(scenarios, threads=threads), strict=True):
@@ -266,7 +266,7 @@ def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
 def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
     common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
     ideal, realistic = scenario(**common), scenario(**common, **fields)
-    assert runner._layout(ideal) != runner._layout(realistic)
+    assert runner.layout(ideal) != runner.layout(realistic)
     for s, trace in zip((realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True):
         same(trace, smc.run(s))
 
