@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from smc_mujoco.margins import margins as margins
     from smc_mujoco.mechanism import deviation as deviation
     from smc_mujoco.metrics import score as score
+    from smc_mujoco.metrics import scores as scores
     from smc_mujoco.own_model import Channel as Channel
     from smc_mujoco.own_model import plant_from as plant_from
     from smc_mujoco.plant import Plant as Plant
@@ -114,7 +115,7 @@ _HOMES = {
     "leaderboard": ("leaderboard",),
     "margins": ("margins",),
     "mechanism": ("deviation",),
-    "metrics": ("score",),
+    "metrics": ("score", "scores"),
     "own_model": ("Channel", "plant_from"),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),

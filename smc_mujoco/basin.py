@@ -133,6 +133,8 @@ def of(
     Args:
       early: whether decided states leave; False runs all of them to the end.
     """
+    if base.plant.mixed:
+        raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)

@@ -8,12 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smc_mujoco import linear, theory
+from smc_mujoco import linear, metrics, theory
 from smc_mujoco.conditions import Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.friction import Coulomb
-from smc_mujoco.measure import EFFORT, scale
-from smc_mujoco.metrics import ultimate_bound
+from smc_mujoco.measure import EFFORT, parts, refuse, scale
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Constant
 from smc_mujoco.trace import Trace
@@ -61,11 +60,13 @@ class Kind:
 
 
 def bears(trace: Trace) -> bool:
-    """Whether a run did not fail and ended within 5 % of its scale."""
+    """Whether a run did not fail and ended within 5 % of its scale, its free joints too, each group of its own."""
     try:
-        return ultimate_bound(trace) <= BEARS * scale(trace)
+        refuse(trace)
     except ScenarioError:  # it failed, or diverged
         return False
+    bound = metrics.CATALOGUE["ultimate_bound"].formula
+    return all(bound(part) <= BEARS * scale(part) for part in parts(trace).values())
 
 
 def _doubled(largest: float) -> tuple[float, ...]:

@@ -92,12 +92,10 @@ def scales(plant: Plant, u_max: float, modelled: bool) -> dict[str, float]:
     """The plant's X, F, M and T in SI units; F is an acceleration for a law that has the model.
 
     Raises:
-      ScenarioError: a plant without a start, without an inertia, or with a joint that no actuator moves.
+      ScenarioError: a plant without a start or an inertia, with channels of two units, or a joint without an actuator.
     """
-    if plant.underactuated:
-        raise ScenarioError(
-            f"{plant.name} has joints of two units and one actuator: tune on a plant without free joints"
-        )
+    if plant.underactuated or plant.mixed:
+        raise ScenarioError(f"{plant.name} has free joints, or channels of two units: tune on a plant that has neither")
     at_rest = np.zeros(plant.n)
     g = min(abs(plant.nominal(at_rest, at_rest, i, plant.values({}))[1]) for i in range(plant.n))
     X = max(abs(x) for x in plant.x0)

@@ -1,9 +1,15 @@
 """What every metric shares: the conventions, the refusal of broken traces, and `@metric`.
 
+Groups: a metric is of channels that are alike, those of one of the plant's `groups`. Driven channels and free
+joints, which no actuator drives, are scored apart, even where their units agree: what the one is told to do, the other
+only suffers. `score` and each metric are of the driven channels. Where these have several units, each unit is measured
+by itself: a time, a percentage, a share is then the worst of them, and a metric with x's or u's unit is refused.
+`scores` has every group by itself, the free joints' too, without what says something of a command.
+
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
 
-- scale: the largest |e(0)| over the channels, or the largest peak-to-peak range of r over the channels
+- scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over them
   where that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
 - settling band: |e| <= 2 % of the scale.
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
@@ -11,10 +17,10 @@ sliding variable; h the time between samples. The conventions, all chosen, one f
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
   sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
-- at rest: |v| <= 0.1 % of the run's largest |v|, or 1e-5 rad/s or m/s where that is larger. Coulomb friction and
+- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s where that is larger. Coulomb friction and
   contacts creep by 1e-6 or less while they hold; LuGre friction bends its bristles meanwhile.
-- channels: errors and efforts that are integrals over time are summed over the channels; every other
-  metric takes the worst channel, so that it does not grow with n.
+- channels: errors and efforts that are integrals over time are summed over the group's channels; every other
+  metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
 """
 
@@ -31,8 +37,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.groups import Group, cut, groups
 
 if TYPE_CHECKING:
+    from smc_mujoco.plant import Plant
     from smc_mujoco.trace import Trace
 
 BAND = 0.02  # of the scale
@@ -52,9 +60,10 @@ class Metric:
       name: the function's name.
       unit: may contain {x} and {u}, see `unit_for`.
       summary: first line of the docstring.
-      network: True if it compares channels and so needs n > 1.
+      network: True if it compares channels and so needs several of a kind.
       realistic: True if it says something of a mechanism that is more than its plant's equation.
-      formula: Trace -> float, without the checks.
+      command: True if it says something of u or s, which free joints have none of.
+      formula: Trace of one group's channels -> float, without the checks.
     """
 
     name: str
@@ -62,7 +71,28 @@ class Metric:
     summary: str
     network: bool
     realistic: bool
+    command: bool
     formula: Callable[[Trace], float]
+
+    def refusal(self, plant: Plant) -> str:
+        """Why this is no metric of the plant's driven channels, or ""."""
+        if self.network and not plant.network:
+            return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
+        if "{" in self.unit and len(units := dict.fromkeys(plant.units[: plant.driven])) > 1:
+            each = " and ".join(units)
+            return f"{self.name} has no one value where channels are in {each}, as in {plant.name}: use smc.scores"
+        return ""
+
+    def of(self, trace: Trace) -> float:
+        """The value for the driven channels, of a trace that `refuse` and `refusal` let pass."""
+        driven = [group for group in groups(trace.scenario.plant) if group.driven]
+        return max(float(self.formula(cut(trace, group))) for group in driven)
+
+    def fits(self, group: Group, plant: Plant) -> bool:
+        """Whether this is a metric of a group by itself."""
+        if self.network:
+            return plant.network and len(group.channels) > 1
+        return group.driven or not self.command
 
     def unit_for(self, x: str) -> str:
         """The unit where positions have the unit x, "rad" or "m" (as `plant.unit`)."""
@@ -70,7 +100,7 @@ class Metric:
 
 
 def metric(
-    unit: str, *, network: bool = False, realistic: bool = False
+    unit: str, *, network: bool = False, realistic: bool = False, command: bool = False
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
 
@@ -78,6 +108,7 @@ def metric(
       unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
       network: True if the metric compares channels.
       realistic: True if it is told only of realistic mechanisms.
+      command: True if it is of the command or the sliding variable.
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
@@ -86,16 +117,17 @@ def metric(
         @functools.wraps(formula)
         def checked(trace: Trace) -> float:
             refuse(trace)
-            if network and trace.x.shape[1] < 2:
-                raise ScenarioError(f"{name} compares channels and {label(trace)} has one: give n >= 2")
-            return float(formula(trace))
+            if why := entry.refusal(trace.scenario.plant):
+                raise ScenarioError(why)
+            return entry.of(trace)
 
-        CATALOGUE[name] = Metric(
+        entry = CATALOGUE[name] = Metric(
             name=name,
             unit=unit,
             summary=doc.partition("\n")[0],
             network=network,
             realistic=realistic,
+            command=command,
             formula=formula,
         )
         return checked
@@ -131,14 +163,19 @@ def error(trace: Trace) -> np.ndarray:
     return trace.x - trace.r
 
 
+def parts(trace: Trace) -> dict[Group, Trace]:
+    """The trace of each group's channels alone: what the functions below take."""
+    return {group: cut(trace, group) for group in groups(trace.scenario.plant)}
+
+
 def scale(trace: Trace) -> float:
-    """The run's yardstick in x's unit, never zero; see the module's conventions."""
+    """The yardstick of a group's trace in x's unit, never zero; see the module's conventions."""
     start, travel = np.abs(trace.x[0] - trace.r[0]).max(), max(np.ptp(r) for r in trace.r.T)
     return float(max(start, travel)) or 1.0
 
 
 def at_rest(trace: Trace) -> np.ndarray:
-    """Where each channel is at rest, (K+1, n); see the module's conventions."""
+    """Where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
     return np.abs(trace.v) <= max(REST * float(np.abs(trace.v).max()), STILL)
 
 

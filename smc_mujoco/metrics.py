@@ -1,8 +1,8 @@
 """Metrics: numbers that say how well a run went, each a function Trace -> float.
 
-Conventions (e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
-`measure.py`. A metric is one decorated function here; `score` and every table find it by themselves.
-Each refuses a trace that diverged or holds NaN (ScenarioError); "never" is inf.
+Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
+`measure.py`. A metric is one decorated function here; `score` and every table find it by themselves. Each is of the
+driven channels, and refuses a trace that diverged or holds NaN (ScenarioError); "never" is inf.
 """
 
 from __future__ import annotations
@@ -12,18 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smc_mujoco import measure
-from smc_mujoco.measure import (
-    BAND,
-    CATALOGUE,
-    Metric,
-    approaches,
-    error,
-    last,
-    last_exit,
-    metric,
-    refuse,
-    scale,
-)
+from smc_mujoco.measure import BAND, CATALOGUE, Metric, approaches, error, last, last_exit, metric, refuse, scale
 
 if TYPE_CHECKING:
     from smc_mujoco.trace import Trace
@@ -39,14 +28,27 @@ def metrics() -> tuple[Metric, ...]:
 
 
 def score(trace: Trace) -> dict[str, float]:
-    """Every metric by name; those that compare channels only where n > 1.
+    """Every metric of the driven channels by name; those that compare channels only of a network.
+
+    Driven channels of several units have the worst time and percentage of any; what has their unit is left to `scores`.
 
     Raises:
       ScenarioError: the run diverged, failed or holds NaN.
     """
     refuse(trace)
-    several = trace.x.shape[1] > 1
-    return {m.name: float(m.formula(trace)) for m in metrics() if several or not m.network}
+    return {m.name: m.of(trace) for m in metrics() if not m.refusal(trace.scenario.plant)}
+
+
+def scores(trace: Trace) -> dict[str, dict[str, float]]:
+    """The metrics of each group of channels by itself: {"driven": score(trace), "free": ...} of a cart with a pole.
+
+    Joints without an actuator are free; a kind in several units has a group of each: "driven m". Raises as `score`.
+    """
+    refuse(trace)
+    plant, found = trace.scenario.plant, {}
+    for group, part in measure.parts(trace).items():
+        found[group.name] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(group, plant)}
+    return found
 
 
 @metric("s")
@@ -84,8 +86,7 @@ def overshoot(trace: Trace) -> float:
     100 max(0, -sign(e_b) e) / scale over all channels and approaches, b an approach's begin: only the far
     side from where it began counts. An approach that begins with e_b = 0 has no near side: there it is |e|.
     """
-    e = error(trace)
-    worst = 0.0
+    e, worst = error(trace), 0.0
     for i, parts in enumerate(approaches(trace)):
         for part in parts:
             side = np.sign(e[part.start, i])
@@ -137,7 +138,7 @@ def itae(trace: Trace) -> float:
     return np.trapezoid(since * np.abs(error(trace)).sum(axis=1), trace.t)
 
 
-@metric("s")
+@metric("s", command=True)
 def reaching_time(trace: Trace) -> float:
     """Time from which |s| stays within 2 % of its start.
 
@@ -149,25 +150,25 @@ def reaching_time(trace: Trace) -> float:
     return last_exit(trace.t, size, BAND * (size[0] or size.max()))
 
 
-@metric("{u}")
+@metric("{u}", command=True)
 def max_u(trace: Trace) -> float:
     """Largest |u|, worst channel."""
     return np.abs(trace.u).max()
 
 
-@metric("{u}")
+@metric("{u}", command=True)
 def max_step(trace: Trace) -> float:
     """Largest |u[k+1] - u[k]|, worst channel; 0 for a single sample."""
     return np.abs(np.diff(trace.u, axis=0)).max(initial=0.0)
 
 
-@metric("{u}")
+@metric("{u}", command=True)
 def tv(trace: Trace) -> float:
     """Total variation of u: sum of |u[k+1] - u[k]| over the run, worst channel."""
     return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
 
 
-@metric("{u}/s")
+@metric("{u}/s", command=True)
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
@@ -181,7 +182,7 @@ def tv_rate(trace: Trace) -> float:
     return np.abs(np.diff(u, axis=0)).sum(axis=0).max() / (t[-1] - t[0])
 
 
-@metric("({u})^2 s")
+@metric("({u})^2 s", command=True)
 def energy(trace: Trace) -> float:
     """Integral of u^2 dt, summed over the channels.
 
@@ -190,7 +191,7 @@ def energy(trace: Trace) -> float:
     return (trace.u[:-1] ** 2).sum(axis=1) @ np.diff(trace.t)
 
 
-@metric("1")
+@metric("1", command=True)
 def hf_share(trace: Trace) -> float:
     """Share of the variance of u above 50 Hz, 0 to 1.
 

@@ -132,12 +132,14 @@ def plant_from(
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = OwnFields(mass, gravity)
+    units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
     why_not = missing(model, joints, drives)
     return Plant(
         name=named(name, file),
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
         mass="m",
-        unit=SIMPLE[mujoco.mjtJoint(model.joint(joints[0]).type[0])],
+        unit=units[0],
+        mixed=units if len(set(units)) > 1 else (),
         x0=starts(model, joints, asked, keyframe),
         n=len(joints),
         sizes=(len(joints), len(joints)),

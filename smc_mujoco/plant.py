@@ -80,7 +80,8 @@ class Plant:
       name: as in `smc.plants()`.
       parameters: name -> value, SI units; the nominal ones, which laws may know.
       mass: which parameter the name `mass` stands for in a mismatch or a jump.
-      unit: unit of x, "rad" or "m".
+      unit: unit of x, "rad" or "m"; of its first channel where they differ.
+      mixed: units of all channels where they differ, (n,), else (); `units` has them in either case.
       x0: initial positions of the paper study, (n,), recycled when n is larger.
       n: number of channels.
       sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
@@ -110,6 +111,7 @@ class Plant:
     lane: tuple[float, float, float]
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
+    mixed: tuple[str, ...] = ()
     underactuated: bool = False
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
     direct: bool = False
@@ -140,9 +142,14 @@ class Plant:
         return self.n - self.driven
 
     @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of x of each channel, (n,)."""
+        return self.mixed or (self.unit,) * self.n
+
+    @property
     def network(self) -> bool:
-        """Whether there are several channels of a kind."""
-        return self.driven > 1
+        """Whether several channels have an actuator, and one unit: then they can be compared with each other."""
+        return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
     def spec(self) -> mujoco.MjSpec:
         """The mechanism as an editable MjSpec, with default parameters."""

@@ -30,7 +30,7 @@ class Scene:
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
       film: the condition that is filmed; by default the first.
       figure: "overview" (x, u, s and phase portrait, a figure a condition) or "signals" (u of all conditions in one).
-      answers: metrics that answer the scene's question, printed on their own after the scores.
+      answers: metrics of the driven channels that answer the scene's question, printed on their own after the scores.
       facts: label -> sentence, printed under the answers: what else was measured.
     """
 
@@ -134,5 +134,6 @@ def _execute(path: Path) -> dict:
 
 
 def slug(name: str) -> str:
-    """A name as part of a file name."""
-    return re.sub(r"[^\w.=+-]+", "_", name.lower()).strip("_") or "run"
+    """A name as part of a file name: letters and numbers, and what ties them together."""
+    words = re.sub(r"\s*=\s*", "-", name.lower())
+    return re.sub(r"[^\w.+-]+", "_", words).strip("_") or "run"

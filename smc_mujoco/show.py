@@ -12,6 +12,7 @@ from smc_mujoco.chunk import contents
 from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
+from smc_mujoco.groups import cut
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import catalogue as plants
 from smc_mujoco.run import run
@@ -42,7 +43,8 @@ def perform(
     with clock("simulating"):
         traces = simulate(scene, threads)
     for condition, runs in traces.items():
-        console.print(tables.scores(_title(scene, condition), runs))
+        for table in tables.scores(_title(scene, condition), runs):
+            console.print(table)
         for label, trace in runs.items():
             if trace.failure:
                 console.print(f"{label}: {trace.failure}", style="red", highlight=False, markup=False)
@@ -121,8 +123,15 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        written += figure(list(runs.values()), path, labels=list(runs), title=_title(scene, condition))
+        written += figure(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
     return written
+
+
+def _labels(runs: Mapping[str, Trace]) -> list[str]:
+    """The labels of a condition as pictures have them: a law's own name, as `paper.comparison` gives, in words."""
+    from smc_mujoco.draw.style import law_name
+
+    return [law_name(label) if label == trace.scenario.law.name else label for label, trace in runs.items()]
 
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
@@ -140,23 +149,28 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     with Progress(transient=True, console=console) as bar:
         task = bar.add_task("film", total=len(video.clock(shown, video.FPS)))
         path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-        return [video.film(shown, path, list(runs), title, report=lambda n: bar.advance(task, n))]
+        return [video.film(shown, path, _labels(runs), title, report=lambda n: bar.advance(task, n))]
 
 
 def summary(trace: Trace, console: Console) -> None:
-    """What a trace is of, the course of its first channel, and its scores."""
+    """What a trace is of, the course of the first channel of each group, and its scores."""
     s = trace.scenario
     console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
     if s.plant.network:
         console.print(f"channel 1 of {s.plant.n}:")
-    for name in ("x", "v", "u", "s", *(["reaction"] if trace.reaction.any() else [])):
-        column = getattr(trace, name)[:, 0]
-        line = f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
-        console.print(line, highlight=False, soft_wrap=True)
+    for group, heading in tables.headings(s.plant).items():
+        if heading:
+            console.print(f"{heading}:", highlight=False, markup=False)
+        part = cut(trace, group)
+        for name in ("x", "v", *("u", "s") * group.driven, *["reaction"] * bool(part.reaction.any())):
+            column = getattr(part, name)[:, 0]
+            line = f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
+            console.print(line, highlight=False, soft_wrap=True)
     if trace.failure:
         console.print(f"failed: {trace.failure}", style="red", highlight=False, markup=False)
     else:
-        console.print(tables.trace_summary(trace))
+        for table in tables.trace_summary(trace):
+            console.print(table)
 
 
 def catalogues(console: Console) -> None:

@@ -9,8 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 from smc_mujoco.draw import style
+from smc_mujoco.groups import Group, groups
 from smc_mujoco.measure import Metric
-from smc_mujoco.metrics import metrics, score
+from smc_mujoco.metrics import metrics
+from smc_mujoco.metrics import scores as metric_scores
+from smc_mujoco.part import joints
+from smc_mujoco.plant import Plant
 from smc_mujoco.trace import Trace
 
 # What a score table shows, of the metrics there are: heading under which, and metric.
@@ -25,29 +29,50 @@ SHOWN = {
 }
 LEAN = {"padding": 0, "show_edge": False, "pad_edge": False}
 FAILED = Text("failed", style="red")
+MOST = 4  # joints of a group that a heading names
 SPARKS = "▁▂▃▄▅▆▇█"
 
 
-def scores(title: str, traces: Mapping[str, Trace]) -> Table:
-    """One line a run, one column a metric, units in the heading; a run that failed says so."""
-    first = next(iter(traces.values()))
-    units = {m.name: m.unit_for(first.scenario.plant.unit) for m in metrics()}
-    networks = {m.name for m in metrics() if m.network}
-    shown = {head: name for head, name in SHOWN.items() if first.scenario.plant.network or name not in networks}
-    table = _table(title)
-    for head, name in shown.items():
-        table.add_column(f"{head}\n[dim]{units[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
-    for label, trace in traces.items():
-        if trace.diverged_at is not None:
-            table.add_row(_label(label, trace), FAILED)
-            continue
-        values = score(trace)
-        table.add_row(_label(label, trace), *(number(values[metric]) for metric in shown.values()))
-    return table
+def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
+    """A table for each group of channels: one line a run, one column a metric, units in the heading.
+
+    A run that failed says so. Only where there are several groups are they named in the titles.
+    """
+    plant = next(iter(traces.values())).scenario.plant
+    values = {label: metric_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
+    tables = []
+    for group, heading in headings(plant).items():
+        fit = {m.name: m.unit_for(group.unit) for m in metrics() if m.fits(group, plant)}
+        shown = {head: name for head, name in SHOWN.items() if name in fit}
+        table = _table(", ".join(filter(None, (title, heading))))
+        for head, name in shown.items():
+            table.add_column(f"{head}\n[dim]{fit[name]}[/]", justify="right", no_wrap=True, vertical="bottom")
+        for label, trace in traces.items():
+            told = [number(values[label][group.name][name]) for name in shown.values()] if label in values else [FAILED]
+            table.add_row(_label(label, trace), *told)
+        tables.append(table)
+    return tables
+
+
+def headings(plant: Plant) -> dict[Group, str]:
+    """The plant's groups with what they are called: by their joints; a single one has no need of a name."""
+    found = groups(plant)
+    if len(found) == 1:
+        return {found[0]: ""}
+    names = [joint.name for joint in joints(plant.spec())]
+    return {group: _heading(group, [names[i] for i in group.channels]) for group in found}
+
+
+def _heading(group: Group, names: Sequence[str]) -> str:
+    kind = "driven" if group.driven else "free"
+    each = ", ".join(names) if len(names) <= MOST else f"{len(names)} joints"
+    return f"{kind}: {each} ({group.unit})"
 
 
 def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
-    """The named metrics of condition -> label -> trace: a table a metric, a line a label, a column a condition.
+    """The named metrics of the driven channels, of condition -> label -> trace.
+
+    A table a metric, a line a label, a column a condition.
 
     Of a single condition: one table, a column a metric.
     """
@@ -74,10 +99,10 @@ def _grid(title: str, heads: Sequence[str], columns: Sequence[tuple[Metric, Mapp
 
 
 def _cell(metric: Metric, trace: Trace | None) -> Text | str:
-    """A metric of a run as a table has it; nothing where there is no such run, or the metric is for networks."""
-    if trace is None or (metric.network and not trace.scenario.plant.network):
+    """A metric of a run as a table has it; nothing where there is no such run, or the metric is not for its plant."""
+    if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    return FAILED if trace.diverged_at is not None else number(metric.formula(trace))
+    return FAILED if trace.diverged_at is not None else number(metric.of(trace))
 
 
 def _table(title: str, width: int = 16) -> Table:
@@ -113,16 +138,22 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
-def trace_summary(trace: Trace) -> Table:
-    """Every metric of one trace, with its unit and what it means; what only realism brings where there is some."""
-    values = score(trace)
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for head in ("metric", "value", "unit", ""):
-        table.add_column(head, justify="right" if head == "value" else "left")
-    for m in metrics():
-        if m.name in values and (trace.scenario.realistic or not m.realistic):
-            table.add_row(m.name, number(values[m.name]), m.unit_for(trace.scenario.plant.unit), Text(m.summary))
-    return table
+def trace_summary(trace: Trace) -> list[Table]:
+    """Every metric of one trace, with its unit and what it means; what only realism brings where there is some.
+
+    A table for each group of channels, with its name where there are several.
+    """
+    values, tables = metric_scores(trace), []
+    for group, heading in headings(trace.scenario.plant).items():
+        table = Table(box=None, padding=(0, 2, 0, 0), title=heading or None, title_justify="left", title_style="bold")
+        for head in ("metric", "value", "unit", ""):
+            table.add_column(head, justify="right" if head == "value" else "left")
+        for m in metrics():
+            if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
+                told = number(values[group.name][m.name])
+                table.add_row(m.name, told, m.unit_for(group.unit), Text(m.summary))
+        tables.append(table)
+    return tables
 
 
 def spark(values: Sequence[float] | np.ndarray, width: int = 60) -> str:

@@ -26,7 +26,7 @@ class Trace:
 
     Attributes:
       t: times, (K + 1,), s.
-      x, v: true positions and velocities, (K + 1, n), the plant's unit and per second.
+      x, v: true positions and velocities, (K + 1, n), each channel in its own of `plant.units`, and per second.
       u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).

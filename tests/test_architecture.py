@@ -41,7 +41,8 @@ CORE = (
     {"scenario"},
     {"harness", "record", "gains", "assembly"},
     {"callback", "trace", "paper"},
-    {"plain", "measure"},
+    {"plain", "groups"},
+    {"measure"},
     {"chunk", "metrics"},
     {"run", "scene"},
 )

@@ -116,6 +116,11 @@ def test_the_channels_of_a_network_start_alike():
 # analytic limits
 
 
+def test_metres_and_radians_do_not_start_alike():
+    with pytest.raises(smc.ScenarioError, match="cart_pole has channels in m and rad"):
+        maps.of(smc.Scenario(plant="cart_pole", law="none"), [0.1], [0.0])
+
+
 def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
     limit = maps.holdable(PENDULUM, WEAK.gains["lam"])
     p = PENDULUM.parameters

@@ -278,6 +278,41 @@ def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
     assert rows["reaction"][-1] == f"{stuck.reaction[-1, 0]:.3g}"
 
 
+def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
+    scenario = smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.3)
+    trace = smc.run(scenario)
+    trace.save(folder / "pole.npz")
+    code, out, err = call("show", "pole.npz")
+    assert (code, err) == (0, "")
+    parts = re.split(r"^(driven: slide \(m\)|free: hinge \(rad\)):? *$", out, flags=re.M)
+    assert parts[1::4] == ["driven: slide (m)"] * 2  # above the curves, and above the metrics
+    assert parts[3::4] == ["free: hinge (rad)"] * 2
+    driven, free = parts[6::2]
+    for part, group, x, u in ((driven, "driven", "m", "N"), (free, "free", "rad", None)):
+        rows = {line.split()[0]: line.split()[1:3] for line in part.splitlines() if line and not line.startswith(" ")}
+        assert rows["peak"] == [tables.number(smc.scores(trace)[group]["peak"]), x]
+        assert rows.get("max_u", ["", None])[1] == u
+        assert "spread_bound" not in rows
+
+
+def test_a_scene_of_carts_with_poles_has_a_table_of_each(call, undrawn, folder):
+    (folder / "poles.py").write_text(
+        "import smc_mujoco as smc\n"
+        "run = smc.Scenario(plant='cart_pole', law='hierarchical', model='nominal', duration=0.3)\n"
+        "scene = smc.Scene(title='Poles', conditions={'nominal': {'k = 2': run, 'k = -2': run}})\n"
+    )
+    code, out, err = call("run", "poles.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    cart, pole = out.split("Poles, driven: slide (m)")[1].split("Poles, free: hinge (rad)")
+    assert "TV rate" in cart
+    assert "TV rate" not in pole
+    peaks = smc.scores(smc.load("out/nominal-k-2.npz"))
+    for part, group, unit in ((cart, "driven", "m s^2"), (pole, "free", "rad s^2")):
+        assert tables.number(peaks[group]["itae"]) in part
+        assert unit in part
+    assert {path.name for path in (folder / "out").glob("*.npz")} == {"nominal-k-2.npz", "nominal-k--2.npz"}
+
+
 ANSWERS = """
 import smc_mujoco as smc
 from smc_mujoco.friction import Coulomb

@@ -6,11 +6,12 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco import plain
-from smc_mujoco.draw import envelope, panels, style
+from smc_mujoco.draw import charts, envelope, panels, rows, style
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.friction import Coulomb
 from smc_mujoco.trace import ARRAYS
@@ -116,6 +117,56 @@ def test_signals_has_a_column_for_each_condition(pair, tmp_path):
         signals([pair[0], pair[0]], tmp_path / "a", ["nominal", "nominal"])
 
 
+def cart_and_pole(**fields) -> smc.Trace:
+    return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields))
+
+
+def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
+    text = words(figure([cart_and_pole()], tmp_path / "a")[0])
+    for name in ("position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"):
+        assert name in text
+    assert "reaction" not in text
+    assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
+    rubbed = words(figure([cart_and_pole(friction=Coulomb(0.01))], tmp_path / "b")[0])
+    assert "reaction (N)" in rubbed
+    assert "reaction on q (N·m)" in rubbed
+
+
+def test_the_band_around_each_joint_is_that_of_its_own_scale():
+    trace = cart_and_pole()
+    shown = rows.rows_of([trace])
+    widths = []
+    for row in shown[:2]:
+        ax = Figure().subplots()
+        panels.target(ax, row.traces)
+        (band,) = ax.collections
+        widths.append(band.get_datalim(ax.transData).height)
+    assert [row.name for row in shown] == ["x", "x", "u", "s"]
+    assert widths == pytest.approx([2 * 0.02, 2 * 0.02 * 0.3])  # the cart starts at 0: 1 m; the pole at 0.3 rad
+
+
+def test_a_film_has_a_chart_of_each_joint():
+    trace = cart_and_pole()
+    parts = charts.shown([trace])
+    assert [(name, group.unit) for name, group, _ in parts] == [("x", "m"), ("x", "rad"), ("u", "m")]
+    np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
+
+
+def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
+    (tmp_path / "arm.xml").write_text("""
+      <mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/><geom size=".1" contype="0"/>
+        <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
+      <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "arm.xml", ["lift", "turn"])
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.5, x0=0.1))
+    text = words(figure([trace], tmp_path / "a")[0])
+    for name in ("position x (m)", "angle x (rad)", "control u (N)", "control u (N·m)"):
+        assert name in text
+    assert "mean" not in text.replace("line: mean over", "")
+    with pytest.raises(smc.ScenarioError, match="u of arm has several units: draw it with"):
+        signals([trace], tmp_path / "b", ["all"])
+
+
 def test_refuses_what_shares_no_axes(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="no traces"):
         figure([], tmp_path / "a")
@@ -136,7 +187,7 @@ def test_laws_keep_their_colours_and_traces_never_share_one(pair):
 
 def test_labels_are_the_laws_names_unless_given(pair):
     assert style.labels([*pair, pair[0]], None) == ["Observer-free 1", "Classical", "Observer-free 2"]
-    assert style.labels(pair, ["observer_free", "heavy"]) == ["Observer-free", "heavy"]
+    assert style.labels(pair, ["observer_free", "heavy"]) == ["observer_free", "heavy"]  # as they are given
 
     @smc.law_function
     def my_law(y, gains, memory):
@@ -237,7 +288,8 @@ def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
 
 def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can_hold_it():
     rubbed = realistic(friction=Coulomb(0.5))
-    (place,) = panels.rests(rubbed)
+    (sample,) = panels.rests(rubbed)
+    place = rubbed.x[sample, 0]
     assert place == pytest.approx(rubbed.x[-1, 0], abs=1e-9)
     assert abs(place) > 1e-3  # friction stopped it before the goal
     assert panels.rests(realistic(friction=smc.Viscous(5.0))) == []

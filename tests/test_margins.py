@@ -5,6 +5,7 @@ import importlib
 import json
 import math
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -57,6 +58,14 @@ def test_a_run_bears_what_leaves_it_within_five_percent_of_its_start():
     carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))
     assert abs(held.x[-1, 0]) < 0.05 * 1.5 < abs(carried.x[-1, 0])
     assert (bearing.bears(held), bearing.bears(carried)) == (True, False)
+
+
+def test_a_run_bears_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
+    trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 0.0), duration=1.0))
+    fallen = trace.x.copy()
+    assert bearing.bears(trace)
+    fallen[:, 1] = np.linspace(0.0, 3.0, len(fallen))
+    assert not bearing.bears(dataclasses.replace(trace, x=fallen))
 
 
 def test_a_run_that_fails_bears_nothing():

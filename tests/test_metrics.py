@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from smc_mujoco import metrics as m
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.measure import scale
+from smc_mujoco.plant import plant
 
 SYNC = {"mean_settling_time", "spread_settling_time", "spread_bound"}
 
@@ -30,22 +31,29 @@ class Run:
     s: np.ndarray
     d: np.ndarray
     r: np.ndarray
+    force: np.ndarray
     reaction: np.ndarray
     scenario: SimpleNamespace
     diverged_at: float | None = None
     failure: str | None = None
 
 
-def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, **fields):
-    """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n)."""
+def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):
+    """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n).
+
+    Without units all channels are in m; `free` if the second half of them has no actuators.
+    """
     t = np.asarray(t, float)
     columns = [np.asarray(a, float) for a in (x, r, u, s, v, reaction)]
     columns = [a[:, None] if a.ndim == 1 else a for a in columns]
     n = max(a.shape[1] if a.ndim else 1 for a in columns)
     x, r, u, s, v, reaction = (np.broadcast_to(a, (t.size, n)) for a in columns)
     zero = np.zeros((t.size, n))
-    scenario = SimpleNamespace(plant=SimpleNamespace(name="duffing", unit="m"), law=SimpleNamespace(name="classical"))
-    return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, reaction=reaction, scenario=scenario, **fields)
+    units = units or ("m",) * n
+    mixed = dataclasses.replace(plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free)
+    scenario = SimpleNamespace(plant=mixed, law=SimpleNamespace(name="classical"))
+    more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
+    return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, **more)
 
 
 def clock(duration, h):
@@ -500,6 +508,72 @@ def test_score_has_every_metric_and_the_sync_metrics_for_networks_only():
     assert all(type(value) is float for value in m.score(network).values())
 
 
+def cart_and_pole():
+    """A cart that settles at 0.2 s from 1 m, its pole at 0.4 s from 0.1 rad."""
+    x = np.array([[1.0, 0.5, 0.0, 0.0, 0.0], [0.1, -0.05, 0.01, 0.0015, 0.001]]).T
+    u = np.array([[3.0, -1.0, 0.0, 0.0, 0.0], [0.0] * 5]).T
+    t = np.arange(5) / 10
+    return run(t, x, u=u, v=np.gradient(x, t, axis=0), reaction=[[0.5, 0.2]] * 5, units=("m", "rad"), free=True)
+
+
+def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
+    trace, alone = cart_and_pole(), []
+    for i in (0, 1):
+        columns = {name: getattr(trace, name)[:, [i]] for name in ("x", "v", "u", "s", "r", "reaction")}
+        alone.append(m.score(run(trace.t, columns.pop("x"), units=("m", "rad")[i : i + 1], **columns)))
+    found = m.scores(trace)
+    assert list(found) == ["driven", "free"]
+    assert found["driven"] == m.score(trace) == alone[0]
+    commanded = {"reaching_time", "max_u", "max_step", "tv", "tv_rate", "energy", "hf_share"}
+    assert found["free"] == {name: value for name, value in alone[1].items() if name not in commanded}
+    assert (found["driven"]["settling_time"], found["free"]["settling_time"]) == (0.2, 0.3)
+    assert (found["driven"]["overshoot"], found["free"]["overshoot"]) == (0.0, pytest.approx(50.0))
+    assert m.peak(trace) == 1.0
+
+
+def test_a_free_joint_is_scored_apart_where_its_unit_is_the_same_too():
+    t = clock(1, 0.1)
+    acrobot = run(t, np.column_stack([np.exp(-9 * t), 5.0 + t]), units=("rad", "rad"), free=True)
+    assert m.settling_time(acrobot) < 1.0
+    assert m.scores(acrobot)["free"]["settling_time"] == math.inf
+
+
+def test_a_cart_with_its_pole_is_no_network():
+    trace = cart_and_pole()
+    assert not SYNC & set(m.score(trace))
+    assert not SYNC & set(m.scores(trace)["free"])
+    for name in SYNC:
+        with pytest.raises(ScenarioError, match=f"{name} compares channels and duffing has one of a kind"):
+            getattr(m, name)(trace)
+
+
+def test_carts_with_poles_side_by_side_are_compared_each_with_its_kind():
+    trace = run(np.arange(2.0), np.array([[0.0, 1.0, 0.2, 0.5]] * 2), units=("m", "m", "rad", "rad"), free=True)
+    assert m.spread_bound(trace) == 1.0
+    assert m.scores(trace)["free"]["spread_bound"] == pytest.approx(0.3)
+
+
+def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_either_unit():
+    t = np.arange(5.0)
+    arm = run(t, np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T, units=("m", "rad", "rad"))
+    found, ours = m.score(arm), m.scores(arm)
+    assert list(ours) == ["driven m", "driven rad"]
+    assert found["settling_time"] == ours["driven rad"]["settling_time"] == 3.0 > ours["driven m"]["settling_time"]
+    assert "ultimate_bound" not in found
+    assert (ours["driven m"]["peak"], ours["driven rad"]["peak"]) == (10.0, 0.1)
+    assert not SYNC & {*found, *ours["driven rad"]}  # a slide and two hinges
+    for name in ("peak", "itae", "tv"):
+        with pytest.raises(ScenarioError, match=rf"{name} has no one value .* in m and rad, .*: use smc.scores"):
+            getattr(m, name)(arm)
+
+
+def test_rest_is_measured_beside_the_largest_speed_of_the_group():
+    """A pole at 100 rad/s does not put its cart at 0.05 m/s to rest."""
+    v = np.array([[0.05, 100.0]] * 3)
+    slow = run(np.arange(3.0), v=v, reaction=1.0, units=("m", "rad"), free=True)
+    assert m.stick_time(slow) == 0.0
+
+
 def test_every_metric_has_a_unit_and_a_one_line_summary():
     for metric in m.metrics():
         assert metric.summary.endswith("."), metric.name
@@ -540,7 +614,7 @@ def broken():
 
 @pytest.mark.parametrize(("message", "trace"), list(broken()))
 def test_a_broken_trace_is_refused_by_score_and_by_every_metric(message, trace):
-    for function in (m.score, *(getattr(m, metric.name) for metric in m.metrics())):
+    for function in (m.score, m.scores, *(getattr(m, metric.name) for metric in m.metrics())):
         with pytest.raises(ScenarioError) as refusal:
             function(trace)
         text = str(refusal.value)

@@ -72,6 +72,12 @@ def pusher() -> smc.Plant:
     return smc.plant_from(path, dict.fromkeys(names, smc.Channel(motor=True)))
 
 
+def test_every_channel_has_the_unit_of_its_joint():
+    assert (cartpole().units, cartpole().network) == (("m", "rad"), False)
+    assert (acrobot().units, acrobot().unit) == (("rad", "rad"), "rad")
+    assert both_links().network
+
+
 @pytest.fixture
 def arm(tmp_path):
     """A function that writes an arm and makes a plant of it."""

@@ -223,6 +223,36 @@ def test_a_response_starts_at_rest_at_zero_and_has_every_metric(step_response):
     assert "\n" not in repr(r)
 
 
+@pytest.fixture
+def pole(step_response):
+    return step_response("cart_pole", "hierarchical", step=0.3, model="nominal", duration=1.0)
+
+
+def test_a_pole_on_a_cart_has_metrics_of_its_own_in_its_own_unit(pole):
+    assert (pole.trace.r == [0.3, 0.0]).all()
+    assert {name: float(value) for name, value in pole.scores["free"].items()} == smc.scores(pole.trace)["free"]
+    assert pole.metrics.keys() == pole.scores["driven"].keys() == smc.score(pole.trace).keys()
+    assert pole.scores["free"]["peak"] > 1e-4
+    assert not pole.scores["free"]["peak"] < 1e-4
+    peak = next(line for line in pole.table().splitlines() if line.startswith("free peak "))
+    assert peak.split()[3:] == ["rad", ">", "0.0001,", "<", "0.0001", "NO"]
+    assert pole.unit("peak") == "m"
+    with pytest.raises(AttributeError, match="spread_bound compares channels and cart_pole has one of a kind"):
+        pole.spread_bound  # noqa: B018
+
+
+def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
+    golden.record(tmp_path / "a.json", "test", pole, None, {})
+    golden.compare(tmp_path / "a.json", "test", pole, None, {})
+    text = (tmp_path / "a.json").read_text()
+    assert '"free peak"' in text
+    held = f'"value": {float(pole.scores["free"]["peak"])!r}'
+    assert text.count(held) == 1
+    (tmp_path / "a.json").write_text(text.replace(held, '"value": 9.0'))
+    with pytest.raises(AssertionError, match=r"^free peak is .* rad, golden 9 ±"):
+        golden.compare(tmp_path / "a.json", "test", pole, None, {})
+
+
 def test_a_condition_sets_its_fields_and_the_test_s_own_go_before_them(step_response):
     r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, seed=7)
     assert (r.scenario.noise, r.scenario.seed) == (smc.paper.CONDITIONS["noise"]["noise"], 7)  # pyright: ignore[reportIndexIssue]

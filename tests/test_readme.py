@@ -100,6 +100,14 @@ def results(folder: Path) -> set[str]:
     return {(folder / f"{scene.slug(condition)}-{scene.slug(label)}.npz").as_posix() for condition, label, _ in runs}
 
 
+def test_names_of_files_hold_letters_numbers_and_little_else():
+    names = {"k = 2": "k-2", "k=2": "k-2", "k = -2": "k--2", "a = 0.67": "a-0.67", "0.02 N, N m": "0.02_n_n_m"}
+    assert {name: scene.slug(name) for name in names} == names
+    run = smc.Scenario(plant="duffing", law="none")
+    with pytest.raises(smc.ScenarioError, match="same file name: k = 2, k=2"):
+        smc.Scene(title="Twins", conditions={"nominal": {"k = 2": run, "k=2": run}})
+
+
 def test_traces_are_named_as_these_tests_say(tmp_path):
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
     assert show.save({"A b": {"c": trace}}, tmp_path) == [tmp_path / f"{scene.slug('A b')}-{scene.slug('c')}.npz"]

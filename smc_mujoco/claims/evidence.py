@@ -116,8 +116,7 @@ def scored(trace: Trace) -> Scores:
     try:
         return score(trace)
     except ScenarioError:
-        several = trace.x.shape[1] > 1
-        return {m.name: math.inf for m in metrics() if several or not m.network}
+        return {m.name: math.inf for m in metrics() if not m.refusal(trace.scenario.plant)}
 
 
 def of_table(table: "Table") -> dict[str, Held]:

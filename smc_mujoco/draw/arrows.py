@@ -2,24 +2,30 @@
 
 The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which
 switches faster than the film still shows how far it swings. Arrows lie along a pendulum's arc, beyond the bob, and
-along the rail, above the cart.
+along the rail, above the cart, and before it where it carries something. Driven joints alone have arrows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from smc_mujoco import assembly
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.envelope import Envelope, windows
+from smc_mujoco.groups import Group, groups
+from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
-HINGE, SLIDE = 0.85, 0.16  # length of the longest: of the pendulum's, of the rail's
+HINGE, SLIDE = 0.425, 0.08  # length of the longest: of the pendulum's, of the rail's
+RAIL = 0.035  # m, thickness of the rail's
+OWN, THIN = 0.25, 0.012  # length and thickness of those along an own model's slides, of its extent
 CHAIN = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
 LEAST = 0.05  # of the longest: shorter ones are not drawn
-SLENDER = 0.1  # thickest shaft of a short one, of its length
+SLENDER = 0.2  # thickest shaft of a short one, of its length
 LEVER = 1e-6  # m: a body centred on its hinge has no arc to lay an arrow along
+DRAWN = 0.5  # of the length that it is given, MuJoCo draws an arrow (not a capsule): measured, 3.17.0
 BAR = 0.1  # of the longest: the least range that gets a bar
 
 
@@ -32,6 +38,34 @@ class Arrow(NamedTuple):
     layer: int = 0  # further from the body
     size: float = 1.0
     head: bool = True
+
+
+class Grip(NamedTuple):
+    """Where and how large arrows are drawn at a joint.
+
+    Attributes:
+      joint: of the film's scene.
+      unit: at a slide the length of the longest, m; at a hinge how much longer than HINGE of the pendulum it is.
+      thick: their thickness at a slide, m.
+      front: the direction to the camera, (3,), where they lie before what slides: it carries what would hide them.
+    """
+
+    joint: int
+    unit: float
+    thick: float
+    front: np.ndarray | None
+
+
+def grips(
+    scenario: Scenario, joints: Sequence[int], slides: Sequence[bool], rail: float, front: np.ndarray
+) -> list[Grip]:
+    """A Grip for each joint of a machine on a `rail`, m, inf without one; under a camera in front of it."""
+    plant = scenario.plant
+    extent = float(assembly.model([scenario]).stat.extent) if plant.direct else 0.0
+    length, thick = (OWN * extent, THIN * extent) if plant.direct else (SLIDE * rail, RAIL)
+    turning = CHAIN if plant.n > 1 and not plant.direct else 1.0
+    before = front if plant.direct or plant.free else None
+    return [Grip(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
 
 
 class Acts(NamedTuple):
@@ -60,11 +94,22 @@ class Longest(NamedTuple):
     blows: bool = False  # whether a reaction is larger than its longest arrow
 
 
-def longest(traces: Sequence[Trace]) -> Longest:
-    """The scale of the arrows of these traces."""
+def longest(traces: Sequence[Trace]) -> dict[Group, Longest]:
+    """The scale of the arrows of these traces, for each group of driven channels."""
+    return {group: _longest(parts) for group, parts in style.split(traces).items() if group.driven}
+
+
+def _longest(traces: Sequence[Trace]) -> Longest:
     control, disturbance, reaction = (max(map(abs, panels.span(traces, y))) for y in ("applied", "d", "reaction"))
     shown = min(reaction, control) if control else reaction
     return Longest(control, disturbance, shown, reaction > 1.01 * shown)
+
+
+def scales(trace: Trace, longest: Mapping[Group, Longest]) -> list[Longest]:
+    """The scale of the arrows of each of a trace's driven channels."""
+    driven = [group for group in groups(trace.scenario.plant) if group.driven]
+    found = {i: each for group, each in zip(driven, longest.values(), strict=True) for i in group.channels}
+    return [found[i] for i in sorted(found)]
 
 
 def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) -> list[Arrow]:
@@ -87,38 +132,51 @@ def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) ->
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > LEAST]
 
 
-def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, joint: int, unit: float, arrow: Arrow):
-    """Add an arrow to a scene that holds the machines already.
-
-    Args:
-      unit: length of the rail, m, if the joint is a slide; else how much longer than HINGE the longest arrow is.
-    """
+def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, grip: Grip, arrow: Arrow) -> None:
+    """Add an arrow to a scene that holds the machines already."""
     if scene.ngeom >= scene.maxgeom:
         return
-    body = handle(model, model.jnt_bodyid[joint])
+    body = handle(model, model.jnt_bodyid[grip.joint])
     if body < 0:
         return
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
-    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
-        arm = place - data.xanchor[joint]
+    if model.jnt_type[grip.joint] == mujoco.mjtJoint.mjJNT_HINGE:
+        arm = place - data.xanchor[grip.joint]
         length = np.linalg.norm(arm)
         if length < LEVER:
             return
-        reach, width, out = unit * HINGE * length, 0.16 * radius + 0.012 * unit, arm / length
-        along, start = np.cross(data.xaxis[joint], out), radius + 1.6 * width
+        reach, width, out = grip.unit * HINGE * length, 0.16 * radius + 0.012 * grip.unit, arm / length
+        along, start = np.cross(data.xaxis[grip.joint], out), radius + 1.6 * width
     else:
-        reach, width, out = unit * SLIDE, 0.035, np.array([0.0, 0.0, 1.0])
-        along, start = data.xaxis[joint], model.geom_size[body, 2] + 2.2 * width
+        reach, width, along, out = grip.unit, grip.thick, data.xaxis[grip.joint], np.array([0.0, 0.0, 1.0])
+        if grip.front is not None:
+            out = aside(along, grip.front)
+            place = place + (half(model, data, body, grip.front) + width) * grip.front
+        start = half(model, data, body, out) + 2.2 * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
     width = min(arrow.size * width, 0.006 + SLENDER * abs(high - low))
 
     kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
-    geom, zero = scene.geoms[scene.ngeom], np.zeros(3)
+    geom, zero, end = scene.geoms[scene.ngeom], np.zeros(3), low + (high - low) / (DRAWN if arrow.head else 1.0)
     mujoco.mjv_initGeom(geom, kind, zero, zero, np.zeros(9), np.array(arrow.rgba, np.float32))
-    mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + high * along)
+    mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + end * along)
     geom.specular = 0.0
     scene.ngeom += 1
+
+
+def aside(along: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """The direction across a slide in the picture, (3,): up, where it can be."""
+    across = np.cross(front, along)
+    if np.linalg.norm(across) < 0.1:  # it slides to the camera
+        return np.array([0.0, 0.0, 1.0])
+    return across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
+
+
+def half(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
+    """How far a geom's box reaches from its middle in a direction, m."""
+    turned = direction @ data.geom_xmat[geom].reshape(3, 3)
+    return float(model.geom_aabb[geom, :3] @ turned + model.geom_aabb[geom, 3:] @ np.abs(turned))
 
 
 def handle(model: mujoco.MjModel, body: int) -> int:

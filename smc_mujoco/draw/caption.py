@@ -1,7 +1,7 @@
 """Words on a film's frames: title, key to the arrows, a label a machine and its state, the clock. Drawn with Pillow."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -11,6 +11,7 @@ from smc_mujoco.draw.arrows import Longest
 from smc_mujoco.draw.camera import Room
 from smc_mujoco.draw.stage import SHOWN
 from smc_mujoco.draw.state import CALM, HELD, STRUCK, State, play, rubs, touches
+from smc_mujoco.groups import Group
 from smc_mujoco.trace import Trace
 
 LABEL, TITLE, KEY, BADGE = 15, 24, 13, 13  # px, height of letters in a film of full size
@@ -34,7 +35,7 @@ class Caption:
         title: str | None,
         size: tuple[int, int],
         scale: float,
-        longest: Longest,
+        longest: Mapping[Group, Longest],
         told: Sequence[Sequence[State | None]] = (),
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
@@ -158,18 +159,24 @@ class Caption:
         draw.text((right, y), text, colour, style.font(KEY * s, bold=True), anchor="rm")
 
 
-def key(traces: Sequence[Trace], longest: Longest) -> list[str]:
+def key(traces: Sequence[Trace], longest: Mapping[Group, Longest]) -> list[str]:
     """What the arrows mean, and how much of a network is shown."""
-    unit = style.units(traces[0])["u"]
+    sizes = [(style.units(group)["u"], each) for group, each in longest.items()]
+    control = [f"{style.short(each.control)} {unit}" for unit, each in sizes if each.control]
+    disturbance = [f"{style.short(each.disturbance)} {unit}" for unit, each in sizes if each.disturbance]
+    reaction = [
+        f"{style.short(each.reaction)} {unit}{' or more' * each.blows}" for unit, each in sizes if each.reaction
+    ]
     words = []
-    if longest.control:
-        words.append(f"coloured arrow: mean control, longest {style.short(longest.control)} {unit}")
-        words.append("bar: the range over which it switches")
-    if longest.disturbance:
-        words.append(f"dark arrow: disturbance, longest {style.short(longest.disturbance)} {unit}")
-    if longest.reaction:
-        most = f"{style.short(longest.reaction)} {unit}{' or more' * longest.blows}"
-        words.append(f"violet arrow: {reacting(traces)}, longest {most}")
+    if control:
+        words += [
+            f"coloured arrow: mean control, longest {', '.join(control)}",
+            "bar: the range over which it switches",
+        ]
+    if disturbance:
+        words.append(f"dark arrow: disturbance, longest {', '.join(disturbance)}")
+    if reaction:
+        words.append(f"violet arrow: {reacting(traces)}, longest {', '.join(reaction)}")
     most = max(trace.scenario.plant.n for trace in traces)
     if most > SHOWN:
         words.append(f"machines: the first {SHOWN} of {most} pendulums")
@@ -178,6 +185,8 @@ def key(traces: Sequence[Trace], longest: Longest) -> list[str]:
 
 def reacting(traces: Sequence[Trace]) -> str:
     """What the reaction of these traces is made of."""
+    if any(trace.scenario.plant.direct and not trace.scenario.plant.smooth for trace in traces):
+        return "friction, limits and contact"
     runs = [trace.scenario for trace in traces if trace.scenario.realistic]
     kinds = {
         "friction": any(rubs(scenario) for scenario in runs),

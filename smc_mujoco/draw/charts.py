@@ -1,4 +1,4 @@
-"""The strip charts under a film: x and u of all traces, drawn once and uncovered as the clock runs.
+"""The strip charts under a film: x, q of free joints, and u of all traces, drawn once and uncovered as the clock runs.
 
 Two pictures are drawn: the charts with every curve, and the charts with the curves as a faint promise. A frame takes
 the columns up to the clock from the first and the rest from the second, so that it costs a copy, whatever they hold.
@@ -14,15 +14,18 @@ from matplotlib.figure import Figure
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.envelope import end
+from smc_mujoco.groups import Group
 from smc_mujoco.trace import Trace
 
 DPI = 100
 FAINT = 0.16  # opacity of what is still to come
+LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
+GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one where there are two
 CURSOR = np.array(style.rgb(style.MUTED))
 
 
 class Charts:
-    """The two charts as pictures of `size` px; `at` gives a frame of them.
+    """The charts as pictures of `size` px; `at` gives a frame of them.
 
     Attributes:
       scale: pixels per px of a film 1280 wide, by which letters and lines grow.
@@ -41,20 +44,25 @@ class Charts:
         with style.page():
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
-            axes = figure.subplots(1, 2)
-            figure.subplots_adjust(left=0.062, right=0.985, bottom=0.2, top=0.855, wspace=0.155)
-            draw_axes(axes, traces, self.end, DPI * scale / 72)
+            charts = shown(traces)
+            axes = figure.subplots(1, len(charts))
+            wide = (RIGHT - LEFT + GAP) / len(charts) - GAP
+            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=GAP / wide)
+            draw_axes(axes, charts, self.end, DPI * scale / 72)
             for ax in axes:
                 panels.jumps(ax, style.jumps(traces, names), named=ax is axes[0])
-            drawn = [panels.over_time(ax, traces, colours, name) for ax, name in zip(axes, "xu", strict=True)]
+            drawn = [
+                panels.over_time(ax, parts, colours, name, group)
+                for ax, (name, group, parts) in zip(axes, charts, strict=True)
+            ]
             self.full = picture(canvas)
             for artist in itertools.chain(*drawn):
                 artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))
             self.faint = picture(canvas)
             self.frames = [frame(ax, self.full.shape[0]) for ax in axes]
             self.paths = [
-                [path(ax, trace, name, self.full.shape[0]) for trace in traces]
-                for ax, name in zip(axes, "xu", strict=True)
+                [path(ax, part, name, self.full.shape[0]) for part in parts]
+                for ax, (name, _, parts) in zip(axes, charts, strict=True)
             ]
         self.colours = [np.array(style.rgb(colour)) for colour in colours]
 
@@ -85,12 +93,22 @@ class Charts:
             image[rows, cols] = (image[rows, cols] * (1 - cover) + ink * cover).astype(np.uint8)
 
 
-def draw_axes(axes: Sequence[Axes], traces: Sequence[Trace], end: float, point: float) -> None:
+def shown(traces: Sequence[Trace]) -> list[tuple[str, Group, list[Trace]]]:
+    """What the charts are of, from left to right: x of each group of channels, and u of the driven ones."""
+    parts = style.split(traces)
+    return [("x", *each) for each in parts.items()] + [("u", *each) for each in parts.items() if each[0].driven]
+
+
+def draw_axes(axes: Sequence[Axes], charts: Sequence[tuple[str, Group, list[Trace]]], end: float, point: float) -> None:
     """Frames, names and units, and what lines and bands are; a point has `point` px."""
-    unit, n, window = style.units(traces[0]), traces[0].scenario.plant.driven, panels.mean_window(traces)
-    names = f"{style.quantity(traces[0])} x ({unit['x']})", f"control u ({unit['u']})"
-    for ax, name, words in zip(axes, names, (note(n), note(n, window, band=True)), strict=True):
+    for ax, (quantity, group, parts) in zip(axes, charts, strict=True):
+        n, unit = len(group.channels), style.units(group)[quantity]
+        name = f"control u ({unit})" if quantity == "u" else f"{style.quantity(group)} {style.letter(group)} ({unit})"
+        words = note(n, panels.mean_window(parts), band=True) if quantity == "u" else note(n)
         room = ax.get_window_extent().width - style.width(name, 11 * point, bold=True) - 15 * point
+        if len(charts) > 2:  # they are narrow: what the band is goes without saying before what the line is
+            shorter = (words, words.partition(", ")[2], "")
+            words = next(text for text in shorter if not text or style.width(text, 9.5 * point) <= room)
         ax.set_title(name)
         ax.set_title(
             style.cropped(words, room, 9.5 * point), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED

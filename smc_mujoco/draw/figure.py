@@ -4,7 +4,7 @@ Written as SVG and PNG; the same traces give the same files.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,11 @@ from matplotlib.patches import Patch
 from smc_mujoco import metrics
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.envelope import end, finite
+from smc_mujoco.draw.rows import REALISM, Row, axis, rows_of
 from smc_mujoco.draw.state import HOLD
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
+from smc_mujoco.groups import Group, cut
 from smc_mujoco.trace import Trace
 
 WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
@@ -35,13 +37,14 @@ def figure(
 ) -> list[Path]:
     """Draw traces of one plant: x, u and s over time, the phase portrait, the last samples of u.
 
-    Of a network: the mean of the channels, single channels light, and the spread max x - min x. Of realistic mechanisms
-    also what an actuator delivers, what friction and contacts exert, and where friction holds it. A run that failed is
-    drawn to its end, which is marked; the instant at which a plant changes is marked too.
+    Of a network: the mean of the channels, single channels light, and the spread max x - min x. Joints that no actuator
+    drives, and channels in another unit, have panels of their own. Of realistic mechanisms also what an actuator
+    delivers, what friction and contacts exert, and where friction holds it. A run that failed is drawn to its end,
+    which is marked; the instant at which a plant changes is marked too.
 
     Args:
       path: without an ending, or with .svg or .png, which give way to both.
-      labels: one a trace; default: the laws' names.
+      labels: one a trace, shown as it is; default: the laws' names.
       title: default: the plant's name.
 
     Returns:
@@ -53,19 +56,25 @@ def figure(
     base = _base(path)
     names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
     traces = [finite(trace) for trace in traces]
-    network = any(trace.scenario.plant.network for trace in traces)
+    rows, held = rows_of(traces), [panels.rests(trace) for trace in traces]
     with style.page():
-        page = _page(7.2 + 1.3 * len(_realism(traces)))
+        extra = sum(row.name in REALISM for row in rows)
+        page = _page(7.2 + 1.3 * (extra + max(0, len(rows) - extra - 4)))
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
-        _overview(page, left, traces, names, colours)
-        portrait, close = (page.add_subplot(cell) for cell in right.subgridspec(2, 1, height_ratios=(1.5, 1.0)))
-        panels.phase(portrait, traces, colours)
-        portrait.set_xlabel(_name(traces[0], "x", network))
-        portrait.set_ylabel(_name(traces[0], "v", network))
-        panels.last_samples(close, traces, colours)
+        _overview(page, left, rows, style.jumps(traces, names), colours)
+        places = [row for row in rows if row.name == "x"]
+        column = right.subgridspec(len(places) + 1, 1, height_ratios=(*[1.5] * len(places), 1.0))
+        for i, row in enumerate(places):
+            portrait = page.add_subplot(column[i])
+            panels.phase(portrait, row.traces, colours, held)
+            portrait.set_xlabel(axis(row, "x"))
+            portrait.set_ylabel(axis(row, "v"))
+        first, close = next(row for row in rows if row.name == "u"), page.add_subplot(column[len(places)])
+        panels.last_samples(close, first.traces, colours)
         close.set_xlabel("time before the end (ms)")
-        close.set_ylabel(_name(traces[0], "u", False) + (", channel 1" if network else ""))
-        _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours))
+        several = traces[0].scenario.plant.driven > 1
+        close.set_ylabel(f"control u ({style.units(first.group)['u']})" + (", channel 1" if several else ""))
+        _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours, rows))
         return _write(page, base)
 
 
@@ -80,7 +89,7 @@ def signals(
     Args:
       labels: the condition of each trace; traces under the same condition share it.
 
-    Returns, raises: as `figure`; also ScenarioError for two traces of one law under one condition.
+    Returns, raises: as `figure`; also ScenarioError for two traces of one law under one condition, or u in two units.
     """
     base = _base(path)
     given = style.labels(style.same_plant(traces), labels)
@@ -88,6 +97,9 @@ def signals(
     cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
     if len(cells) < len(traces):
         raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
+    group, *others = [group for group in style.split(traces) if group.driven]
+    if others:
+        raise ScenarioError(f"u of {traces[0].scenario.plant.name} has several units: draw it with smc.figure")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
     with style.page():
         page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
@@ -95,11 +107,11 @@ def signals(
         room = 72 * WIDTH / len(conditions)  # points, a column's width
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
-            panels.over_time(ax, [trace], [style.law_colour(law)], "u")
+            panels.over_time(ax, [cut(trace, group)], [style.law_colour(law)], "u", group)
             panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
-            ax.set_title(_variation(trace), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
+            ax.set_title(_variation(trace, group), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         for law, ax in zip(laws, axes[:, 0], strict=True):
-            ax.set_ylabel(_name(traces[0], "u", traces[0].scenario.plant.network).replace("control ", ""))
+            ax.set_ylabel(axis(Row("u", group, traces), "u").replace("control ", ""))
             words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
             ax.set_title(words, color=style.law_colour(law), parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
@@ -107,39 +119,31 @@ def signals(
             place = (0.5, 1.0), (0, 22), "axes fraction", "offset points"
             top.annotate(words, *place, ha="center", fontsize=13, parse_math=False)
             bottom.set_xlabel("time (s)")
-        axes[0, 0].set_ylim(panels.limits(traces, "u"))
+        parts = style.split(traces)[group]
+        axes[0, 0].set_ylim(panels.limits(parts, "u"))
         axes[0, 0].set_xlim(0.0, end(traces))
         note = Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %")
-        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning(traces, "u"), note])
+        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning([parts], "u"), note])
         return _write(page, base)
 
 
 def _overview(
-    page: Figure, place: SubplotSpec, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]
+    page: Figure, place: SubplotSpec, rows: Sequence[Row], changes: Mapping[float, str], colours: Sequence[str]
 ) -> None:
     """The quantities over time, one below the other."""
-    plant = traces[0].scenario.plant
-    network = plant.network
-    rows = ["x", *["spread"] * network, *["q"] * bool(plant.free), "u", *_realism(traces), "s"]
-    column, axes = place.subgridspec(len(rows), 1), {}
-    for i, name in enumerate(rows):
-        ax = axes[name] = page.add_subplot(column[i], sharex=axes.get("x"))
-        if name == "x":
-            panels.target(ax, traces)
-        panels.over_time(ax, traces, colours, name)
-        panels.jumps(ax, style.jumps(traces, names), named=name == "x")
-        ax.set_ylabel(_name(traces[0], name, network))
-        ax.tick_params(labelbottom=name == "s")
-    axes["s"].set_xlabel("time (s)")
-    axes["s"].set_xlim(0.0, end(traces))
-    page.align_ylabels(list(axes.values()))
-
-
-def _realism(traces: Sequence[Trace]) -> list[str]:
-    """What realism adds to an overview: what actuators deliver, what friction and contacts exert."""
-    drives = any(trace.scenario.actuator for trace in traces)
-    reacts = any(np.nan_to_num(trace.reaction).any() for trace in traces)
-    return ["force"] * drives + ["reaction"] * reacts
+    column, axes = place.subgridspec(len(rows), 1), []
+    for i, row in enumerate(rows):
+        ax = page.add_subplot(column[i], sharex=axes[0] if axes else None)
+        axes.append(ax)
+        if row.name == "x":
+            panels.target(ax, row.traces)
+        panels.over_time(ax, row.traces, colours, row.name, row.group)
+        panels.jumps(ax, changes, named=ax is axes[0])
+        ax.set_ylabel(axis(row, row.name))
+        ax.tick_params(labelbottom=row is rows[-1])
+    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlim(0.0, end(rows[0].traces))
+    page.align_ylabels(axes)
 
 
 def _page(height: float) -> Figure:
@@ -172,33 +176,28 @@ def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
         shown.set_parse_math(False)
 
 
-def _name(trace: Trace, name: str, network: bool) -> str:
-    """An axis' name with its unit."""
-    unit = style.units(trace)[{"spread": "x", "force": "u", "reaction": "u"}.get(name, name)]
-    if name in ("spread", "force", "reaction"):
-        words = {"spread": "max − min x", "force": "delivered", "reaction": "reaction"}
-        return f"{'mean ' * (network and name != 'spread')}{words[name]} ({unit})"
-    words = {"x": style.quantity(trace), "v": "velocity", "u": "control", "s": "sliding variable", "q": "angle"}
-    return f"{'mean' if network else words[name]} {name} ({unit})"
-
-
-def _key(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Line2D | Patch]:
+def _key(
+    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], rows: Sequence[Row]
+) -> list[Line2D | Patch]:
     """What the legend shows: the traces, the reference with its band, what lines and bands are."""
     handles: list[Line2D | Patch] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
         how = style.ending(trace)
         words = style.cropped(name, 0.3 * 72 * WIDTH, LETTERS) + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=3, label=words))
-    banded = ["u", *("delivered" if name == "force" else name for name in _realism(traces)), "s"]
+    there = [row.name for row in rows]
+    banded = ["u", *("delivered" if name == "force" else name for name in REALISM if name in there), "s"]
     if any(panels.rests(trace) for trace in traces):
         diamond = {"marker": "D", "ms": 5, "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
-    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(traces, ", ".join(banded))]
+    driven = [row.traces for row in rows if row.name == "u"]
+    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(driven, ", ".join(banded))]
 
 
-def _meaning(traces: Sequence[Trace], names: str) -> list[Line2D | Patch]:
+def _meaning(driven: Sequence[Sequence[Trace]], names: str) -> list[Line2D | Patch]:
     """What the bands and the lines of the named quantities are, where they need words."""
-    n, over = traces[0].scenario.plant.driven, panels.mean_window(traces)
+    n = max(traces[0].x.shape[1] for traces in driven)
+    over = max(filter(None, map(panels.mean_window, driven)), default=None)
     words = [] if over is None and n == 1 else [f"band: range of {names}"]
     words += [f"line: mean over {1e3 * over:.3g} ms"] if over else []
     handles: list[Line2D | Patch] = [Patch(color=style.MUTED, alpha=0.3, label=", ".join(words))] if words else []
@@ -209,12 +208,12 @@ def _meaning(traces: Sequence[Trace], names: str) -> list[Line2D | Patch]:
     return handles
 
 
-def _variation(trace: Trace) -> str:
+def _variation(trace: Trace, group: Group) -> str:
     """How much u moves in the last part of a run."""
     if trace.diverged_at is not None:
         return style.ending(trace)
     rate = metrics.tv_rate(trace)
-    return f"{rate:,.{0 if rate >= 10 else 2}f} {style.units(trace)['u']}/s"
+    return f"{rate:,.{0 if rate >= 10 else 2}f} {style.units(group)['u']}/s"
 
 
 def _base(path: str | os.PathLike) -> Path:

@@ -10,6 +10,7 @@ from smc_mujoco.part import joint_ids
 from smc_mujoco.scenario import Scenario
 
 LOOK = "look"
+MOST = 4.0  # times as large as what moves: a larger thing that stands still may leave the picture, chosen
 FRONT = (1.0, 0.0, 0.0, 0.0, 0.2, 1.0)  # right and up of a camera before the machine, a little above it
 ABOVE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.35)  # of one above, for what turns about vertical axes
 FIXED, PLANE = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtGeom.mjGEOM_PLANE

@@ -1,8 +1,8 @@
 """What one pair of axes shows: a quantity of several traces over time, their phase portrait, the last samples of u.
 
-Traces come cut to what is finite (envelope.finite). Over time, a curve is the mean of the channels, and where it
-chatters its mean over a window of time too (envelope.py); the band behind it is the range in a column of the picture,
-of u and s over all channels. Single channels of a network are light.
+Traces come cut to what is finite (envelope.finite) and to a group of channels (style.split). Over time, a curve is the
+mean of the channels, and where it chatters its mean over a window of time too (envelope.py); the band behind it is the
+range in a column of the picture, of u and s over all channels. Single channels of a network are light.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 
 from smc_mujoco.draw import style
 from smc_mujoco.draw.envelope import columns, end, line, stretches, window
-from smc_mujoco.draw.state import HOLD, rubs
-from smc_mujoco.measure import BAND, at_rest, scale
+from smc_mujoco.draw.state import HOLD, resting, rubs
+from smc_mujoco.groups import Group
+from smc_mujoco.measure import BAND, scale
 from smc_mujoco.trace import Trace
 
 COLUMNS = 360  # of a panel
@@ -25,22 +26,16 @@ MARKED = 12  # rests in a phase portrait
 FINE = 1 / 200  # of a phase portrait's diagonal: how far apart its points are
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
-    "x": lambda trace: driven(trace, trace.x),
-    "v": lambda trace: driven(trace, trace.v),
-    "u": lambda trace: driven(trace, trace.u),
-    "applied": lambda trace: driven(trace, trace.applied),
-    "d": lambda trace: driven(trace, trace.d),
-    "s": lambda trace: driven(trace, trace.s),
-    "force": lambda trace: driven(trace, trace.force),
-    "reaction": lambda trace: driven(trace, trace.reaction),
+    "x": lambda trace: trace.x,
+    "v": lambda trace: trace.v,
+    "u": lambda trace: trace.u,
+    "applied": lambda trace: trace.applied,
+    "d": lambda trace: trace.d,
+    "s": lambda trace: trace.s,
+    "force": lambda trace: trace.force,
+    "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
-    "q": lambda trace: trace.x[:, trace.scenario.plant.driven :],  # of what is only measured
 }
-
-
-def driven(trace: Trace, y: np.ndarray) -> np.ndarray:
-    """The columns of the channels that have an actuator."""
-    return y[:, : trace.scenario.plant.driven]
 
 
 def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace, str, float]]:
@@ -71,12 +66,12 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     return max(found, default=None)
 
 
-def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: str) -> list[Artist]:
-    """Draw a quantity of every trace and set the vertical range."""
+def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: str, group: Group) -> list[Artist]:
+    """Draw a quantity of every trace, which are those of a group, and set the vertical range."""
     drawn: list[Artist] = []
     ax.set_ylim(limits(traces, name))
     if name == "reaction":
-        blows(ax, traces)
+        blows(ax, traces, style.units(group)["u"])
     for trace, colour, wider in layers(traces, colours):
         y, held = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         mean = y.mean(axis=1)
@@ -92,25 +87,25 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
     return drawn
 
 
-def blows(ax: Axes, traces: Sequence[Trace]) -> None:
+def blows(ax: Axes, traces: Sequence[Trace], unit: str) -> None:
     """Show what lasts of a reaction, and tell of the blows beyond it, which are short and would squash the rest."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in traces]
     peak = max(size.max(initial=0.0) for size in sizes)
     usual = max(*(float(np.quantile(size, BRIEF)) for size in sizes if size.size), *map(abs, span(traces, "u")))
     if peak > 2.0 * usual > 0.0:
         ax.set_ylim(-1.16 * usual, 1.16 * usual)
-        words = f"blows up to {style.short(peak, 3)} {style.units(traces[0])['u']}"
+        words = f"blows up to {style.short(peak, 3)} {unit}"
         ax.set_title(words, loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
 
 
-def rests(trace: Trace) -> list[float]:
-    """Where dry friction holds all channels of a machine for HOLD s or longer: its mean x, of the latest times."""
+def rests(trace: Trace) -> list[int]:
+    """The last samples of the latest times in which dry friction holds all channels of a machine, HOLD s or longer."""
     if not trace.scenario.realistic or not rubs(trace.scenario):
         return []
-    still = at_rest(trace).all(axis=1)
+    still = resting(trace).all(axis=1)
     edges = np.flatnonzero(np.diff(still.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    long = [last for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= HOLD]
-    return [float(trace.x[last].mean()) for last in long[-MARKED:]]
+    long = [int(last) for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= HOLD]
+    return long[-MARKED:]
 
 
 def target(ax: Axes, traces: Sequence[Trace]) -> None:
@@ -141,9 +136,9 @@ def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
             )
 
 
-def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
-    """Draw v over x, with a ring where each trace starts."""
-    for trace, colour, wider in layers(traces, colours):
+def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Sequence[Sequence[int]]) -> None:
+    """Draw v over x, with a ring where each trace starts, and a diamond at each of the samples in which it is held."""
+    for (trace, colour, wider), samples in zip(layers(traces, colours), reversed(held), strict=True):
         x, v = QUANTITIES["x"](trace), QUANTITIES["v"](trace)
         if x.shape[1] > 1:
             for i in light(x.shape[1]):
@@ -151,8 +146,8 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
         x, v = x.mean(axis=1), v.mean(axis=1)
         ax.plot(*thinned(x, v), color=colour, lw=1.4 + wider)
         ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=6, zorder=4)
-        for x_rest in rests(trace):
-            ax.plot(x_rest, 0.0, "D", color=colour, ms=5.5, mec=style.PAPER, zorder=4)
+        for sample in samples:
+            ax.plot(x[sample], 0.0, "D", color=colour, ms=5.5, mec=style.PAPER, zorder=4)
         if trace.diverged_at is not None:
             ax.plot(x[-1], v[-1], "X", color=colour, ms=9, mec="white", zorder=5)
     ax.axhline(0.0, color=style.RULE, lw=0.9, zorder=1)

@@ -23,6 +23,7 @@ from smc_mujoco.trace import Trace
 SHOWN = 6  # channels of a network that a film shows: more would hide behind the next machine
 AISLE = 0.05  # m between machines, chosen
 SEEN = 2  # the last group of tendons that MuJoCo draws by default
+SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
 POSES = 24  # poses of each trace that must be in the picture
 QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 24, "numstacks": 14, "numquads": 1}  # looks and speed
 
@@ -45,7 +46,6 @@ class Stage:
         names = [[joint.name for joint in joints(assembly.spec([scenario]))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
         self.rotors = [[self.place(f"m{k}/{ROTOR}{name}") for name in each] for k, each in enumerate(names)]
-        self.units = [arrow_unit(scenario, length) for scenario, length in zip(scenarios, self.rails, strict=True)]
         self.dressed = [-1] * len(scenarios)
         for k, colour in enumerate(colours):
             self.dress(k, 0.0)
@@ -53,6 +53,9 @@ class Stage:
         corners = self.corners(traces)
         turn = self.data.cam("m0/look").xmat.reshape(3, 3)
         place = camera.fit(np.concatenate(corners), turn, size, room)
+        slides = [self.model.jnt_type[each] == SLIDE for each in self.joints]
+        each = zip(scenarios, self.joints, slides, self.rails, strict=True)
+        self.grips = [arrows.grips(*machine, turn[:, 2]) for machine in each]
         film = self.model.camera("film")
         film.pos = place
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
@@ -94,7 +97,7 @@ class Stage:
         Args:
           ahead: how far their rotors are ahead of them, (shown,) rad or m; default: not at all.
         """
-        slides = self.model.jnt_type[self.joints[k]] == mujoco.mjtJoint.mjJNT_SLIDE
+        slides = self.model.jnt_type[self.joints[k]] == SLIDE
         x = np.where(slides, np.clip(x, -self.rails[k] / 2, self.rails[k] / 2), x)
         self.data.qpos[self.model.jnt_qposadr[self.joints[k]]] = x
         for rotor, value in zip(self.rotors[k], x if ahead is None else x + ahead, strict=True):
@@ -106,7 +109,7 @@ class Stage:
         settle(self.model, self.data)
         self.renderer.update_scene(self.data, camera="film")
         for k, i, arrow in drawn:
-            arrows.draw(self.renderer.scene, self.model, self.data, self.joints[k][i], self.units[k], arrow)
+            arrows.draw(self.renderer.scene, self.model, self.data, self.grips[k][i], arrow)
         return self.renderer.render()
 
     def corners(self, traces: Sequence[Trace]) -> list[np.ndarray]:
@@ -126,7 +129,14 @@ class Stage:
             settle(model, self.data)
             world = boxes(model, self.data)
             found.append([world[own].reshape(-1, 3) for own in mine])
-        return [np.concatenate(poses) for poses in zip(*found, strict=True)]
+        moved = [np.concatenate(poses) for poses in zip(*found, strict=True)]
+        return [self.beside(k, points) for k, points in enumerate(moved)] if self.own else moved
+
+    def beside(self, k: int, points: np.ndarray) -> np.ndarray:
+        """The points and those of what stands still of an own model, as a rail does; not of what is far larger."""
+        fixed = still(self.shapes[k][0].model) + self.data.cam(f"m{k}/look").xpos
+        near = np.ptp(fixed, axis=1).max(axis=1) < own.MOST * np.ptp(points, axis=0).max()
+        return np.concatenate([points, fixed[near].reshape(-1, 3)])
 
 
 def settle(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -156,17 +166,8 @@ def small(scenario: Scenario) -> Scenario:
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
     """Length of the rail, m: of what does not move, along x. Pendulums and own models have none: inf."""
-    return (
-        np.inf
-        if scenario.plant.unit == "rad" or scenario.plant.direct
-        else float(2 * np.abs(still(model)[..., 0]).max())
-    )
-
-
-def arrow_unit(scenario: Scenario, length: float) -> float:
-    """What arrows.draw scales the arrows of a machine by."""
-    chain = scenario.plant.n > 1 and not scenario.plant.direct
-    return length if np.isfinite(length) else arrows.CHAIN if chain else 1.0
+    none = scenario.plant.unit == "rad" or scenario.plant.direct
+    return np.inf if none else float(2 * np.abs(still(model)[..., 0]).max())
 
 
 def still(model: mujoco.MjModel) -> np.ndarray:

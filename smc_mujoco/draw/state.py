@@ -50,7 +50,7 @@ def told(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | No
     """What is told at each time; None where there is nothing to tell, and once the run has failed."""
     dry, gap = rubs(trace.scenario), play(trace.scenario)
     touch = np.any(np.stack([held(on, trace.t, hold) for on in touching(trace).T]), axis=0)
-    sliding = np.array([held(first_too(~on, trace.t, hold), trace.t, hold) for on in measure.at_rest(trace).T])
+    sliding = np.array([held(first_too(~on, trace.t, hold), trace.t, hold) for on in resting(trace).T])
     lies = [lying(flank, trace.t, hold) for flank in flanks(trace).T] if gap else []
     found: list[State | None] = []
     for time in times.tolist():
@@ -64,6 +64,14 @@ def told(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | No
             holds = dry and not sliding[:, k].all()
             found.append(State(", ".join(words), HELD if holds else CALM) if words else None)
     return steady(found, times, hold)
+
+
+def resting(trace: Trace) -> np.ndarray:
+    """Where each channel is at rest beside those of its group, (K + 1, n)."""
+    rest = np.empty(trace.x.shape, bool)
+    for group, part in measure.parts(trace).items():
+        rest[:, group.channels] = measure.at_rest(part)
+    return rest
 
 
 def steady(found: Sequence[State | None], times: np.ndarray, hold: float) -> list[State | None]:

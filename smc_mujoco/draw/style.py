@@ -11,6 +11,7 @@ from pathlib import Path
 
 from smc_mujoco import plain
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.groups import Group, cut, groups
 from smc_mujoco.measure import EFFORT
 from smc_mujoco.trace import Trace
 
@@ -100,9 +101,7 @@ def law_name(law: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """One label a trace: the given ones, else the laws' names, numbered where a law comes again.
-
-    A given label that is the law's own name is written as people write it; any other is shown as it is.
+    """One label a trace: the given ones as they are, else the laws' names, numbered where a law comes again.
 
     Raises:
       ScenarioError: not as many labels as traces.
@@ -111,7 +110,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
-        return [law_name(law) if label == law else str(label) for label, law in zip(given, own, strict=True)]
+        return [str(label) for label in given]
     names = [law_name(law) for law in own]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
 
@@ -171,22 +170,39 @@ def same_plant(traces: Sequence[Trace]) -> Sequence[Trace]:
     plants = sorted({trace.scenario.plant.name for trace in traces})
     if len(plants) > 1:
         raise ScenarioError(f"traces of {' and '.join(plants)} share no axes: draw one plant at a time")
+    if len({tuple((g.name, g.unit) for g in groups(trace.scenario.plant)) for trace in traces}) > 1:
+        raise ScenarioError(
+            f"traces of {plants[0]} differ in their kinds of channels: draw those with the same ones at a time"
+        )
     return traces
 
 
-def units(trace: Trace) -> dict[str, str]:
-    """Units of the quantities x, v, u, s, and q, the angle of what is only measured."""
-    x = trace.scenario.plant.unit
-    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s", "q": "rad"}
+def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
+    """The traces of each group of channels, of traces of one plant: what shares a pair of axes."""
+    kinds = zip(*(groups(trace.scenario.plant) for trace in traces), strict=True)
+    return {kind[0]: [cut(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
 
 
-def quantity(trace: Trace) -> str:
-    """What x is: "angle" or "position"."""
-    return {"rad": "angle", "m": "position"}[trace.scenario.plant.unit]
+def units(group: Group) -> dict[str, str]:
+    """Units of the quantities x, v, u, s of a group's channels."""
+    x = group.unit
+    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
+
+
+def quantity(group: Group) -> str:
+    """What x is: "angle" or "position", and "free angle" where no actuator drives it."""
+    return ("" if group.driven else "free ") + {"rad": "angle", "m": "position"}[group.unit]
+
+
+def letter(group: Group) -> str:
+    """What x is called: q where no actuator drives it, as in a law's y.q."""
+    return "x" if group.driven else "q"
 
 
 def plant_name(trace: Trace) -> str:
-    """The plant's name as people write it."""
+    """The plant's name as people write it; that of your own model as you do."""
+    if trace.scenario.plant.direct:
+        return trace.scenario.plant.name
     words = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
     name = " ".join(words.get(w, w) for w in trace.scenario.plant.name.split("_"))
     name += " oscillator" if name in ("Van der Pol", "Duffing") else ""

@@ -189,6 +189,7 @@ def frames(
     gap = times[1] - times[0] if len(times) > 1 else 1 / 30
     traces = [finite(trace) for trace in traces]
     longest = arrows.longest(traces)
+    scales = [arrows.scales(trace, longest) for trace in traces]
     acts = [arrows.acts(trace, times, gap) for trace in traces]
     told = [state.told(trace, times, max(state.HOLD, gap)) for trace in traces]
     caption = Caption(traces, names, colours, title, above, scale, longest, told)
@@ -205,8 +206,8 @@ def frames(
                 stage.dress(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame])
                 stage.paint(k, style.FAILED if failed[k] else colour)
-                for i in range(0 if failed[k] else stage.shown[k] - traces[k].scenario.plant.free):
-                    drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, longest, colour)]
+                for i, most in enumerate([] if failed[k] else scales[k][: stage.shown[k]]):
+                    drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, most, colour)]
             ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
             moved = [part[frame] for part in (*places, *ahead)]
             now = np.concatenate([*moved, failed, stage.dressed, ends])

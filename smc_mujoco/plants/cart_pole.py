@@ -60,6 +60,7 @@ CART_POLE = Plant(
     parameters={"M": 1.0, "m": 0.1, "l": 0.5, "b": 0.0, "bq": 0.0, "grav": 9.81},
     mass="M",
     unit="m",
+    mixed=("m", "rad"),
     x0=(0.0, 0.3),
     n=2,
     sizes=(2, 2),

@@ -60,6 +60,7 @@ OVERHEAD_CRANE = Plant(
     parameters={"M": 1.06, "m": 0.73, "l": 0.7, "b": 0.0, "bq": 0.0, "grav": 9.81},
     mass="m",
     unit="m",
+    mixed=("m", "rad"),
     x0=(1.0, 0.0),
     n=2,
     sizes=(2, 2),

@@ -34,10 +34,10 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
       ScenarioError: the run failed, or a tolerance is none.
     """
     _asked(response, tolerances)
-    names = tolerances if tolerances and rel is None else [name for name in response.metrics if response.tells(name)]
+    names = tolerances if tolerances and rel is None else [name for name in response.values if response.tells(name)]
     entry = {}
     for name in names:
-        value = float(response.metrics[name])
+        value = float(response.values[name])
         within = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
         written = value if math.isfinite(value) else str(value)  # JSON has no infinity
         entry[name] = {"value": written, "tolerance": within, "unit": response.unit(name)}
@@ -93,7 +93,7 @@ def _asked(response: object, tolerances: Mapping[str, float]) -> None:
 def _judge(response: StepResponse, asked: Sequence[Limit]) -> None:
     """Raise AssertionError where a metric is off."""
     __tracebackhide__ = True
-    met = {name: told(response.metrics[name], response.unit(name)) for name, _, _ in asked}
+    met = {name: told(response.values[name], response.unit(name)) for name, _, _ in asked}
     if off := [f"{name} is {met[name]}, golden {words}" for name, words, kept in asked if not kept]:
         lines = table(
             ("metric", "value", "golden", "ok"), [(n, met[n], words, answer(kept)) for n, words, kept in asked]
@@ -102,7 +102,7 @@ def _judge(response: StepResponse, asked: Sequence[Limit]) -> None:
 
 
 def _limit(response: StepResponse, name: str, golden: float, tolerance: float) -> Limit:
-    value = float(response.metrics[name])
+    value = float(response.values[name])
     kept = value == golden or abs(value - golden) <= tolerance
     return Limit(name, f"{told(golden)} ± {told(tolerance)}", kept)
 

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from smc_mujoco import paper
 from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.groups import groups
 from smc_mujoco.measure import CATALOGUE
-from smc_mujoco.metrics import score
+from smc_mujoco.metrics import score, scores
 from smc_mujoco.plant import Plant
 from smc_mujoco.run import run
 from smc_mujoco.scenario import Scenario
@@ -23,6 +24,9 @@ TOLD = ("settling_time", "overshoot", "tv_rate")  # of the metrics, in one line
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StepResponse:
     """What a law made of a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
+
+    Those are of the driven channels. `r.scores` has each group of channels by itself, as `smc.scores`: of the pole on a
+    cart, r.scores["free"]["settling_time"].
 
     A run that failed has no metrics: to ask for one is a ScenarioError that says when and why it failed.
 
@@ -57,6 +61,20 @@ class StepResponse:
         """
         return {name: Value(value, name, self.limits) for name, value in score(self.trace).items()}
 
+    @functools.cached_property
+    def scores(self) -> Mapping[str, Mapping[str, float]]:
+        """Every metric of each group of channels, by the group's name; raises as `metrics`."""
+        return {
+            group: {name: Value(value, _label(group, name), self.limits) for name, value in values.items()}
+            for group, values in scores(self.trace).items()
+        }
+
+    @functools.cached_property
+    def values(self) -> Mapping[str, float]:
+        """`metrics`, and those of other groups of channels by the group's name and theirs, "free peak"."""
+        others = {_label(group, name): value for group, each in self.scores.items() for name, value in each.items()}
+        return dict(self.metrics) | others
+
     @mendable
     def __getattr__(self, name: str) -> float:
         __tracebackhide__ = True  # of the AttributeError
@@ -80,25 +98,32 @@ class StepResponse:
         return f"StepResponse({self}: {how})"
 
     def unit(self, name: str) -> str:
-        """The unit of a metric."""
-        return CATALOGUE[name].unit_for(self.scenario.plant.unit)
+        """The unit of one of the `values`."""
+        group, _, metric = name.rpartition(" ")
+        units = {each.name: each.unit for each in groups(self.scenario.plant)}
+        return CATALOGUE[metric].unit_for(units.get(group, self.scenario.plant.unit))
 
     def _told(self, name: str) -> str:
-        return told(self.metrics[name], self.unit(name))
+        return told(self.values[name], self.unit(name))
 
     def _unknown(self, name: str) -> ScenarioError:
         if name in CATALOGUE:
-            return ScenarioError(f"{name} compares channels and {self.scenario.plant.name} has one: give n >= 2")
+            return ScenarioError(CATALOGUE[name].refusal(self.scenario.plant))
         return unknown("metric", name, CATALOGUE)
 
     def tells(self, name: str) -> bool:
-        """Whether a metric says something of this run: some are of realistic mechanisms alone."""
-        return self.scenario.realistic or not CATALOGUE[name].realistic
+        """Whether one of the `values` says something of this run: some are of realistic mechanisms alone."""
+        return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
     def named(self, names: Mapping[str, object]) -> None:
-        """Raise ScenarioError for names that are no metrics of this run."""
+        """Raise ScenarioError for names that are not among the `values` of this run."""
+        plant = self.scenario.plant
+        known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
+        known += [
+            _label(group.name, m.name) for group in groups(plant) for m in CATALOGUE.values() if m.fits(group, plant)
+        ]
         for name in names:
-            if name not in CATALOGUE or (CATALOGUE[name].network and self.trace.x.shape[1] < 2):
+            if name not in known:
                 raise self._unknown(name)
 
     @mendable
@@ -130,13 +155,18 @@ class StepResponse:
         if self.failure is not None:
             return f"failed: {self.failure}"
         asked = {limit.metric for limit in self.limits}
-        listed = names or [name for name in self.metrics if name in asked or self.tells(name)]
+        listed = names or [name for name in self.values if name in asked or self.tells(name)]
         rows = []
         for name in listed:
             of = list(dict.fromkeys(limit for limit in self.limits if limit.metric == name))
             kept = answer(all(limit.kept for limit in of)) if of else ""
             rows.append((name, self._told(name), ", ".join(limit.words for limit in of), kept))
         return table(("metric", "value", "limit", "ok"), rows)
+
+
+def _label(group: str, metric: str) -> str:
+    """What a metric of a group is called in tables; all know the driven channels' ones by their name alone."""
+    return metric if group == "driven" else f"{group} {metric}"
 
 
 def respond(

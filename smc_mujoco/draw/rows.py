@@ -1,0 +1,52 @@
+"""What an overview shows over time: quantities of groups of channels, one a row, and what their axes are called."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.draw import style
+from smc_mujoco.groups import Group
+from smc_mujoco.trace import Trace
+
+REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
+
+
+class Row(NamedTuple):
+    """A quantity of a group of channels."""
+
+    name: str
+    group: Group
+    traces: Sequence[Trace]  # of these channels alone
+
+
+def rows_of(traces: Sequence[Trace]) -> list[Row]:
+    """What an overview shows over time, from top to bottom; realism adds what acts on the joints."""
+    shown = style.split(traces)
+    driven = {group: parts for group, parts in shown.items() if group.driven}
+    drives = any(trace.scenario.actuator for trace in traces)
+    rows = []
+    for group, parts in shown.items():
+        several = group.driven and len(group.channels) > 1
+        rows += [Row(name, group, parts) for name in ("x", *["spread"] * several)]
+    for group, parts in driven.items():
+        rows += [Row(name, group, parts) for name in ("u", *["force"] * drives)]
+    for group, parts in shown.items():
+        rows += [Row("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
+    return rows + [Row("s", group, parts) for group, parts in driven.items()]
+
+
+def axis(row: Row, name: str) -> str:
+    """An axis' name with its unit."""
+    group, several = row.group, len(row.group.channels) > 1
+    unit = style.units(group)[{"spread": "x", "force": "u", "reaction": "u"}.get(name, name)]
+    if name in ("spread", *REALISM):
+        words = {"spread": "max − min x", "force": "delivered", "reaction": "reaction" + " on q" * (not group.driven)}
+        return f"{'mean ' * (several and name != 'spread')}{words[name]} ({unit})"
+    if name == "s" and row.traces[0].scenario.plant.free:
+        return "sliding variable s"  # of both joints, in a unit that the law alone knows
+    if name == "s" and row.traces[0].scenario.plant.mixed:
+        return f"{'mean ' * several}s ({unit})"  # rows of it are many, and low
+    words = {"x": style.quantity(group), "v": "velocity", "u": "control", "s": "sliding variable"}
+    letters = {"x": "q", "v": "q′"} if not group.driven else {}
+    return f"{'mean' if several else words[name]} {letters.get(name, name)} ({unit})"
