@@ -82,8 +82,9 @@ class Agent:
         return u[: loop.scenario.plant.driven] / loop.scenario.u_max
 
     def forget(self) -> None:
-        """Begin anew: all memories zero."""
-        for memory in (*self.loop.memory, *self.loop.surface_memory, *self.loop.estimator_memory):
+        """Begin anew: all memories zero, and the last commands, which the nominal model of coupled channels knows."""
+        loop = self.loop
+        for memory in (*loop.memory, *loop.surface_memory, *loop.estimator_memory, loop.latest):
             memory[:] = 0.0
 
 

@@ -96,13 +96,17 @@ def _compiled(signature, function: Callable):
 
 @contextlib.contextmanager
 def uninstalled() -> Iterator[None]:
-    """No control callback for the length of a with block: MuJoCo compiles no model while a Python one is installed."""
-    before = mujoco.get_mjcb_control()
-    mujoco.set_mjcb_control(None)
-    try:
-        yield
-    finally:
-        mujoco.set_mjcb_control(before)
+    """No control callback for the length of a with block: MuJoCo compiles no model while a Python one is installed.
+
+    Other threads' runs, which would go on without their laws, are waited for.
+    """
+    with _lock:
+        before = mujoco.get_mjcb_control()
+        mujoco.set_mjcb_control(None)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_control(before)
 
 
 @contextlib.contextmanager

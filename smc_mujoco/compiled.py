@@ -115,6 +115,12 @@ class AtAddress:
     address: int
 
 
+class Uncompiled:
+    """What is Python by its nature; `why` says so of a law, after its name."""
+
+    why: str
+
+
 # How the lines of numba's errors begin that say where it was, not what it did not like.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"

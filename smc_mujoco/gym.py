@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 from gymnasium import spaces
 
-from smc_mujoco import registration
+from smc_mujoco import gl, registration
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.harness import WORLD
 from smc_mujoco.plant import Plant
-from smc_mujoco.setting import Setting, setting
+from smc_mujoco.setting import Setting, bounded, setting
 
 registration.register()  # for who imports this module alone
 
@@ -30,13 +30,11 @@ def action_space(found: Setting) -> spaces.Box:
 
 
 def observation_space(found: Setting) -> spaces.Box:
-    """The finite world."""
-    return spaces.Box(-WORLD, WORLD, (found.size,), np.float64)
-
-
-def bounded(observation: np.ndarray) -> np.ndarray:
-    """An observation from outside the finite world as one of the space: the last of its episode."""
-    return np.clip(np.nan_to_num(observation, nan=WORLD, posinf=WORLD, neginf=-WORLD), -WORLD, WORLD)
+    """The finite world; for r, r', r'' as much more as they take."""
+    high = np.full(found.size, WORLD)
+    if found.task.moving:
+        high[-3:] = np.maximum(WORLD, np.abs(found.references).max(axis=0))
+    return spaces.Box(-high, high, dtype=np.float64)
 
 
 class PlantEnv(gymnasium.Env):
@@ -65,7 +63,7 @@ class PlantEnv(gymnasium.Env):
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         self.setting, self.render_mode, self.sample = setting(plant, task, changes), render_mode, 0
-        self.metadata = self.metadata | {"render_fps": round(1.0 / self.setting.scenario.control_period)}
+        self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / self.setting.scenario.control_period))}
         self.data = mujoco.MjData(self.setting.model)
         self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
         self.renderer: mujoco.Renderer | None = None
@@ -94,10 +92,16 @@ class PlantEnv(gymnasium.Env):
         return observation, float(found.reward(x, v, self.sample)), False, truncated, {}
 
     def render(self) -> np.ndarray | None:
-        """What the plant's own camera sees, (height, width, 3), with render_mode "rgb_array"."""
+        """What the plant's own camera sees, (height, width, 3), with render_mode "rgb_array".
+
+        Raises:
+          ScenarioError: there is nothing to render with.
+        """
         if self.render_mode is None:
             return None
         if self.renderer is None:
+            if why := gl.missing():
+                raise ScenarioError(why)
             self.renderer = mujoco.Renderer(self.setting.model)
         mujoco.mj_forward(self.setting.model, self.data)
         self.renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
@@ -108,3 +112,7 @@ class PlantEnv(gymnasium.Env):
         if self.renderer is not None:
             self.renderer.close()
             self.renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For copies and other processes: all but the renderer."""
+        return self.__dict__ | {"renderer": None}

@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 from numba import carray
 
-from smc_mujoco.compiled import AtAddress, Function, NotCompilable, attempt, jit, loader, named, pointer
+from smc_mujoco.compiled import AtAddress, Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import Reading
@@ -125,6 +125,8 @@ def component(c: Component) -> Function | AtAddress:
     """
     if isinstance(c.function, AtAddress):
         return c.function
+    if isinstance(c.function, Uncompiled):
+        raise NotCompilable(f"{c.kind} {c.name!r} {c.function.why}")
     compiler = {"law": law, "surface": law, "estimator": estimator}[c.kind]
     return _named(f"{c.kind} {c.name!r}", compiler, c.function, tuple(c.gains), c.memory)
 

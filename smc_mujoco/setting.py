@@ -2,7 +2,7 @@
 
 The physics are those of `smc.run`: an action is the command u of a control sample, held for one control period, as a
 part of u_max: in [-1, 1], beyond which it saturates. Only the law is left out, and what a Scenario puts between plant
-and law: noise, delay, encoder.
+and law: noise, delay, encoder; and disturbances, contacts and jumps.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from smc_mujoco.callback import uninstalled
 from smc_mujoco.channels import CTRL, QPOS, QVEL, channels
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.guarded import Failure, signalled
-from smc_mujoco.harness import WORLD
+from smc_mujoco.harness import HUGE, WORLD
 from smc_mujoco.part import ROTOR, joint_ids
 from smc_mujoco.plant import Plant, ready
 from smc_mujoco.plant import plant as find_plant
@@ -74,15 +74,24 @@ class Setting:
         """Of an action."""
         return (self.scenario.plant.driven,)
 
+    @functools.cached_property
+    def rest(self) -> Pair:
+        """qpos (nq,) and qvel (nv,) of a run's start, in which an episode's x and v are put."""
+        return assembly.start(self.model, self.scenario)
+
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
         """What ctrl becomes under an action: u_max times it, saturated, in the actuators' unit.
 
         Raises:
-          ScenarioError: an action of another shape, or with NaN.
+          ScenarioError: an action of another shape, or with what is no finite number.
         """
-        a = np.asarray(action, float)
-        if a.shape != copies + self.shape or (square := np.vdot(a, a)) != square:
-            raise ScenarioError(f"action is {shown(action)}: give numbers in [-1, 1], of shape {copies + self.shape}")
+        try:
+            a = np.asarray(action, float)
+        except (TypeError, ValueError):
+            a = np.array(np.nan)
+        if a.shape != copies + self.shape or not math.isfinite(np.vdot(a, a)):
+            shape = copies + self.shape
+            raise ScenarioError(f"action is {_culprit(action, a, shape)}: give finite numbers, of shape {shape}")
         return self.scale * self.scenario.u_max * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
@@ -92,6 +101,8 @@ class Setting:
           ScenarioError: another option, or not n finite numbers.
         """
         x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
+        if not isinstance(options, Mapping | None):
+            raise ScenarioError(f"options is {shown(options)}: give a mapping, such as {{'x0': 1.0}}")
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
@@ -101,14 +112,14 @@ class Setting:
 
     def place(self, qpos: np.ndarray, qvel: np.ndarray, x: np.ndarray, v: np.ndarray) -> None:
         """Write a start into qpos (nq,) and qvel (nv,)."""
-        qpos[:], qvel[:] = self.model.qpos0, 0.0
+        qpos[:], qvel[:] = self.rest
         qpos[self.qpos], qvel[self.qvel] = x, v
         channel, at_q, at_v = self.rotors
         qpos[at_q], qvel[at_v] = x[channel], v[channel]
 
     def reference(self, k: Any) -> np.ndarray:
         """r, r', r'' at sample k, (..., 3)."""
-        return self.references[np.minimum(k, len(self.references) - 1)]
+        return np.take(self.references, k, axis=0, mode="clip")  # a copy: who observes may write into it
 
     def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
         """The observation at sample k: x, v, and for a moving task the reference, (..., size)."""
@@ -121,6 +132,19 @@ class Setting:
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Whether x, v (..., n) are outside the finite world, where an episode ends without reward."""
         return ~(np.vecdot(x, x) + np.vecdot(v, v) < WORLD**2)
+
+
+def bounded(observation: np.ndarray) -> np.ndarray:
+    """An observation from outside the finite world, the last of its episode, as numbers that end there."""
+    return np.clip(np.nan_to_num(observation, nan=WORLD, posinf=WORLD, neginf=-WORLD), -WORLD, WORLD)
+
+
+def _culprit(action: Any, a: np.ndarray, shape: tuple[int, ...]) -> str:
+    """A refused action in words: of many copies the first one that is not finite."""
+    if a.shape != shape or a.ndim < 2:
+        return shown(action)
+    i = int(np.argmin(np.abs(a).max(axis=-1) < HUGE))
+    return f"{shown(a[i].tolist())} for copy {i}"
 
 
 def setting(
@@ -179,6 +203,9 @@ def _built(scenario: Scenario, task: Task, spread: Pair, edit: Callable[[mujoco.
         references = np.array([signalled(scenario.reference, float(t)) for t in times])
     except Failure as failure:
         raise ScenarioError(f"reference {failure}: give another") from None
+    if not (finite := np.isfinite(references).all(axis=1)).all():
+        at = f"t = {times[np.argmin(finite)]:.6g} s"
+        raise ScenarioError(f"reference {shown(scenario.reference)} is no finite number at {at}: give another")
     return Setting(
         task=task,
         scenario=scenario,

@@ -10,8 +10,9 @@ An action is the command of the driven channels, in parts of u_max. Observations
 dm_control's viewer: viewer.launch(environment).
 """
 
+import contextlib
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,16 @@ from dm_env import specs
 
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.plant import Plant
-from smc_mujoco.setting import Setting, setting
+from smc_mujoco.setting import Setting, bounded, setting
+
+
+class PlantPhysics(Physics):
+    """dm_control's physics, in which a plant that leaves the finite world ends its episode and raises nothing."""
+
+    @contextlib.contextmanager
+    def check_invalid_state(self) -> Iterator[None]:
+        """Leave it to `PlantTask.over`."""
+        yield
 
 
 class PlantTask(control.Task):
@@ -66,7 +76,8 @@ class PlantTask(control.Task):
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Positions and velocities, and what is to be followed."""
-        found = OrderedDict(position=self.x, velocity=self.v)
+        x, v = (bounded(self.x), bounded(self.v)) if self.over else (self.x, self.v)
+        found = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
             found["reference"] = self.setting.reference(self.sample)
         return found
@@ -105,7 +116,7 @@ def load(
         random = _generator(random)
     scenario = found.scenario
     return control.Environment(
-        Physics.from_model(MjModel(found.model)),
+        PlantPhysics.from_model(MjModel(found.model)),
         PlantTask(found, random),
         time_limit=(scenario.samples - 0.5) * scenario.control_period,  # half a sample less: sums of floats miss it
         n_sub_steps=scenario.steps,

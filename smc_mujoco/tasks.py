@@ -15,6 +15,7 @@ Suite, 2018), and the form is its cart-pole's; the margins, 1 (rad or m) for e a
 import dataclasses
 import functools
 import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -37,9 +38,17 @@ WAY = Sine(amplitude=0.5, omega=1.0)  # rad or m, what `track` follows unless to
 Pair = tuple[np.ndarray, np.ndarray]
 
 
+def _all(plant: Plant) -> np.ndarray:
+    return np.ones(plant.n, bool)
+
+
+def _none(plant: Plant) -> dict[str, Any]:
+    return {}
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Task:
-    """What an agent is to do.
+    """What an agent is to do; of functions with names, so that pickle knows them.
 
     Attributes:
       fits: whether a plant has this task.
@@ -53,8 +62,8 @@ class Task:
     fits: Callable[[Plant], bool]
     spread: Callable[[Plant], Pair]
     errors: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Pair]
-    which: Callable[[Plant], np.ndarray] = lambda plant: np.ones(plant.n, bool)
-    fields: Callable[[Plant], dict[str, Any]] = lambda plant: {}
+    which: Callable[[Plant], np.ndarray] = _all
+    fields: Callable[[Plant], dict[str, Any]] = _none
     moving: bool = False
 
 
@@ -86,6 +95,18 @@ def toppling(plant: Plant) -> np.ndarray:
 def driven(plant: Plant) -> np.ndarray:
     """Which channels have an actuator, (n,) of bool."""
     return np.arange(plant.n) < plant.driven
+
+
+def _any(plant: Plant) -> bool:
+    return True
+
+
+def _topples(plant: Plant) -> bool:
+    return bool(toppling(plant).any())
+
+
+def _way(plant: Plant) -> dict[str, Any]:
+    return {"reference": WAY}
 
 
 def _within_start(plant: Plant) -> Pair:
@@ -129,21 +150,21 @@ def _synchronise(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray)
 
 
 TASKS = {
-    "regulate": Task(fits=lambda plant: True, spread=_within_start, errors=_regulate),
+    "regulate": Task(fits=_any, spread=_within_start, errors=_regulate),
     "track": Task(
-        fits=lambda plant: True,
+        fits=_any,
         spread=_within_start,
         errors=_track,
         which=driven,
-        fields=lambda plant: {"reference": WAY},
+        fields=_way,
         moving=True,
     ),
     "swing_up": Task(
-        fits=lambda plant: bool(toppling(plant).any()),
+        fits=_topples,
         spread=_hanging,
         errors=_swing_up,
         which=toppling,
         fields=_weak,
     ),
-    "synchronise": Task(fits=lambda plant: plant.network, spread=_apart, errors=_synchronise),
+    "synchronise": Task(fits=operator.attrgetter("network"), spread=_apart, errors=_synchronise),
 }

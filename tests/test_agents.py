@@ -1,10 +1,13 @@
 """dm_env environments: their physics are those of smc.run, its own tests pass, laws act, policies control."""
 
-import contextlib
-import sys
-import types
+import dataclasses
+import math
+import threading
 import warnings
+from pathlib import Path
 
+import dm_control.suite
+import mujoco
 import numpy as np
 import pytest
 from dm_control.rl import control
@@ -13,7 +16,7 @@ from dm_env import StepType, test_utils
 from episodes import EVERY, LAW, columns, driven_by_dm, run_of, start
 
 import smc_mujoco as smc
-from smc_mujoco import fingerprint, gl, suite, tasks
+from smc_mujoco import callback, gl, suite, tasks
 from smc_mujoco.setting import setting
 
 # the physics are the benchmark's
@@ -63,6 +66,45 @@ def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, f
     first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
     assert np.abs(first - columns(trace)).max() < 1e-9
     assert np.array_equal(first, second)  # nothing is left of the episode before
+
+
+def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
+    """What the other channel was told last is part of the model, and must not come from the episode before."""
+    links = {joint: smc.Channel(motor=True) for joint in ("shoulder", "elbow")}
+    arm = smc.plant_from(Path(dm_control.suite.__file__).parent / "acrobot.xml", links)
+    environment = suite.load(arm, changes={"x0": [1.0, 0.5], "duration": 0.05, "u_max": 500.0})
+    act = smc.agent(smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal")
+    first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
+    assert np.array_equal(first, second)
+
+
+def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
+    path = tmp_path / "pair.xml"
+    path.write_text("""
+<mujoco><worldbody>
+  <body name="a"><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 -1" mass="1"/></body>
+  <body name="b" pos="2 0 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 -1" mass="1"/></body>
+</worldbody><actuator><motor joint="a"/></actuator><keyframe><key name="up" qpos="0.2 3"/></keyframe></mujoco>""")
+    environment = suite.load(smc.plant_from(path, ["a"], keyframe="up"), changes={"u_max": 1.0})
+    environment.reset()
+    assert environment.physics.data.qpos[1] == 3.0  # a joint without a channel, where the keyframe has it
+
+
+def test_what_makes_an_environment_waits_for_the_runs_of_other_threads():
+    """Which would go on without their laws: MuJoCo's callback, which it takes away for a moment, is everybody's."""
+    made = threading.Event()
+
+    def other():
+        suite.load("duffing")
+        made.set()
+
+    thread = threading.Thread(target=other)
+    with callback.installed():
+        thread.start()
+        assert not made.wait(0.3)
+        assert mujoco.get_mjcb_control() is not None
+    thread.join(30.0)
+    assert made.is_set()
 
 
 # rewards, observations, ends
@@ -125,10 +167,44 @@ def test_an_episode_ends_where_the_finite_world_does():
     assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
 
 
+def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_begins():
+    environment = suite.load("duffing", changes={"u_max": 1e9, "control_period": 0.1, "x0": 1e5})
+    environment.reset()
+    timestep = environment.step([1.0])
+    assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
+    assert np.abs(flat(timestep)).max() <= 1e6  # numbers: 0 times NaN is no target
+    assert environment.step([0.0]).first()
+
+
+def test_who_writes_into_an_observation_changes_nothing():
+    environment = suite.load("duffing", "track", random=0)
+    for _ in range(2):
+        environment.reset()
+        timestep = environment.step([0.0])
+        assert timestep.observation["reference"][1] == pytest.approx(0.5)
+        for value in timestep.observation.values():
+            value[:] = 99.0
+
+
+@pytest.mark.parametrize("action", [[5.0], [1e100]])
+def test_an_action_beyond_its_bounds_saturates(action):
+    environment = suite.load("duffing", changes={"x0": 1.0})
+    states = []
+    for given in (action, [1.0]):
+        environment.reset()
+        states.append(flat(environment.step(given)))
+    assert np.array_equal(*states)
+
+
 def test_seeds_reproduce_starts_and_different_seeds_differ():
     starts = [suite.load("cart_pole", "swing_up", random=seed).reset().observation["position"] for seed in (3, 3, 4)]
     assert np.array_equal(starts[0], starts[1])
     assert not np.array_equal(starts[0], starts[2])
+
+
+def flat(timestep):
+    """An observation as one array, as gymnasium has it."""
+    return np.concatenate([*timestep.observation.values()])
 
 
 # what dm_control and dm_env have
@@ -187,92 +263,18 @@ def test_environments_are_dm_control_s_own():
     assert smc.agent("classical", environment)(timestep).shape == (1,)
 
 
-# policies
-
-
-def flat(timestep):
-    """An observation as one array, as gymnasium has it."""
-    return np.concatenate([*timestep.observation.values()])
-
-
-def proportional(observation):
-    return -0.7 * observation[:1] - 0.5 * observation[1:2]
-
-
-def test_a_policy_as_a_law_gives_the_episode_that_it_has_as_an_agent():
-    environment = suite.load("duffing", changes={"duration": 0.2, "x0": 0.7})
-    states = driven_by_dm(environment, lambda timestep: proportional(flat(timestep)))
-    with pytest.warns(smc.PlainLoopWarning, match="proportional"):
-        trace = smc.run(run_of(environment.task.setting, smc.policy(proportional)))
-    assert np.abs(states - columns(trace)).max() < 1e-9
-
-
-def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
-    environment = suite.load("cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]})
-
-    def act(observation):
-        return np.array([observation @ np.arange(0.1, 0.8, 0.1)])
-
-    states = driven_by_dm(environment, lambda timestep: np.clip(act(flat(timestep)), -1.0, 1.0))
-    with pytest.warns(smc.PlainLoopWarning):
-        trace = smc.run(run_of(environment.task.setting, smc.policy(act, reference=True)))
-    assert np.abs(states - columns(trace)).max() < 1e-9
-
-
-def test_a_policy_of_another_size_ends_the_run_in_words():
-    with pytest.warns(smc.PlainLoopWarning):
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(lambda o: [1.0, 2.0]), duration=0.01))
-    assert "2 numbers" in str(trace.failure)
-
-
-def test_files_of_onnx_and_torch_are_asked_as_batches_of_one(tmp_path, monkeypatch):
-    seen = []
-
-    class Session:
-        def __init__(self, path, providers):
-            self.path = path
-
-        def get_inputs(self):
-            return [types.SimpleNamespace(name="obs", type="tensor(float)")]
-
-        def run(self, names, inputs):
-            seen.append(inputs["obs"])
-            return [-2.0 / 6.0 * inputs["obs"][:, :1]]
-
-    monkeypatch.setitem(sys.modules, "onnxruntime", types.SimpleNamespace(InferenceSession=Session))
-    (tmp_path / "net.onnx").write_bytes(b"x")
-    with pytest.warns(smc.PlainLoopWarning, match="net"):
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(tmp_path / "net.onnx"), duration=0.003))
-    assert trace.u[0, 0] == pytest.approx(-3.0, rel=1e-6)
-    assert (seen[0].shape, seen[0].dtype) == ((1, 2), np.float32)
-    first = fingerprint.of(smc.policy(tmp_path / "net.onnx").function)
-    (tmp_path / "net.onnx").write_bytes(b"y")
-    assert fingerprint.of(smc.policy(tmp_path / "net.onnx").function) != first  # a study runs it again
-
-
-def test_a_torch_module_is_asked_for_float32_without_gradients(monkeypatch):
-    class Tensor(np.ndarray):
-        def numpy(self):
-            return np.asarray(self)
-
-    class Module:
-        def __call__(self, batch):
-            assert (batch.shape, batch.dtype) == ((1, 2), np.float32)
-            return -0.5 * batch[:, :1]
-
-    torch = types.SimpleNamespace(
-        nn=types.SimpleNamespace(Module=Module),
-        no_grad=contextlib.nullcontext,
-        as_tensor=lambda array, dtype: array.astype(dtype).view(Tensor),
-        float32=np.float32,
-    )
-    monkeypatch.setitem(sys.modules, "torch", torch)
-    with pytest.warns(smc.PlainLoopWarning, match="Module"):
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(Module()), duration=0.003, x0=0.5))
-    assert trace.u[0, 0] == pytest.approx(-1.5, rel=1e-6)
-
-
 # errors
+
+
+@dataclasses.dataclass(frozen=True)
+class Lost(smc.Signal):
+    """A reference that is NaN from some time on."""
+
+    after: float
+
+    @staticmethod
+    def value(t, p):
+        return (math.nan if t > p.after else 0.0), 0.0, 0.0
 
 
 @pytest.mark.parametrize(
@@ -286,10 +288,11 @@ def test_a_torch_module_is_asked_for_float32_without_gradients(monkeypatch):
         (lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}), "unknown field of an environment"),
         (lambda: suite.load("duffing", changes={"u_max": np.inf}), "u_max is inf"),
         (lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}), "take 'track'"),
+        (lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}), "finite number at t = 1.001 s"),
         (lambda: suite.load("duffing", changes=3), "changes is 3"),
-        (lambda: smc.policy(3), "policy is 3"),
-        (lambda: smc.policy("net.h5"), "ends in .onnx"),
-        (lambda: smc.policy("net.onnx"), "no policy 'net.onnx'"),
+        (lambda: suite.load("duffing").task.setting.command([np.inf]), "action is \\[inf\\]: give finite numbers"),
+        (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
+        (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),
         (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.suite"),
         (lambda: smc.agent("clasical", suite.load("duffing")), "did you mean 'classical'"),
     ],
@@ -298,24 +301,6 @@ def test_bad_input_is_one_sentence(make, words):
     with pytest.raises(smc.ScenarioError, match=words) as raised:
         make()
     assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt", "torch")])
-def test_a_library_that_is_missing_is_named(file, library, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, library, None)
-    (tmp_path / file).write_bytes(b"x")
-    with pytest.raises(smc.ScenarioError, match=f"pip install {library}"):
-        smc.policy(tmp_path / file)
-
-
-def test_a_file_that_is_no_network_is_one_sentence(tmp_path, monkeypatch):
-    def refuse(path, providers):
-        raise RuntimeError("protobuf\n parsing failed")
-
-    monkeypatch.setitem(sys.modules, "onnxruntime", types.SimpleNamespace(InferenceSession=refuse))
-    (tmp_path / "bad.onnx").write_bytes(b"z")
-    with pytest.raises(smc.ScenarioError, match=r"'bad.onnx' cannot be read \(protobuf parsing failed\): export"):
-        smc.policy(tmp_path / "bad.onnx")
 
 
 def test_an_agent_whose_law_fails_says_so():
