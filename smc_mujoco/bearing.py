@@ -12,7 +12,8 @@ from smc_mujoco import linear, metrics, theory
 from smc_mujoco.conditions import Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.friction import Coulomb
-from smc_mujoco.measure import EFFORT, parts, refuse, scale
+from smc_mujoco.measure import parts, refuse, scale
+from smc_mujoco.plant import EFFORT
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Constant
 from smc_mujoco.trace import Trace

@@ -99,6 +99,9 @@ def run(
 ) -> None:
     """Run a scene: print its scores; write its traces, figures and film.
 
+    Exported traces hold every number to the last bit, and its unit: csv in the first line ("t [s],x [m],..."), mat in
+    the struct `units`, parquet in each column's metadata, "unit".
+
     Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
     """
     with mendable():
@@ -126,7 +129,7 @@ def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file that `run` or Trace.save wrote.")],
     figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
     export: Annotated[
-        Path | None, typer.Option(help="Also write its columns, to a .csv, .mat or .parquet file.")
+        Path | None, typer.Option(help="Also write its columns, with units, to a .csv, .mat or .parquet file.")
     ] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores."""

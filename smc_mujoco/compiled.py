@@ -110,9 +110,15 @@ class Function:
 
 
 class AtAddress:
-    """What is a C function of the callback's type already; `address` is where it lies, as long as this lives."""
+    """What is a C function of the callback's type already.
+
+    Attributes:
+      address: where it lies, as long as this lives.
+      digest: a hash of its machine code.
+    """
 
     address: int
+    digest: str
 
 
 class Uncompiled:

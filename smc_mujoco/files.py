@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files: the shipped ones, and written ones that are there whole or not at all."""
 
 import contextlib
 import os
@@ -7,6 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from smc_mujoco.errors import ScenarioError
+
+
+def shipped(folder: str) -> Path:
+    """The folder models/ or scenes/, from a checkout or from an installed wheel."""
+    here = Path(__file__).parent
+    for place in (here / folder, here.parent / folder):
+        if place.is_dir():
+            return place
+    raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
 
 
 def ended(path: str | os.PathLike, ending: str) -> Path:

@@ -4,8 +4,8 @@
 
 What counts: bytecode, constants, defaults, closed-over values, and whatever it reaches by a global name - constants by
 value, functions by their own code, objects by their class and what pickle would keep of them, down to functions and
-classes of Python and of the numerical packages, which a version tells. The names of files, lines and comments do not
-count. It holds for one version of Python.
+classes of Python and of the numerical packages, which a version tells. A law in C counts by its machine code. The names
+of files, lines and comments do not count. It holds for one version of Python.
 """
 
 import functools
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.compiled import AtAddress
 from smc_mujoco.errors import ScenarioError, shown
 
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages told by version, not by code
@@ -68,6 +69,8 @@ def _pieces(thing: Any, seen: Seen) -> Iterator[bytes]:
         yield from _function(thing, seen)
     elif isinstance(thing, MethodType):
         yield from _all((thing.__func__, thing.__self__), seen)
+    elif isinstance(thing, AtAddress):
+        yield f"machine code {thing.digest}".encode()
     elif isinstance(thing, CodeType):
         yield thing.co_code + thing.co_exceptiontable
         yield from _all([*thing.co_names, *thing.co_varnames, thing.co_argcount, *thing.co_consts], seen)

@@ -38,16 +38,15 @@ import numpy as np
 
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.groups import Group, cut, groups
+from smc_mujoco.plant import EFFORT, Plant
 
 if TYPE_CHECKING:
-    from smc_mujoco.plant import Plant
     from smc_mujoco.trace import Trace
 
 BAND = 0.02  # of the scale
 LAST = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that rounding put this much before the last part is in it
 REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above what stuck joints creep, see friction.py
-EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 

@@ -20,9 +20,11 @@ import numpy as np
 
 from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.files import shipped
 from smc_mujoco.frozen import frozen
 
 DIRECTLY = "smc:direct"  # a text in the MJCF of own models: disturbances act on their joints, not on bodies
+EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
 LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
@@ -202,15 +204,6 @@ def array(model: mujoco.MjModel, name: str) -> np.ndarray:
     """The array of a model or option field that a Field names."""
     owner = model.opt if name.startswith("opt.") else model
     return getattr(owner, name.removeprefix("opt."))
-
-
-def shipped(folder: str) -> Path:
-    """The folder models/ or scenes/, from a checkout or from an installed wheel."""
-    here = Path(__file__).parent
-    for place in (here / folder, here.parent / folder):
-        if place.is_dir():
-            return place
-    raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
 
 
 def model_path(name: str) -> Path:

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from smc_mujoco.errors import ScenarioError, shown, unknown
 from smc_mujoco.errors import find as lookup
+from smc_mujoco.files import shipped
 from smc_mujoco.metrics import metrics
-from smc_mujoco.plant import shipped
 from smc_mujoco.scenario import Scenario
 
 

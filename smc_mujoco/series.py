@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.signals import EARLY, Signal
 
 GAP = 1.5  # median steps; chosen: jitter of a logger's clock stays below, one row that is missing does not
+WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # a column's name
+SECONDS = ("s", "sec", "second", "seconds")
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -59,13 +62,14 @@ class TimeSeries(Signal):
         """The series in a CSV file: numbers separated by commas, a row for each time, at a nearly constant rate.
 
         Args:
-          path: the file. Its first row may name the columns; where it does not, they are time and value.
+          path: the file. Its first row may name the columns; where it does not, they are time and value. A name may
+            have a unit, "d [N m]", as in what Trace.export writes, and is found with and without it.
           column: the column of the values. Default: the first besides time.
           time: the column of the times, s. Default: "t" or "time", else the first.
 
         Raises:
-          ScenarioError: no such file or column, a cell that is empty or no finite number, times that do not increase,
-            or a step between them beyond 1.5 median steps; each with its line.
+          ScenarioError: no such file or column, times that are not in s, a cell that is empty or no finite number,
+            times that do not increase, or a step between them beyond 1.5 median steps; each with its line.
         """
         rows = _rows(path)
         if not rows:
@@ -164,14 +168,18 @@ def _columns(
                 "names in its first line, or leave out column and time"
             )
         return 0, 1, rows
+    places = {WITH_UNIT.sub(r"\1", name): i for i, name in reversed([*enumerate(names)])}
+    places |= {name: i for i, name in reversed([*enumerate(names)])}
     if time is None:
-        time = next((name for name in ("t", "time") if name in names), names[0])
-    if time not in names:
+        time = next((name for name in ("t", "time") if name in places), names[0])
+    if not isinstance(time, str) or time not in places:
         raise unknown(f"time column of {path}", time, names)
-    if column is not None and column not in names:
+    if column is not None and (not isinstance(column, str) or column not in places):
         raise unknown(f"column of {path}", column, names)
-    at = names.index(time)
-    return at, int(at == 0) if column is None else names.index(column), rows[1:]
+    at = places[time]
+    if (unit := WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECONDS:
+        raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
+    return at, int(at == 0) if column is None else places[column], rows[1:]
 
 
 def _cell(path: str | os.PathLike, line: int, name: str, cell: str) -> float:

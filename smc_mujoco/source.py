@@ -4,7 +4,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-from smc_mujoco.plant import shipped
+from smc_mujoco.files import shipped
 
 PACKAGE = Path(__file__).parent
 BESIDE = ("models", "scenes")  # in a wheel they lie in the package, in a checkout beside it

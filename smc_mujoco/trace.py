@@ -13,6 +13,7 @@ import numpy as np
 from smc_mujoco import record
 from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.files import replacing
+from smc_mujoco.plant import EFFORT
 from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
 
@@ -76,16 +77,28 @@ class Trace:
         return path
 
     def columns(self) -> dict[str, np.ndarray]:
-        """The arrays by channel: t, x, v, ... of a single one, t, x0, x1, ..., v0, ... of several."""
+        """The arrays by channel: t, x, v, ... of a single one, t, x0, x1, ..., v0, ... of several; see `units`."""
         n = self.x.shape[1]
         return {"t": self.t} | {
             f"{name}{i}" if n > 1 else name: getattr(self, name)[:, i] for name in ARRAYS[1:] for i in range(n)
         }
 
-    def export(self, path: str | os.PathLike) -> Path:
-        """Write the `columns` to a .csv or a .parquet file, or the arrays to a .mat file (MATLAB 5).
+    def units(self) -> dict[str, str]:
+        """The unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, which is what the law makes of it."""
+        found, channels = {"t": "s"}, self.scenario.plant.units
+        for column in list(self.columns())[1:]:
+            name = column.rstrip("0123456789")
+            x = channels[int(column[len(name) :] or 0)]
+            found[column] = {"x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
+        return found
 
-        The last two hold the scenario too, as JSON: a variable in the one, metadata of the schema in the other.
+    def export(self, path: str | os.PathLike) -> Path:
+        """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), every number to the last bit.
+
+        CSV: a line of headers with units, "t [s]", "x [rad]", ..., then a line a sample, of the fewest digits that tell
+        a number from its neighbours (0.1, not 0.10000000000000001); nan after a failure. Parquet: the `columns` under
+        their plain names; the metadata of each has its "unit", those of the schema "scenario", as JSON. MAT: the arrays
+        by name, (K + 1, n), a struct `units` with a unit for each (a cell array where channels differ), and `scenario`.
 
         Raises:
           ScenarioError: another ending.
@@ -99,15 +112,21 @@ class Trace:
 
 
 def _write_csv(trace: Trace, file: Path) -> None:
-    columns = trace.columns()
-    np.savetxt(file, np.column_stack(list(columns.values())), "%.17g", ",", header=",".join(columns), comments="")
+    heads = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(f"{','.join(heads)}\n")
+        for row in np.column_stack(list(trace.columns().values())):
+            stream.write(f"{','.join(map(repr, row.tolist()))}\n")
 
 
 def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
-    about = json.dumps(record.describe(trace.scenario))
-    savemat(file, {name: getattr(trace, name) for name in ARRAYS} | {"scenario": about}, oned_as="column")
+    about, units = json.dumps(record.describe(trace.scenario)), trace.units()
+    listed = {name: [units[c] for c in units if c.rstrip("0123456789") == name] for name in ARRAYS}
+    alike = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in listed.items()}
+    arrays = {name: getattr(trace, name) for name in ARRAYS}
+    savemat(file, arrays | {"units": alike, "scenario": about}, oned_as="column")
 
 
 def _write_parquet(trace: Trace, file: Path) -> None:
@@ -115,8 +134,9 @@ def _write_parquet(trace: Trace, file: Path) -> None:
     from pyarrow import parquet
 
     about = json.dumps(record.describe(trace.scenario))
+    fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in trace.units().items()]
     with file.open("wb") as stream:  # whose errors say what is wrong as those of other files do
-        parquet.write_table(pa.table(trace.columns(), metadata={"scenario": about}), stream)
+        parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
 
 
 _WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}

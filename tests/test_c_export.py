@@ -171,6 +171,7 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
     assert words == {"ON_E": 2560, "ON_DE": 2048, "LAM": 24576}  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
     core = back(folder, smc.law("observer_free"), "q15").library.smc_q15_u
     core.restype, core.argtypes = ctypes.c_int16, [ctypes.c_int16] * 2
+    assert core(-32768, 24576) == core(-32767, 24576)  # which the sliding variable's function never gives
     s = np.arange(-32767, 32768)
     i, part = np.abs(s) >> 7, np.abs(s) & 127
     T = q15.TABLE[i] + ((np.diff(q15.TABLE, append=0)[i] * part + 64) >> 7)
@@ -180,7 +181,7 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
 # laws of one's own
 
 
-WIDTH, QUARTERS = 0.5, (1, 2, 3)
+WIDTH, QUARTERS, NOUGHT = 0.5, (1, 2, 3), -0.0
 
 
 @smc.law_function(gains={"k": 2.0, "out": 3.0, "if_": 1.5}, memory=4)
@@ -209,7 +210,7 @@ def turns(z, K, state):
     state[0], state[1] = state[1], state[0] + s
     high, low = (0.75, 0.25) if state[0] > state[1] else (a, b)
     memory = high - (low - (a - b)) / (2.0 / (b * b + 1.0))
-    u = -K.out * math.tanh(s) - K.if_ * double + late * abs(count) + memory
+    u = -K.out * math.tanh(s) - -NOUGHT * a - K.if_ * double + late * abs(count) + memory
     return u, s + state[2] + (1 if a > b else 0.5) + state[3]
 
 
@@ -272,13 +273,18 @@ REFUSED = {
     "try:\n        u = y.e\n    finally:\n        pass": "try",
     "u = (lambda a: a)(y.e)": "a call",
     "y = 3.0; u = y": "an assignment to this",
+    "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
+    "u = gains.k * y.e": "it reads an unknown gain 'k': there is none",
+    "u = halts(y.e)": "halts, whose last line is no return,",
 }
 
 
 @pytest.mark.parametrize(("line", "words"), REFUSED.items())
 def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
     (tmp_path / "strange.py").write_text(
-        "import numpy as np\nimport smc_mujoco as smc\ndef again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
+        "import numpy as np\nimport smc_mujoco as smc\n"
+        "def halts(a):\n    while a:\n        return a\n"
+        "def again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
         f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
     )
     monkeypatch.syspath_prepend(tmp_path)

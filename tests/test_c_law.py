@@ -7,13 +7,14 @@ import stat
 import subprocess
 import sys
 import time
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import cli, plain
+from smc_mujoco import cli, identity, plain
 from smc_mujoco.c import build
 from smc_mujoco.law import Measurement
 
@@ -37,6 +38,11 @@ def law(body: str, more: str = "") -> str:
 
 FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
 WAITS = law("out[0] = -y->e;", "int smc_setup(void) { volatile int on = 1; while (on) { } return 0; }")
+# state that is neither in memory nor in static data
+KEPT = """#include <signal.h>
+#include <stdlib.h>
+static double *hidden;
+int smc_setup(void) { hidden = calloc(1, sizeof *hidden); return hidden == 0; }"""
 
 
 @pytest.fixture
@@ -66,6 +72,14 @@ def call(capsys):
 def scenario(law: object, plant: str = "duffing", **more: object) -> smc.Scenario:
     common = {"duration": 0.3, "noise": smc.Noise(0.01, 0.05), "disturbance": smc.Sine(0.5, 7.0)}
     return smc.Scenario(plant=plant, law=law, **common | more)
+
+
+def python(code: str) -> str:
+    """What another process prints."""
+    variables = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+    ).stdout
 
 
 def same(one: smc.Trace, other: smc.Trace) -> bool:
@@ -176,11 +190,66 @@ def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
         smc.run(trace.scenario)
 
 
-def test_a_scenario_with_it_can_be_pickled(file):
-    first = scenario(smc.law_from_c(file(MINE))(lam=4.0))
-    again = pickle.loads(pickle.dumps(first))
-    assert again.law.gains == first.law.gains
-    assert same(*smc.run([first, again]))
+def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_then(file, tmp_path):
+    text = 'const char smc_law_gains[] = "k=2";'
+    first = scenario(smc.law_from_c(file(law("out[0] = table * gains[0] * y->e;", f"static double table;\n{text}\n"
+        "int smc_setup(void) { table = -1.0; return 0; }")), name="mine")(k=4.0), noise=None)  # fmt: skip
+    kept, trace = pickle.dumps([first, first]), smc.run(first)
+    file(law("out[0] = y->e;"))
+    one, two = pickle.loads(kept)
+    assert str(one.law) == "mine(k=4)"
+    assert one.law.function is two.law.function is pickle.loads(kept)[0].law.function  # loaded once
+    assert same(smc.run(one), trace)
+    assert same(plain.run(one), trace)
+    Path(tmp_path / "my_law.c").unlink()
+    code = f"import pickle, smc_mujoco as smc; print(smc.run(pickle.loads({pickle.dumps(first)!r})).u[:, 0].tolist())"
+    assert eval(python(code)) == trace.u[:, 0].tolist()
+
+
+def test_a_law_of_floats_is_as_large_in_another_process(file):
+    text = "#define SMC_REAL float\n" + law("memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];")
+    first = scenario(smc.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01)
+    trace = smc.run(pickle.loads(pickle.dumps(first)))
+    assert trace.s[:, 0].tolist() == [2.0 * k for k in range(1, 12)]
+
+
+def test_code_of_another_machine_is_one_sentence(file):
+    mine = smc.law_from_c(file(MINE)).function
+    remade, arguments = mine.__reduce__()
+    with pytest.raises(smc.ScenarioError, match=r"my_law\.c cannot be loaded \(my_law\.c: file too short\): run it on"):
+        remade(*arguments[:2], b"\x7fELF", *arguments[3:])
+
+
+def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
+    def key(gain: float, name: str = "my_law.c", **more: object) -> str:
+        return identity.key(scenario(smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()))
+
+    first = key(1.0)
+    assert key(2.0) != first
+    assert key(1.0) == first
+    assert key(1.0, timeout=20.0) == first
+    assert key(1.0, flags=["-O0"]) != first
+    (tmp_path / "elsewhere").mkdir()
+    assert key(1.0, "elsewhere/my_law.c") == first
+    again = pickle.loads(pickle.dumps(scenario(smc.law_from_c(file(law("out[0] = -1.0 * y->e;")))())))
+    assert identity.key(again) == first
+
+
+def test_a_study_runs_it_and_after_an_edit_runs_it_again(file, tmp_path):
+    def table(gain: float):
+        mine = smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;")))
+        return smc.study(smc.grid(["duffing"], [mine()], ["nominal"], seeds=1, duration=0.05), tmp_path / "study")
+
+    first, second, third = (table(gain).column("max_u").tolist() for gain in (1.0, 2.0, 1.0))
+    assert first == third
+    assert second[0] == pytest.approx(2.0 * first[0], rel=0.01)
+
+
+def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
+    """y0 and remove are functions of C's, timezone a number: a linker may take those without a word."""
+    more = "double y0(double a) { return -a; }\ndouble remove(double a) { return y0(2.0 * a); }\ndouble timezone = 0.5;"
+    trace = smc.run(scenario(smc.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))), noise=None))
+    assert trace.u[0, 0] == -trace.x[0, 0]
 
 
 # mistakes
@@ -237,10 +306,15 @@ def test_a_set_up_or_a_loading_that_never_ends_is_ended(file):
         ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the two numbers of out"),
         ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the two numbers of out"),
         ("out[2] = y->e; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the two numbers of out"),
-        ("out[0] = -gains[1] * y->e;", "smc_law returned u = nan"),  # it has one gain
-        ("out[0] = -gains[1] * y->e; /* of floats */", "smc_law returned u = nan"),
+        ("out[0] = -gains[1] * y->e;", "smc_law reads more gains than the 1 that have names: name them"),
+        ("out[0] = -gains[1] * y->e; /* of floats */", "smc_law reads more gains than the 1 that have names"),
+        ("out[0] = y->e / (gains[0] - gains[0]);", "smc_law returned u = inf"),
         ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
-        ("static double z; out[0] = z += y->e;", "smc_law gave two answers to one measurement"),
+        ("static double z; out[0] = z += y->e;", "smc_law changes static data, which all channels and simul"),
+        ("static volatile int n; n = y->e > 1e3; out[0] = 0.0;", "smc_law changes static data"),  # far away alone
+        ("static volatile int on; on = 1; out[0] = on; /* of floats */", "smc_law changes static data"),
+        ("out[0] = *hidden += y->e;", "smc_law gave two answers to one measurement"),
+        ("raise(40); out[0] = 0.0;", "smc_law died of signal 40 (Real-time signal 6)"),
         ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("out[1] = 0.0;", "smc_law returned u = nan"),
     ],
@@ -249,12 +323,28 @@ def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
     timeout = 1.0 if "did not end" in words else 30.0
     with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
         smc.law_from_c(
-            file("#define SMC_REAL float\n" * ("of floats" in body) + law(body)),
+            file("#define SMC_REAL float\n" * ("of floats" in body) + law(body, KEPT)),
             gains={"k": 3.0},
             isolate=True,
             timeout=timeout,
         )
     assert "\n" not in str(error.value)
+
+
+def test_isolated_a_law_may_give_up_far_away(file):
+    text = law("if (y->e * y->e > 1e4) return 7; out[0] = -y->e; /* and say nothing of u */")
+    assert smc.law_from_c(file(text), isolate=True).memory == 8
+
+
+def test_what_a_set_up_prints_without_end_is_not_kept(file):
+    text = '#include <stdio.h>\nint smc_setup(void) { for (;;) puts("a line of a law"); return 0; }'
+    tracemalloc.start()
+    try:
+        with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
+            smc.law_from_c(file(law("", text)), timeout=0.5)
+        assert tracemalloc.get_traced_memory()[1] < 1e7
+    finally:
+        tracemalloc.stop()
 
 
 def test_the_processes_of_a_trial_that_never_ends_are_gone(file, tmp_path):
@@ -336,7 +426,9 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
         (None, {"gains": {"k2": 1.0}}, "unknown gain of my_law.c 'k2': choose from k1, lam"),
         (None, {"gains": 3}, "gains is 3: give names"),
         (None, {"memory": 0}, "memory is 0"),
+        (".", {}, "cannot take a law from '.': give a .c file"),
         (None, {"timeout": 0}, "timeout is 0"),
+        (None, {"timeout": 1e12}, "timeout is 1e+12: give at most 86400"),
         (None, {"symbol": "a b"}, "symbol is 'a b': give the name of a C function"),
         (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
         (None, {"flags": "-O3"}, "flags is '-O3': give several"),
@@ -385,6 +477,29 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
     assert len(Measurement._fields) == build.INPUTS
 
 
+def test_check_c_names_its_own_options(call, file):
+    wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
+    for words, said in (
+        ((), "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory"),
+        (("--memory", 21), "reads more gains than the 0 that have names: name them in smc_law_gains, or give --gains"),
+        (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "mend it, or give other --flag"),
+    ):
+        code, out, err = call("check-c", wants, *words)
+        assert (code, out) == (2, "")
+        assert err.endswith(f"{said}\n")
+    assert call("check-c", wants, "--memory", 21, "--gains", "k=2")[0] == 0
+    assert (
+        "did not end within 0.5 s: mend what it waits for, or give --timeout\n"
+        in call("check-c", file(WAITS), "--timeout", 0.5)[2]
+    )
+    assert "cannot take a law from '.'" in call("check-c", ".")[2]
+
+
+def test_gains_may_have_any_name_that_python_takes(file):
+    mine = smc.law_from_c(file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";')))
+    assert mine.defaults == {"λ": 3.0}
+
+
 def test_check_c_says_what_it_found(call, file):
     code, out, err = call("check-c", file(MINE.replace("(void)memory;", "int unused;")), "--gains", "lam=5")
     assert (code, err) == (0, "")
@@ -398,10 +513,6 @@ def test_check_c_says_what_it_found(call, file):
 
 def test_nothing_is_left_behind(file):
     code = f"import smc_mujoco as smc; smc.law_from_c({str(file(MINE))!r})\n"
-    code += "from smc_mujoco.c import build; print(build.folder())"
-    root = str(Path(smc.__file__).parents[1])
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": root}, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip()
-    assert not Path(done.stdout.strip()).exists()
+    folder = python(code + "from smc_mujoco.c import build; print(build.folder())").strip()
+    assert folder
+    assert not Path(folder).exists()

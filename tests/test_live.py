@@ -103,9 +103,14 @@ def test_what_is_shown_is_where_the_run_is(shown):
         view.frame(viewer, FRAME)
         assert view.data.time == view.loop.data.time
         np.testing.assert_array_equal(view.data.qpos, view.loop.data.qpos)
+        drives = len(view.loop.data.ctrl)
+        np.testing.assert_array_equal(view.data.ctrl[:drives], view.loop.data.ctrl)
+        assert view.data.ctrl[:drives].any()
     assert view.step == pytest.approx(12 * FRAME / HARD.physics_step, abs=1.0)
     np.testing.assert_allclose(view.model.body_mass, view.loop.model.body_mass)  # after the jump
     assert any(view.model.body_mass != live.Live(HARD).model.body_mass)
+    view.begin(HARD)
+    np.testing.assert_array_equal(view.model.body_mass, live.Live(HARD).model.body_mass)
 
 
 def test_a_run_that_is_over_begins_anew_with_its_gains(shown):
@@ -345,11 +350,15 @@ def test_condition_and_label_name_the_run(call, screen):
     assert [(s.plant.name, s.law.name) for s in screen] == [("duffing", "observer_free"), ("van_der_pol", "classical")]
 
 
+@pytest.mark.parametrize("display_there", [True, False])
 @pytest.mark.parametrize("words", [("nowhere",), ("duffing", "--condition", "windy"), ("duffing", "--label", "mine")])
-def test_what_the_scene_does_not_have_is_named(words, call, screen):
+def test_what_the_scene_does_not_have_is_named_before_a_display_is_missed(
+    words, display_there, call, screen, monkeypatch
+):
+    monkeypatch.setattr(display, "missing", lambda: None if display_there else "no view: there is no display")
     code, out, err = call("view", *words)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert words[-1] in err
+    assert repr(words[-1]) in err
     assert screen == []
 
 

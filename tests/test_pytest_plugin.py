@@ -1,5 +1,6 @@
 """The pytest plugin: what a user's tests on step responses say when they pass, fail, are recorded and are mistaken."""
 
+import contextlib
 import importlib.metadata
 import json
 import os
@@ -401,6 +402,18 @@ def test_what_a_test_says_goes_before_the_tolerances_of_the_file(step_response, 
         assert off
     else:
         assert not off
+
+
+@pytest.mark.parametrize(("recorded", "off"), [(1e-12, False), (1e-6, True)])
+def test_of_a_metric_that_is_zero_no_share_is_asked_but_more_than_rounding_is_told(
+    step_response, tmp_path, recorded, off
+):
+    response, file = step_response("duffing", "none", step=0.1, duration=0.01), tmp_path / "a.json"
+    assert response.overshoot == 0
+    golden.record(file, "test", response, None, {"overshoot": 1.0})
+    file.write_text(file.read_text().replace('"value": 0.0', f'"value": {recorded}'))
+    with pytest.raises(AssertionError, match="overshoot is 0 %") if off else contextlib.nullcontext():
+        golden.compare(file, "test", response, 0.01, {})
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no lock there")

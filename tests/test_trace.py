@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ from scipy.io import loadmat
 import smc_mujoco as smc
 
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
+FORCES = ("u", "applied", "d", "force", "reaction")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -233,8 +235,9 @@ def test_no_name_is_no_name(trace):
 def test_csv_holds_every_number_to_the_last_bit(name, traces, tmp_path):
     trace = traces[name]
     with open(trace.export(tmp_path / "a.csv"), newline="") as file:
-        rows = list(csv.DictReader(file))
+        rows = [{re.sub(r" \[.*\]", "", head): cell for head, cell in row.items()} for row in csv.DictReader(file)]
     assert len(rows) == len(trace.t)
+    assert all(cell == repr(float(cell)) for row in rows for cell in row.values())  # no digit more than it takes
     n = trace.x.shape[1]
     columns = ["t"] + [f"{name}{i if n > 1 else ''}" for name in ARRAYS[1:] for i in range(n)]
     assert list(rows[0]) == columns
@@ -251,6 +254,25 @@ def test_mat_holds_every_array_and_the_scenario(name, traces, tmp_path):
     for array in ARRAYS:
         np.testing.assert_array_equal(data[array].reshape(getattr(trace, array).shape), getattr(trace, array))
     assert json.loads(str(data["scenario"][0]))["plant"]["name"] == trace.scenario.plant.name
+
+
+def test_every_format_has_the_units_of_each_column(tmp_path):
+    """Of the cart and of its pole, of which one moves in m and the other in rad."""
+    trace = smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", duration=0.01))
+    units = {"t": "s", "x0": "m", "x1": "rad", "v0": "m/s", "v1": "rad/s", "s0": "", "s1": "", "r0": "m", "r1": "rad"}
+    units |= {f"{name}{i}": unit for name in FORCES for i, unit in enumerate(("N", "N m"))}
+    assert {name: trace.units()[name] for name in units} == units
+    assert list(trace.units()) == list(trace.columns())
+    heads = trace.export(tmp_path / "a.csv").read_text().partition("\n")[0].split(",")
+    assert heads == [f"{name} [{units[name]}]" if units[name] else name for name in trace.columns()]
+    schema = parquet.read_schema(trace.export(tmp_path / "a.parquet"))
+    assert {field.name: field.metadata[b"unit"].decode() for field in schema} == units
+    held = loadmat(trace.export(tmp_path / "a.mat"), simplify_cells=True)["units"]
+    assert {name: held[name].tolist() for name in ("x", "v", "u")} == {
+        "x": ["m", "rad"], "v": ["m/s", "rad/s"], "u": ["N", "N m"],
+    }  # fmt: skip
+    single = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+    assert loadmat(single.export(tmp_path / "b.mat"), simplify_cells=True)["units"]["u"] == "N"
 
 
 @pytest.mark.parametrize("name", ["plain", "network", "diverged"])

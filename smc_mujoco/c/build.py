@@ -10,6 +10,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +24,8 @@ INPUTS = 21  # numbers in a measurement, as in law.Measurement
 PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no products and sums fused into one rounding.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+# Calls of its own functions, and its own data, whatever else in the process has the name: C's remove, y0, timezone.
+OWN = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
 WRONG = ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")  # are errors, not warnings
 ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<said>.*)$", re.MULTILINE)
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
@@ -65,8 +68,11 @@ def compiler() -> list[str]:
         return [said]
 
 
-def timed(command: Sequence[str], timeout: float, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def timed(command: Sequence[str], timeout: float, heard: bool = True) -> subprocess.CompletedProcess[str]:
     """A command that ends in time, with every process that it started.
+
+    Args:
+      heard: whether to keep what it prints; what user's code prints without end would fill the memory.
 
     Raises:
       Late: it did not.
@@ -74,10 +80,9 @@ def timed(command: Sequence[str], timeout: float, cwd: Path | None = None) -> su
     """
     process = subprocess.Popen(
         command,
-        cwd=cwd,
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE if heard else subprocess.DEVNULL,
+        stderr=subprocess.PIPE if heard else subprocess.DEVNULL,
         text=True,
         errors="replace",
         env=os.environ | {"LC_ALL": "C"},
@@ -88,7 +93,7 @@ def timed(command: Sequence[str], timeout: float, cwd: Path | None = None) -> su
     except subprocess.TimeoutExpired:
         raise Late from None
     finally:
-        if process.stdout and not process.stdout.closed:  # it runs, or another that it left behind
+        if process.poll() is None or (process.stdout and not process.stdout.closed):  # it, or what it left behind
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -109,7 +114,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     strict = [f"-Werror={name}" for name in WRONG]
     given = [f'-DSMC_SOURCE="{source.resolve()}"', f"-DSMC_SYMBOL={symbol}", f"-DSMC_INPUTS={INPUTS}"]
     given += [f"-DSMC_BEYOND={BEYOND}", "-I", str(HERE)]
-    line = [*command, *FLAGS, *strict, *given, str(HERE / "glue.c"), "-o", str(target), *flags, "-lm"]
+    line = [*command, *FLAGS, *OWN, *strict, *given, str(HERE / "glue.c"), "-o", str(target), *flags, "-lm"]
     try:
         done = timed(line, timeout)
     except Late:

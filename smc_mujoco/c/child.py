@@ -29,7 +29,7 @@ def attempt(
     order |= {"gains": list(values or ()), "memory": memory, "modelled": modelled}
     command = [sys.executable, "-I", "-S", trial.__file__, json.dumps(order)]
     try:
-        code = build.timed(command, timeout).returncode
+        code = build.timed(command, timeout, heard=False).returncode
     except build.Late:
         code = None
     lines = (told.read_text() if told.exists() else "").splitlines() or ["loading"]
@@ -49,6 +49,7 @@ def _sentence(file: str, symbol: str, last: str, code: int | None, timeout: floa
     if code is None:
         return f"{file}: {last} did not end within {timeout:g} s: mend what it waits for, or give timeout="
     if code < 0:
-        name = signal.Signals(-code).name
+        names = {known.value: known.name for known in signal.Signals}  # without most of the real-time ones
+        name = names.get(-code, f"signal {-code}")
         return f"{file}: {last} died of {name} ({signal.strsignal(-code)}): mend where it reads, writes or divides"
     return f"{file}: {last} ended the process with exit code {code}: let it return"

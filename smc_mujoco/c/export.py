@@ -20,7 +20,7 @@ from smc_mujoco.c.values import Untranslatable, plain
 from smc_mujoco.compiled import AtAddress
 from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import ScenarioError, shown, unknown
-from smc_mujoco.law import catalogue
+from smc_mujoco.law import Measurement, catalogue
 from smc_mujoco.law import law as find_law
 
 NUMBERS = ("double", "float", "q15")
@@ -72,7 +72,12 @@ def _in_q15(law: Component) -> Component:
 def _translated(law: Component, single: bool) -> tuple[int, str]:
     """How many numbers of memory a law uses, and what follows the signature."""
     found = translate(law.function, single)
-    return found.slots, "\n\n".join([*found.constants, *found.functions])
+    code = "\n\n".join([*found.constants, *found.functions])
+    for kind, reads, names in (("measurement", r"->(\w+)", Measurement._fields), ("gain", r"\bGAIN_(\w+)", law.gains)):
+        for name in re.findall(reads, code):
+            if name not in map(plain, names):
+                raise Untranslatable(f"it reads an {unknown(kind, name, names)}")
+    return found.slots, code
 
 
 def _includes(code: str) -> list[str]:

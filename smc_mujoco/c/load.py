@@ -8,6 +8,8 @@ can hang or crash - loading, smc_setup, and where asked for the law itself - is 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import ctypes
+import functools
+import hashlib
 import math
 import re
 import shutil
@@ -18,32 +20,34 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from smc_mujoco.c import build, child, trial
+from smc_mujoco.c import build, child, said, trial
 from smc_mujoco.compiled import AtAddress, Function, call_int, pointer
 from smc_mujoco.component import Template, template
-from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.errors import ScenarioError, number, shown, whole
 
 LIBRARIES = (".so", ".dylib")
-DEFAULT_MEMORY = 8
+LONGEST = 86_400.0  # s, of a timeout
 
 
 class CLaw(AtAddress):
-    """A law in C: called by address in the callback, and here, through ctypes, in the plain loop."""
+    """A law in C: called by address in the callback, and here, through ctypes, in the plain loop.
 
-    def __init__(self, origin: tuple[str, str, tuple[str, ...], float], library: Path):
-        self.origin = origin
-        self.path, self.symbol = Path(origin[0]), origin[1]
+    What tells it from others is its machine code, and so all that went into it: file, headers, flags, compiler.
+    """
+
+    def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
+        self.path, self.symbol, self.file = path, symbol, file
         self.warnings: list[str] = []
-        self.file = library
-        self._function, self.library = trial.entry(str(library), self.symbol)
-        if hasattr(self.library, "smc_mujoco_entry"):
-            self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
-        else:
-            self._trampoline = _trampoline(ctypes.cast(self._function, ctypes.c_void_p).value or 0)
+        self.code = file.read_bytes()
+        self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
+        self._function, self.library = trial.entry(str(file), symbol)
+        self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
+        if not hasattr(self.library, "smc_mujoco_entry"):
+            self._trampoline = _trampoline(self.address)
             self.address = self._trampoline.address
         self.sizes = 0, 1  # how many gains and numbers of memory
-        self.__name__ = re.sub(r"\W", "_", self.path.stem)
-        self.__module__, self.__doc__ = self.path.name, _comment(self.path)
+        self.__name__ = re.sub(r"\W", "_", path.stem)
+        self.__module__, self.__doc__ = path.name, doc
 
     def __call__(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
         """u and s; ArithmeticError where the C function returns anything but 0."""
@@ -62,8 +66,8 @@ class CLaw(AtAddress):
         trial.sized(self.library, gains, memory)
 
     def __reduce__(self):
-        """By what it was made of: another process compiles it again."""
-        return _again, (self.origin, self.sizes, self.__name__)
+        """By its machine code: another process runs this one, whatever its file holds by then."""
+        return _again, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
 
 
 def law_from_c(
@@ -94,13 +98,15 @@ def law_from_c(
       symbol: the function's name.
       flags: more for the compiler: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
       isolate: whether to try the law first in a process of its own, on short runs of a double integrator: it tells by
-        a sentence what crashes, hangs, returns NaN, writes beyond its memory or keeps state elsewhere.
+        a sentence what crashes, hangs, returns NaN, reads gains that have no name, writes beyond its memory or keeps
+        state elsewhere.
       timeout: s, for each of the compiler, the set-up and the trial.
       positive, nonnegative, degree, plants, modelled: as of `smc.law_function`; where degree and modelled are left
         out, what the file says in smc_law_degree and smc_law_modelled.
 
     Returns:
-      A Template, called with gains for the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`.
+      A Template, called with gains for the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It is the code of now:
+      an edit of the file asks for another call. Pickled, it takes its machine code along.
 
     Raises:
       ScenarioError: no such file or function, what does not compile or has another type, a set-up that fails, crashes
@@ -113,7 +119,7 @@ def law_from_c(
     if not isinstance(source, str | Path):
         raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
     path = Path(source)
-    timeout = number("timeout", timeout, above=0.0)
+    timeout = number("timeout", timeout, above=0.0, most=LONGEST)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
     if not isinstance(gains, Mapping | None):
@@ -123,9 +129,9 @@ def law_from_c(
     if name is not None and not (isinstance(name, str) and name.isprintable() and name.strip()):
         raise ScenarioError(f"name is {shown(name)}: give a word, such as 'my_law'")
     law = _loaded(str(path), symbol, tuple(flags), timeout)
-    defaults, size = _gains(law, gains), _memory(law, memory)
-    degree = whole("degree", (_number(law, "smc_law_degree") or 1) if degree is None else degree, 1, 3)
-    modelled = bool(_number(law, "smc_law_modelled")) if modelled is None else modelled
+    defaults, size = said.gains(law.library, path.name, gains), said.memory(law.library, memory)
+    degree = whole("degree", (said.number(law.library, "smc_law_degree") or 1) if degree is None else degree, 1, 3)
+    modelled = bool(said.number(law.library, "smc_law_modelled")) if modelled is None else modelled
     law.sized(len(defaults), size)
     if isolate:
         child.attempt(law.file, path, symbol, timeout, values=list(defaults.values()), memory=size, modelled=modelled)
@@ -151,87 +157,51 @@ def checked(
     yield f"{path.name}: {symbol} passes; gains {named}; memory {made.memory}"
 
 
-def _again(origin: tuple[str, str, tuple[str, ...], float], sizes: tuple[int, int], name: str) -> CLaw:
-    law = _loaded(*origin)
+@functools.cache
+def _again(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: str, doc: str | None) -> CLaw:
+    """The law of another process, loaded once in this one."""
+    copy = build.fresh(".so")
+    copy.write_bytes(code)
+    try:
+        law = CLaw(Path(file), symbol, copy, doc)
+    except OSError as error:
+        why = str(error).replace(str(copy), file)
+        raise ScenarioError(
+            f"{file} cannot be loaded ({why}): run it on machines like the one it was built on"
+        ) from None
+    _set_up(law)
     law.sized(*sizes)
     law.__name__ = name
     return law
+
+
+def _set_up(law: CLaw) -> None:
+    if code := trial.set_up(law.library):
+        raise ScenarioError(f"{law.path.name}: smc_setup returned {code}: mend it")
 
 
 def _loaded(source: str, symbol: str, flags: tuple[str, ...], timeout: float) -> CLaw:
     """The law in a file, compiled where it is not, and set up."""
     path = Path(source)
     if path.suffix not in (".c", *LIBRARIES):
-        raise ScenarioError(f"cannot take a law from {path.name!r}: give a .c file, or a shared library, .so")
+        raise ScenarioError(f"cannot take a law from {shown(source)}: give a .c file, or a shared library, .so")
     if not path.is_file():
         raise ScenarioError(f"there is no file {source}: give the path of a .c file or of a .so")
-    said: list[str] = []
+    warned: list[str] = []
     if path.suffix == ".c":
-        file, said = build.library(path, symbol, flags, timeout)
+        file, warned = build.library(path, symbol, flags, timeout)
     else:
         try:
             file = Path(shutil.copy(path, build.fresh(path.suffix)))  # so that one built again is loaded again
         except OSError as error:
             raise ScenarioError(f"{source} cannot be read ({error.strerror}): give one that can") from None
     child.attempt(file, path, symbol, timeout)
-    law = CLaw((source, symbol, flags, timeout), file)
-    law.warnings = said
-    if _number(law, "smc_law_real") not in (None, 8) and not hasattr(law.library, "smc_mujoco_entry"):
+    law = CLaw(path, symbol, file, said.comment(path))
+    law.warnings = warned
+    if said.number(law.library, "smc_law_real") not in (None, 8) and not hasattr(law.library, "smc_mujoco_entry"):
         raise ScenarioError(f"{path.name} is a library of single precision: give its .c file, or build it of doubles")
-    if code := trial.set_up(law.library):
-        raise ScenarioError(f"{path.name}: smc_setup returned {code}: mend it")
+    _set_up(law)
     return law
-
-
-def _gains(law: CLaw, given: Mapping[str, float] | None) -> dict[str, float]:
-    """Names and defaults: the file's, changed by what is given; or what is given."""
-    text = _text(law, "smc_law_gains")
-    if text is None:
-        return dict(given or {})
-    said = parsed(text, f"{law.path.name}'s smc_law_gains")
-    for key in given or {}:
-        if key not in said:
-            raise unknown(f"gain of {law.path.name}", key, said)
-    return said | dict(given or {})
-
-
-def parsed(text: str, what: str) -> dict[str, float]:
-    """Gains as text, "lam=6,k1=3", as a dict."""
-    found: dict[str, float] = {}
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        key, equals, value = (word.strip() for word in part.partition("="))
-        if key in found:
-            raise ScenarioError(f"{what} is {shown(text)}: give {key} once")
-        try:
-            found[key] = float(value)
-        except ValueError:
-            found[key] = math.nan
-        if not (equals and key.isidentifier() and math.isfinite(found[key])):
-            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
-    return found
-
-
-def _memory(law: CLaw, given: int | None) -> int:
-    said = _number(law, "smc_law_memory")
-    return whole("memory", given if given is not None else DEFAULT_MEMORY if said is None else max(said, 1), 1, 10_000)
-
-
-def _number(law: CLaw, name: str) -> int | None:
-    return ctypes.c_int.in_dll(law.library, name).value if hasattr(law.library, name) else None
-
-
-def _text(law: CLaw, name: str) -> str | None:
-    if not hasattr(law.library, name):
-        return None
-    at = ctypes.addressof(ctypes.c_char.in_dll(law.library, name))
-    return ctypes.string_at(at).decode("ascii", errors="replace")
-
-
-def _comment(path: Path) -> str | None:
-    """The comment that a C file begins with."""
-    text = path.read_text(errors="replace") if path.suffix == ".c" else ""
-    found = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
-    return re.sub(r"^ ?\* ?", "", found[1], flags=re.MULTILINE).strip() if found else None
 
 
 def _trampoline(address: int) -> Function:

@@ -29,7 +29,7 @@ int16_t smc_q15_s(int16_t e, int16_t de, int16_t on_e, int16_t on_de)
 /* u in Q15 of u_range: -lam tanh(s), between the words of the table on a line. */
 int16_t smc_q15_u(int16_t s, int16_t lam)
 {
-    int32_t size = s < 0 ? -(int32_t)s : s, i = size >> 7;
+    int32_t size = s < -MOST ? MOST : s < 0 ? -(int32_t)s : s, i = size >> 7; /* -2^15 is beyond the table */
     int32_t t = TABLE[i] + product(TABLE[i + 1] - TABLE[i], size & 127, 7);
     return (int16_t)-product(lam, s < 0 ? -t : t, 15);
 }

@@ -1,8 +1,8 @@
 /* smc_law.h: a control law in C, as smc_mujoco calls it and as it writes laws out.
  *
  * One function, called once a control sample and channel. It keeps what it remembers in memory[], which is 0 at the
- * start of a run and the channel's own, never in static variables: simulations and channels share the code. It returns
- * 0, or anything else to end the run. u is the command before saturation.
+ * start of a run and the channel's own, never in static variables: simulations and channels share those, on several
+ * threads. It returns 0, or anything else to end the run. u is the command before saturation.
  */
 #ifndef SMC_LAW_H
 #define SMC_LAW_H

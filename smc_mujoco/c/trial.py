@@ -9,12 +9,17 @@ import json
 import math
 import os
 import random
+import struct
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 STEPS = 500  # samples of 1 ms in each of the runs
 BEYOND = 2**40  # what the glue returns where a law of floats wrote beyond its memory; one more: beyond out
 GUARD, PLAY = -7.25, 512  # a value that no law writes by chance; how many of them lie on either side of its numbers
+MORE = 16  # gains beyond those that have names, given to see whether it reads them
+PAGE = 4096  # bytes to which addresses of segments are rounded, or a multiple
+SHARED = "which all channels and simulations share, on several threads"
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 Array = ctypes.Array  # of doubles
 
@@ -44,6 +49,31 @@ def sized(library, gains: int, memory: int) -> None:
         ctypes.c_int.in_dll(library, "smc_mujoco_memory").value = memory
 
 
+def writable(path: str) -> list[tuple[int, int]]:
+    """Address and size of what a loaded library may change, static variables among it; on 64-bit Linux, else none."""
+    real = os.path.realpath(path)
+    try:
+        maps = [line for line in Path("/proc/self/maps").read_text().splitlines() if line.endswith(f" {real}")]
+        image = Path(path).read_bytes()
+    except OSError:
+        return []
+    if not maps or image[:6] != b"\x7fELF\x02\x01":
+        return []
+    found = list(segments(image))
+    base = min(int(line.partition("-")[0], 16) for line in maps) - min(at for at, _, _ in found) // PAGE * PAGE
+    return [(base + at, size) for at, size, flags in found if flags & 2]  # PF_W
+
+
+def segments(image: bytes) -> Iterator[tuple[int, int, int]]:
+    """Address, size and flags of what an ELF file of 64 bits loads (elf(5): Elf64_Ehdr, Elf64_Phdr)."""
+    (table,) = struct.unpack_from("<Q", image, 32)
+    width, count = struct.unpack_from("<HH", image, 54)
+    for i in range(count):
+        kind, flags, _, at, _, _, size = struct.unpack_from("<IIQQQQQ", image, table + width * i)
+        if kind == 1:  # PT_LOAD
+            yield at, size, flags
+
+
 def doubles(values) -> Array:
     """An array of C doubles."""
     return (ctypes.c_double * len(values))(*values)
@@ -71,27 +101,28 @@ class Fenced:
 class Trial:
     """Runs of a law on a double integrator x'' = u, and calls far away from it."""
 
-    def __init__(self, law, gains: list[float], memory: int):
-        self.law, self.size = law, memory
+    def __init__(self, law, library, gains: list[float], memory: int):
+        self.law, self.library, self.size = law, library, memory
+        self.writable = writable(library._name)
+        self.static = self.statics()
         self.gains = Fenced(gains, math.nan)  # what it reads of more gains than it has ends in u
         self.held = bytes(self.gains.whole)
         self.random = random.Random(0)
 
-    def call(self, y: list[float], memory: Fenced) -> tuple[float, float]:
-        """u and s; Found where the law fails, or writes where nothing is its own."""
+    def call(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
+        """The law's code, u and s; Found where it writes where nothing is its own."""
         given, out = Fenced(y), Fenced([math.nan, math.nan])
         before = bytes(given.whole)
         code = self.law(given.own, self.gains.own, memory.own, out.own)
-        when = f"at t = {y[0]:g}, e = {y[4]:g}, de = {y[5]:g}"
         if code == BEYOND or memory.passed():
-            raise Found(f"writes beyond the {self.size} numbers of its memory: ask for more with memory=")
+            raise Found(
+                f"writes beyond the {self.size} numbers of its memory: say more in smc_law_memory, or give memory="
+            )
         if code == BEYOND + 1 or out.passed():
             raise Found("writes beyond the two numbers of out, u and s: write out[0] and out[1] alone")
         if bytes(self.gains.whole) != self.held or bytes(given.whole) != before:
             raise Found("changes its gains or its measurement: keep what changes in memory")
-        if code != 0:
-            raise Found(f"returned {code} {when}: mend it, or the gains")
-        return out.own[0], out.own[1]
+        return code, out.own[0], out.own[1]
 
     def run(self, model: float, surfaced: float, x: float) -> None:
         """A run with measurement noise and a sine for reference."""
@@ -103,16 +134,40 @@ class Trial:
             slid = [1.0, de + 2.0 * e, -2.0 * de] if surfaced else [0.0] * 3
             y = [t, dt, e + r, de + dr, e, de, r, dr, ddr, 0.0, 1.0, ddr, 6.0, model, *slid, 0.1 * e, 0.0, 0.0, 1.0]
             before = Fenced(memory.own[:])
-            u, s = self.call(y, memory)
-            if not (math.isfinite(u) and math.isfinite(s)):
-                raise Found(f"returned u = {u}, s = {s} at t = {t:g}, e = {e:g}, de = {de:g}: mend it, or the gains")
-            if k % 50 == 0 and repr(self.call(y, before)) != repr((u, s)):
-                raise Found("gave two answers to one measurement: keep what it remembers in memory, not in static data")
+            code, u, s = self.call(y, memory)
+            if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
+                self.starved(y, before)
+                said = code or f"u = {u}, s = {s}"
+                raise Found(f"returned {said} at t = {t:g}, e = {e:g}, de = {de:g}: mend it, or the gains")
+            if k % 50 == 0:
+                self.alone()
+                if repr(self.call(y, before)) != repr((code, u, s)):
+                    raise Found(f"gave two answers to one measurement, as from state {SHARED}: keep it in memory")
             v += dt * min(max(u, -6.0), 6.0)
             x += dt * v
 
+    def statics(self) -> list[bytes]:
+        """The static data of now."""
+        return [ctypes.string_at(at, size) for at, size in self.writable]
+
+    def alone(self) -> None:
+        """Found where it has changed what other simulations see."""
+        if self.statics() != self.static:
+            raise Found(f"changes static data, {SHARED}: keep state in memory, and fill tables in smc_setup")
+
+    def starved(self, y: list[float], memory: Fenced) -> None:
+        """Found where u is a number once there are more gains than were named."""
+        count, out = self.gains.count, Fenced([math.nan, math.nan])
+        sized(self.library, count + MORE, self.size)
+        code = self.law(Fenced(y).own, Fenced([*self.gains.own, *[1.0] * MORE]).own, memory.own, out.own)
+        sized(self.library, count, self.size)
+        if code == 0 and all(map(math.isfinite, out.own)):
+            raise Found(
+                f"reads more gains than the {count} that have names: name them in smc_law_gains, or give gains="
+            )
+
     def all(self, modelled: bool) -> None:
-        """Every kind of run, and states at the end of the finite world."""
+        """Every kind of run; and states at the end of the finite world, where it may give up."""
         for model in (1.0,) if modelled else (0.0, 1.0):
             for surfaced in (0.0, 1.0):
                 self.run(model, surfaced, 1.0 - 2.0 * surfaced)
@@ -120,6 +175,7 @@ class Trial:
             for de in (-1e6, 0.0, 1e6):
                 y = [0.0, 1e-3, e, de, e, de, *[0.0] * 4, 1.0, 0.0, 6.0, 1.0, *[0.0] * 7]
                 self.call(y, Fenced([0.0] * self.size))
+        self.alone()
 
 
 def main(asked: str) -> None:
@@ -136,7 +192,7 @@ def main(asked: str) -> None:
                 print(order["symbol"], file=told)
                 sized(library, len(order["gains"]), order["memory"])
                 try:
-                    Trial(law, order["gains"], order["memory"]).all(order["modelled"])
+                    Trial(law, library, order["gains"], order["memory"]).all(order["modelled"])
                 except Found as found:
                     raise Found(f"{order['symbol']} {found}") from None
             print("fine", file=told)

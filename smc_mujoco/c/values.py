@@ -70,7 +70,7 @@ def number(value: object, single: bool, node: ast.AST | None = None) -> Value:
     if math.isnan(x) or math.isinf(x):
         return Value("NAN" if math.isnan(x) else "INFINITY" if x > 0.0 else "-INFINITY", kind, UNARY)
     text = repr(x)
-    return Value(text + "f" * (single or kind == "single"), kind, ATOM if x >= 0.0 else UNARY)
+    return Value(text + "f" * (single or kind == "single"), kind, UNARY if text.startswith("-") else ATOM)
 
 
 def plain(name: str) -> str:

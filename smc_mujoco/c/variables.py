@@ -29,6 +29,15 @@ def stored(nodes: Iterable[ast.AST]) -> set[str]:
     return named(n.value if isinstance(n, ast.Subscript) else n for n in inside)
 
 
+def ends(body: Sequence[ast.stmt]) -> bool:
+    """Whether some code always ends in a return."""
+    match body[-1]:
+        case ast.If(body=yes, orelse=no):
+            return bool(no) and ends(yes) and ends(no)
+        case last:
+            return isinstance(last, ast.Return)
+
+
 class Variables:
     """The parameters and variables of a function; `constants` are parameters that are literal numbers instead."""
 
@@ -37,6 +46,8 @@ class Variables:
         arguments = [a.arg for a in tree.args.args]
         if len(arguments) != len(kinds) or tree.args.vararg or tree.args.kwonlyargs or tree.args.kwarg:
             raise refuse(None, f"{tree.name} with its arguments")
+        if not ends(tree.body):
+            raise refuse(None, f"{tree.name}, whose last line is no return,")
         self.parameters = {n: k for n, k in zip(arguments, kinds, strict=True) if n not in constants}
         self.kinds = dict(self.parameters)
         inside = [node for statement in tree.body for node in ast.walk(statement)]

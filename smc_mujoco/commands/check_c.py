@@ -1,17 +1,21 @@
 """smc-mujoco check-c FILE: a law of your own in C, tried where it can do no harm."""
 
+import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from smc_mujoco.errors import ScenarioError
 from smc_mujoco.terminal import loading, mendable
+
+OPTIONS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # arguments of law_from_c, with which its sentences end
 
 
 def check_c(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
     gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="Its gains in order, where it does not name them itself.")
+        str, typer.Option(metavar="NAME=VALUE,...", help="Its gains, in order. If the file names them: other values.")
     ] = "",
     memory: Annotated[int | None, typer.Option(min=1, help="Numbers of state; default: what it says, or 8.")] = None,
     symbol: Annotated[str, typer.Option(help="The function's name.")] = "smc_law",
@@ -21,15 +25,20 @@ def check_c(
     """Compile a control law in C and try it in a process of its own: says what is wrong with it in one sentence.
 
     It is run on a double integrator under noise, with and without model and surface, and called at states far away. A
-    crash, an endless loop, NaN, a write beyond its memory, and state kept outside of it, end in exit code 2. The
-    signature is told in smc_law.h, which stands at the top of every file that `export-c` writes.
+    crash, an endless loop, NaN, gains without a name, a write beyond its memory, and state kept outside of it (static
+    data, above all), end in exit code 2. The signature is told in smc_law.h, which stands at the top of every file that
+    `export-c` writes.
 
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
     with mendable():
         with loading():
-            from smc_mujoco.c.load import checked, parsed
+            from smc_mujoco.c.load import checked
+            from smc_mujoco.c.said import parsed
 
         given = parsed(gains, "--gains") if gains else None
-        for line in checked(file, given, memory, symbol, flag or (), timeout):
-            print(line)
+        try:
+            for line in checked(file, given, memory, symbol, flag or (), timeout):
+                print(line)
+        except ScenarioError as error:
+            raise ScenarioError(OPTIONS.sub(r"--\1", str(error))) from None

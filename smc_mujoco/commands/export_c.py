@@ -25,7 +25,7 @@ def export_c(
     with mendable():
         with loading():
             from smc_mujoco.c.export import law_to_c
-            from smc_mujoco.c.load import parsed
+            from smc_mujoco.c.said import parsed
             from smc_mujoco.law import law as find
 
         print(law_to_c(find(law, **parsed(gains, "--gains")), numbers), end="")

@@ -11,15 +11,23 @@ from smc_mujoco.terminal import loading, mendable
 
 def view(
     name: Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")],
-    condition: Annotated[str | None, typer.Option(help="One of the scene's; default the one that it films.")] = None,
-    label: Annotated[str | None, typer.Option(help="The run in it, by its label; default the first.")] = None,
+    condition: Annotated[
+        str | None, typer.Option(help="Which of the scene's conditions; default: the one that its film shows.")
+    ] = None,
+    label: Annotated[
+        str | None, typer.Option(help="Which run of that condition, by its label; default: the first.")
+    ] = None,
 ) -> None:
-    """Watch one run of a scene in MuJoCo's viewer, at real time, and turn the gains of its law.
+    """Watch one run of a scene in MuJoCo's viewer, in real time, and change the gains of its law.
 
-    Space pauses. The sliders gain:NAME under Control, at the right, change the law's gains, from a tenth of the scene's
-    to ten times; gains that you changed are printed, and those of the end. Double-click a body, then drag with Ctrl and
-    the right button, to push it. Backspace, and the end of the run's duration, begin it anew with the gains of then.
-    Other sliders and settings change the picture at most. It is the run that `run` makes, in the plain loop.
+    - Pause and go on: the space bar.
+    - Change a gain: its slider gain:NAME in the panel "Control" at the right. It reaches from a tenth of the scene's
+      value to ten times that value. Changed gains are printed, as code that makes the law.
+    - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
+    - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
+
+    The run is the one that `run` simulates, one simulation in Python. All other sliders and settings of the viewer
+    change the picture only.
 
     Example: smc-mujoco view inverted_pendulum --label super_twisting
     """
@@ -27,9 +35,8 @@ def view(
         from smc_mujoco import display
         from smc_mujoco.errors import ScenarioError, find
 
-        if sentence := display.missing():
-            raise ScenarioError(sentence)
-        if sys.platform == "linux":
+        no_window = display.missing()
+        if sys.platform == "linux" and not no_window:
             os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
         with loading():
             from smc_mujoco import live
@@ -40,4 +47,6 @@ def view(
         if condition is not None:
             runs = find(f"condition of {name}", condition, scene.conditions)
         scenario = next(iter(runs.values())) if label is None else find(f"label in {name}", label, runs)
+        if no_window:
+            raise ScenarioError(no_window)
         live.watch(scenario)

@@ -12,7 +12,7 @@ from pathlib import Path
 from smc_mujoco import plain
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.groups import Group, cut, groups
-from smc_mujoco.measure import EFFORT
+from smc_mujoco.plant import EFFORT
 from smc_mujoco.trace import Trace
 
 COLOURS = {
