@@ -15,6 +15,7 @@ from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.groups import cut
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import catalogue as plants
+from smc_mujoco.progress import bar
 from smc_mujoco.run import run
 from smc_mujoco.scene import Scene, slug
 from smc_mujoco.surfaces import catalogue as surfaces
@@ -136,8 +137,6 @@ def _labels(runs: Mapping[str, Trace]) -> list[str]:
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
     """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
-    from rich.progress import Progress
-
     if sentence := gl.missing() or gl.note():
         console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
     if gl.missing():
@@ -146,10 +145,9 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
 
     runs = traces[scene.film]
     shown = list(runs.values())
-    with Progress(transient=True, console=console) as bar:
-        task = bar.add_task("film", total=len(video.clock(shown, video.FPS)))
+    with bar("film", len(video.clock(shown, video.FPS))) as drawn:
         path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-        return [video.film(shown, path, _labels(runs), title, report=lambda n: bar.advance(task, n))]
+        return [video.film(shown, path, _labels(runs), title, report=drawn.advance)]
 
 
 def summary(trace: Trace, console: Console) -> None:
