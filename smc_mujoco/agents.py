@@ -79,7 +79,7 @@ class Agent:
                 u, loop.s = loop.decide(*loop.measure(loop.data, k), k)
         except Failure as failure:
             raise ScenarioError(f"{failure}, at t = {k * loop.scenario.control_period:.6g} s") from failure
-        return u[: loop.scenario.plant.driven] / loop.scenario.u_max
+        return u[: loop.scenario.plant.driven] / loop.scenario.limits
 
     def forget(self) -> None:
         """Begin anew: all memories zero, and the last commands, which the nominal model of coupled channels knows."""

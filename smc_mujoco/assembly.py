@@ -83,14 +83,18 @@ def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str
 
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """qpos and qvel at t = 0: every channel at x0 and v0, its rotor with it, the rest where the model has it."""
-    qpos, qvel = compiled.qpos0.copy(), np.zeros(compiled.nv)
-    if (key := mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)) >= 0:
-        qpos, qvel = compiled.key_qpos[key].copy(), compiled.key_qvel[key].copy()
+    qpos, qvel = home(compiled), np.zeros(compiled.nv)
     for joint, x, v in zip(joint_ids(compiled), scenario.x0, scenario.v0, strict=True):
         rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):
             qpos[compiled.jnt_qposadr[moved]], qvel[compiled.jnt_dofadr[moved]] = x, v
     return qpos, qvel
+
+
+def home(compiled: mujoco.MjModel) -> np.ndarray:
+    """qpos where the model itself has every joint, or the keyframe in which runs start."""
+    key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
+    return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
 
 
 def check_starts(scenarios: Sequence[Scenario]) -> None:

@@ -82,7 +82,7 @@ def _critical_delay(base: Scenario) -> float | None:
 
 def _at_rest(base: Scenario) -> float | None:
     most = BEARS * (max(map(abs, base.x0)) or 1.0)
-    return theory.borne(base.plant, base.law, most, base.u_max)
+    return theory.borne(base.plant, base.law, most, min(base.limits))
 
 
 SPECS: dict[str, Kind] = {

@@ -58,7 +58,7 @@ class Believed(Coupled):
         """f and g of channel i; NaN where there is no nominal model."""
         if self.why_not:
             return np.nan, np.nan
-        model, places, data = prepared(self, frozen(vars(p)))
+        model, places, data, _ = prepared(self, frozen(vars(p)))
         with _lock:
             data.qpos[:], data.qvel[:] = model.qpos0, 0.0
             data.qpos[places.qpos], data.qvel[places.qvel] = x, v
@@ -79,19 +79,38 @@ class Believed(Coupled):
         """The C function, and for one simulation the addresses of what it works on."""
         if self.why_not:
             return Native(unknown().address, (), ())
-        model, places, _ = prepared(self, frozen(parameters))
-        data, seen = mujoco.MjData(model), np.full(2 * len(places.qpos), np.nan)
+        model, places, _, spare = prepared(self, frozen(parameters))
+        lent = Lent(model, spare)
+        data, seen = lent.data, np.full(2 * len(places.qpos), np.nan)
         table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
         solved = np.zeros(2 * model.nv)
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places.qpos), len(places.ctrl), model.nv
-        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, data, *arrays))
+        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, lent, *arrays))
+
+
+class Lent:
+    """An mjData for one simulation, which the next takes over: freed and made anew, they leave holes in memory."""
+
+    def __init__(self, model: mujoco.MjModel, spare: list[mujoco.MjData]):
+        self.spare = spare
+        try:
+            self.data = spare.pop()
+        except IndexError:
+            self.data = mujoco.MjData(model)
+        else:
+            mujoco.mj_resetData(model, self.data)
+
+    def __del__(self):
+        self.spare.append(self.data)
 
 
 @functools.lru_cache(maxsize=32)
-def prepared(nominal: Believed, parameters: Mapping[str, float]) -> tuple[mujoco.MjModel, Places, mujoco.MjData]:
-    """The model with nominal parameters, where its channels lie, and an mjData for calls from Python."""
+def prepared(
+    nominal: Believed, parameters: Mapping[str, float]
+) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
+    """The model with nominal parameters, where its channels lie, an mjData for calls from Python, and spare ones."""
     model = ready(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
@@ -101,7 +120,7 @@ def prepared(nominal: Believed, parameters: Mapping[str, float]) -> tuple[mujoco
     mujoco.mj_resetData(model, data)
     joints = joint_ids(model)
     places = Places(model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)])
-    return model, places, data
+    return model, places, data, []
 
 
 @functools.cache

@@ -49,6 +49,7 @@ def contents(scenario: Scenario) -> row.Contents:
         period=scenario.control_period,
         delay=scenario.delay_steps,
         limit=scenario.u_max,
+        limits=scenario.limits if scenario.plant.limits else (),
         seed=scenario.seed,
         sigma_x=scenario.noise.position,
         sigma_v=scenario.noise.velocity,

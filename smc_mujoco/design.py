@@ -20,6 +20,13 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
     Raises:
       ScenarioError: a channel that no actuator pushes its own way: a joint that only moves with others.
     """
+    if plant.unmodelled:
+        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
+    if plant.underactuated:
+        raise ScenarioError(
+            f"{plant.name}'s channel {plant.driven} has no actuator, and lqr does not see such a joint: "
+            "take a law that does, 'hierarchical'"
+        )
     rows = [_channel(plant, i) for i in range(plant.n)]
     for i, (_, _, b) in enumerate(rows):
         if b <= 0.0:

@@ -25,7 +25,7 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """The error for a name that is not among `known`, with the nearest that is."""
     names = sorted(known)
     near = _nearest(name, names) if isinstance(name, str) else []
-    hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}" if names else "there is none"
+    hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}" if names else "there are none"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 

@@ -26,6 +26,7 @@ INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; what halving it changes is studied in tests/test_convergence.py and told in docs/design.md
+U_MAX = 6.0  # N or N m; the study's
 FAR = 1e6  # initial states beyond this have already diverged
 
 
@@ -51,8 +52,8 @@ def filled_velocity(name: str) -> FilledVelocity:
     return FilledVelocity(**vars(estimator(name)))
 
 
-class FilledStep(float):
-    """A physics step that was left out; dataclasses.replace finds it anew."""
+class FilledNumber(float):
+    """A physics step, or u_max, that was left out; dataclasses.replace finds it anew."""
 
 
 class FilledName(str):
@@ -80,19 +81,26 @@ def velocity(value: object, sensor: Encoder | None) -> Component:
 
 def left_out(value: object) -> bool:
     """Whether a default was filled in that depends on other fields."""
-    return isinstance(value, FilledStep | FilledName | FilledVelocity | FilledStart)
+    return isinstance(value, FilledNumber | FilledName | FilledVelocity | FilledStart)
 
 
 def physics_step(step: object, period: float, realistic: bool, least: float) -> float:
     """A step that divides the control period; the default one where none is given."""
-    if step is None or isinstance(step, FilledStep):
+    if step is None or isinstance(step, FilledNumber):
         largest = REALISTIC_STEP if realistic else LARGEST_STEP
-        return FilledStep(period / math.ceil(period / largest - 1e-9))
+        return FilledNumber(period / math.ceil(period / largest - 1e-9))
     h = number("physics_step", step, above=0.0, least=least)
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
     return period / round(count)
+
+
+def u_max(value: object, plant: Plant) -> float:
+    """A bound on |u|; the default one for the plant's motors where none is given."""
+    if value is None or isinstance(value, FilledNumber):
+        return FilledNumber(max((limit for limit in plant.limits if limit < math.inf), default=U_MAX))
+    return number("u_max", value, above=0.0, infinite=True)
 
 
 def integrator(name: object, realistic: bool) -> str:

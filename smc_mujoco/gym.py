@@ -3,8 +3,8 @@
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
 An observation is positions and velocities, and for `track` r, r', r'', one after another; an action is the command of
-the driven channels, in parts of u_max. An episode is truncated at the scenario's duration, and terminated where the
-plant leaves the finite world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
+the driven channels, in parts of their limits. An episode is truncated at the scenario's duration, and terminated where
+the plant leaves the finite world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ registration.register()  # for who imports this module alone
 
 
 def action_space(found: Setting) -> spaces.Box:
-    """Commands of the driven channels, in parts of u_max."""
+    """Commands of the driven channels, in parts of their limits."""
     return spaces.Box(-1.0, 1.0, found.shape, np.float64)
 
 

@@ -98,6 +98,12 @@ def _nominal(base, row, i):
 
 
 @njit(error_model="numpy", inline="always")
+def _limit(row, i):
+    """Bound on |u| of driven channel i."""
+    return row[slot.LIMIT] if row[slot.LIMITS] == 0.0 else row[int(row[slot.LIMITS]) + i]
+
+
+@njit(error_model="numpy", inline="always")
 def _inform(base, row, y, i, partner):
     """What the law of channel i is told, y; `partner` moves with it without an actuator (0: none). A failure code."""
     n, state, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
@@ -113,7 +119,7 @@ def _inform(base, row, y, i, partner):
     y[2], y[3] = row[x + i], row[v + i]
     y[4], y[5] = y[2] - y[6], y[3] - y[7]
     y[11] = y[8] if math.isnan(row[a + i]) else row[a + i]  # none is estimated: as the reference asks
-    y[12], y[13], y[14], y[15], y[16] = row[slot.LIMIT], row[slot.MODEL], 0.0, 0.0, 0.0
+    y[12], y[13], y[14], y[15], y[16] = _limit(row, i), row[slot.MODEL], 0.0, 0.0, 0.0
     if row[slot.SURFACE] != 0.0:
         memory = _at(base, row, slot.SURFACE_MEMORY) + 8 * i * int(row[slot.SURFACE_STRIDE])
         gains = _at(base, row, slot.SURFACE_GAINS)
@@ -144,7 +150,8 @@ def _decide(base, row, table, log, k):
         memory = _at(base, row, slot.LAW_MEMORY) + 8 * i * int(row[slot.LAW_STRIDE])
         if call(int(row[slot.LAW]), base + 8 * given, _at(base, row, slot.GAINS), memory, base + 8 * out) != 0:
             return slot.LAW_RAISED
-        u = min(max(row[out], -row[slot.LIMIT]), row[slot.LIMIT])
+        limit = _limit(row, i)
+        u = min(max(row[out], -limit), limit)
         asked = abs(u) * max(1.0, row[slot.SCALE])
         if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and asked < HUGE):
             return slot.NOT_FINITE

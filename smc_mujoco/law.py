@@ -5,7 +5,7 @@
         s = y.de + gains.k1 * y.e
         return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
 
-The law runs once per control sample; its u is clipped to +-u_max and held. It never sees the simulator: what it knows
+The law runs once per control sample; its u is clipped to +-limit and held. It never sees the simulator: what it knows
 of the plant is the nominal f and g in its measurement.
 
 Laws of this library are written in the wanted acceleration v of the error: `sliding` gives the sliding variable and the
@@ -24,6 +24,7 @@ from numba import njit
 from smc_mujoco.component import Component, Template, discover, template
 from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.plant import Plant
+from smc_mujoco.plant import catalogue as plants_known
 from smc_mujoco.plant import plant as find_plant
 
 Law = Component
@@ -44,7 +45,7 @@ class Measurement(NamedTuple):
     f: float  # nominal f(x, v) of x'' = f + g u, at the measured x and v
     g: float
     a: float = 0.0  # estimated acceleration; r'' where the estimator gives none
-    limit: float = math.inf  # bound on |u|, u_max
+    limit: float = math.inf  # bound on |u|: u_max, or what the channel's own motor gives
     model: float = 0.0  # 1 where the scenario lets its law use f and g
     surfaced: float = 0.0  # 1 where the scenario has a surface, and what it gives:
     s: float = 0.0  # sliding variable
@@ -157,10 +158,19 @@ def law(name: str, **gains: float) -> Law:
     return find("law", name, catalogue()).bind(gains, level=3)
 
 
+def fits(law: Law | Template, plant: Plant) -> bool:
+    """Whether a law is for a plant: every one, those it names, or as they are, a model of the user's with partners."""
+    if not law.plants or plant.name in law.plants:
+        return True
+    known = [plants_known()[name] for name in law.plants if name in plants_known()]
+    return plant.direct and plant.underactuated and any(each.underactuated for each in known)
+
+
 def laws(plant: Plant | str | None = None) -> list[str]:
     """Names that `law` knows; with a plant, of those laws that are for it.
 
-    A law without `plants` of its own is for every plant whose channels all have an actuator; `none` for every plant.
+    A law without `plants` of its own is for every plant whose channels all have an actuator; `none` for every plant;
+    one for joints without an actuator for models of yours that have such joints too.
     """
     if plant is None:
         return list(catalogue())
@@ -170,5 +180,5 @@ def laws(plant: Plant | str | None = None) -> list[str]:
     return [
         name
         for name, template in catalogue().items()
-        if (kind.name in template.plants if template.plants else name == "none" or not kind.underactuated)
+        if fits(template, kind) and (template.plants or name == "none" or not kind.underactuated)
     ]

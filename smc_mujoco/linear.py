@@ -55,6 +55,8 @@ def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
 
 @functools.lru_cache(maxsize=64)
 def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
+    if plant.unmodelled:
+        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
     n, p = plant.n, SimpleNamespace(**vars(plant.values(factors)))
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])

@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import mujoco
 
-from smc_mujoco.errors import ScenarioError, find
+from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.mjcf import pick
 from smc_mujoco.part import PASSIVE
 
 MOTOR = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # what drives a single joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 STILL = mujoco.mjtDyn.mjDYN_NONE.value
+GROUP = 31  # of motors: none that actuatorgroupdisable can turn off
 CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
 class Motor(NamedTuple):
-    """The motor of a channel: its name, its least and largest force, N m or N, the actuators whose place it takes."""
+    """The motor of a channel: the bound on its force, N m or N, and the actuators whose place it takes."""
 
-    name: str
-    low: float
-    high: float
+    limit: float
     replaced: tuple[int, ...]
 
 
@@ -29,30 +29,33 @@ def motor_of(file: Path, model: mujoco.MjModel, joint: str, wanted: str | None, 
     """The motor that drives a joint.
 
     Raises:
-      ScenarioError: there is none, there are several, or it is no motor.
+      ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
     """
-    number = model.joint(joint).id
+    number, name = model.joint(joint).id, file.name
+    held = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
     own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
     own = [i for i in own if model.actuator_trnid[i, 0] == number]
     if ideal:
-        return Motor(joint, -math.inf, math.inf, tuple(own))
+        if wanted is not None:
+            raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
+        return Motor(_limit(f"joint {joint!r} of {name} takes", "widen its actuatorfrcrange", *held), tuple(own))
     if wanted is not None:
         every = {model.actuator(i).name: i for i in range(model.nactuator) if model.actuator(i).name}
-        chosen = find(f"actuator of {file.name}", wanted, every)
+        chosen = pick(file, "actuator", wanted, every)
         if chosen not in own:
-            raise ScenarioError(f"actuator {wanted!r} of {file.name} does not drive joint {joint!r} alone: {CURE}")
+            raise ScenarioError(f"actuator {wanted!r} of {name} does not drive joint {joint!r} alone: {CURE}")
         own = [chosen]
     if not own:
-        raise ScenarioError(f"no actuator of {file.name} drives joint {joint!r} alone: {CURE}")
+        raise ScenarioError(f"no actuator of {name} drives joint {joint!r} alone: {CURE}")
     names = [model.actuator(i).name or f"number {i}" for i in own]
     if len(own) > 1:
         raise ScenarioError(
-            f"joint {joint!r} of {file.name} has the actuators {', '.join(names)}: "
-            "name one with smc.Channel(actuator=...)"
+            f"joint {joint!r} of {name} has the actuators {', '.join(names)}: name one with smc.Channel(actuator=...)"
         )
     if why := _no_motor(model, own[0]):
         raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
-    return Motor(model.actuator(own[0]).name or joint, *_limits(model, own[0]), tuple(own))
+    gives = f"actuator {names[0]!r} gives joint {joint!r} of {name}"
+    return Motor(_limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
@@ -63,12 +66,22 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
         return "has dynamics or a delay of its own"
     if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
         return "has armature or damping of its own"
+    if 0 <= model.actuator_group[i] <= 30 and model.opt.disableactuator >> int(model.actuator_group[i]) & 1:
+        return "is in a group that actuatorgroupdisable turns off"
     if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
         return "has gear or gain 0"
     return ""
 
 
-def _limits(model: mujoco.MjModel, i: int) -> tuple[float, float]:
+def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
+    """The force that all ranges allow both ways, N m or N: that of the weaker way, so that |u| has one bound."""
+    low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
+    if not low < 0.0 < high:
+        raise ScenarioError(f"{who} {low:g} to {high:g}, and a law pushes both ways: {cure}")
+    return min(-low, high)
+
+
+def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
     """The least and the largest force of an actuator at its joint."""
     gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
     low, high = -math.inf, math.inf
@@ -90,10 +103,10 @@ def put(spec: mujoco.MjSpec, motors: Sequence[tuple[str, Motor]]) -> None:
             spec.delete(actuator)
         else:
             actuator.name = f"{PASSIVE}idle:{actuator.name or i}"
-    for joint, motor in motors:
-        made = spec.add_actuator(name=motor.name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    for joint, motor in motors:  # named by joints, as actuators' names may be anything
+        made = spec.add_actuator(name=f"u:{joint}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         made.set_to_motor()
-        limited = math.isfinite(motor.low) and math.isfinite(motor.high)
-        made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limited
-        made.ctrlrange, made.forcerange = (0.0, 0.0), (motor.low, motor.high) if limited else (0.0, 0.0)
-        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, 0
+        limit = motor.limit if math.isfinite(motor.limit) else 0.0
+        made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0
+        made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
+        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, GROUP

@@ -1,12 +1,15 @@
 """The channels of an own model as its user names them, checked against the model."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import mujoco
 
 from smc_mujoco.errors import ScenarioError, find, number, shown
+from smc_mujoco.mjcf import pick
+from smc_mujoco.part import ROTOR
 
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
@@ -20,19 +23,20 @@ class Channel:
       motor: whether an ideal motor takes the place of whatever actuators drive the joint, servos or none.
       partner: a joint without an actuator that moves with it, as a pole on its cart: measured and scored as a channel
         of its own, after the driven ones, and seen by this one's law in y.q, y.dq, y.fq, y.gq.
-      x0: rad or m, where it starts; None: where the keyframe, or the model, has it.
+      x0, partner_x0: rad or m, where it starts, and its partner; None: where the keyframe, or the model, has it.
     """
 
     actuator: str | None = None
     motor: bool = False
     partner: str | None = None
     x0: float | None = None
+    partner_x0: float | None = None
 
 
 def given(channels: object) -> tuple[tuple[str, Channel], ...]:
     """Joints with their Channels, from whatever the user gave."""
-    if isinstance(channels, str) or not isinstance(channels, Iterable):
-        raise ScenarioError(f"channels is {shown(channels)}: give joints' names, such as {{'shoulder': smc.Channel()}}")
+    if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
+        raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
     items = list(channels.items()) if isinstance(channels, Mapping) else [(joint, None) for joint in channels]
     if not items:
         raise ScenarioError("channels is empty: give at least one joint's name")
@@ -50,9 +54,16 @@ def channel(joint: object, value: object) -> Channel:
     made = Channel() if value is None else Channel(**value) if isinstance(value, Mapping) else value
     if not isinstance(made, Channel):
         raise ScenarioError(f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None")
-    if made.x0 is None:
-        return made
-    return dataclasses.replace(made, x0=number(f"x0 of channel {joint!r}", made.x0, least=-1e6, most=1e6))
+    if not isinstance(made.motor, bool):
+        raise ScenarioError(f"motor of channel {joint!r} is {shown(made.motor)}: give True or False")
+    if made.partner is None and made.partner_x0 is not None:
+        raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
+    starts = {
+        name: number(f"{name} of channel {joint!r}", getattr(made, name), least=-1e6, most=1e6)
+        for name in ("x0", "partner_x0")
+        if getattr(made, name) is not None
+    }
+    return dataclasses.replace(made, **starts)
 
 
 def check(file: Path, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
@@ -60,11 +71,13 @@ def check(file: Path, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], .
     joints = [*(joint for joint, _ in asked), *partners]
     there = {model.joint(i).name: i for i in range(model.njnt) if model.joint(i).name}
     for joint in joints:
-        kind = mujoco.mjtJoint(model.jnt_type[find(f"joint of {file.name}", joint, there)])
+        kind = mujoco.mjtJoint(model.jnt_type[pick(file, "joint", joint, there)])
         if kind not in SIMPLE:
             raise ScenarioError(
                 f"joint {joint!r} of {file.name} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
             )
+        if joint.startswith(ROTOR):
+            raise ScenarioError(f"joint {joint!r} of {file.name} is named as a drive's rotor: give it another name")
         if joints.count(joint) > 1:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
     if partners and len(partners) < len(asked):
@@ -81,4 +94,16 @@ def starts(
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
     held = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints}
     said = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
+    said |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
     return tuple((held | said).values())
+
+
+def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[tuple[str, float, float], ...]:
+    """Joint, least and largest position of each channel, rad or m; empty where none has limits."""
+    found = []
+    for joint in map(model.joint, joints):
+        low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)
+        found.append((joint.name, float(low), float(high)))
+    flags = mujoco.mjtDisableBit
+    off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
+    return () if off or not any(math.isfinite(low) for _, low, _ in found) else tuple(found)

@@ -3,14 +3,16 @@
     arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
     trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0), model="nominal"))
 
-A channel's command u is the force on its joint, N m or N: the joint's one motor is put there with gear 1, and with its
-control range times its gear as its limits. Position and velocity sensors are added; the model's own are taken off. Its
+A channel's command u is the force on its joint, N m or N: the joint's one motor is put there with gear 1, and what its
+ranges and the joint's actuatorfrcrange allow both ways bounds |u|, beside the scenario's u_max: laws are told so in
+y.limit. Position and velocity sensors are added; the model's own are taken off. Its
 other actuators stay, at ctrl = 0, and joints without a channel move as the model says. Integrator, step and start are
 the scenario's. Disturbances act on the joints themselves. Parameters are m, kg, the mass of all that moves, which
 scales all masses and inertias, and grav, m/s^2.
 """
 
 import dataclasses
+import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -21,13 +23,14 @@ import numpy as np
 
 from smc_mujoco import mjcf
 from smc_mujoco.believed import Believed
-from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.motors import MOTOR, Motor, motor_of, put
-from smc_mujoco.own_channels import SIMPLE, Channel, check, given, starts
+from smc_mujoco.own_channels import SIMPLE, Channel, check, given, ranges, starts
 from smc_mujoco.part import ROTOR, START
 from smc_mujoco.plant import DIRECTLY, Field, Plant, catalogue
 
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
 
 
 class Drive(NamedTuple):
@@ -107,7 +110,8 @@ def plant_from(
       channels: joint -> Channel, or a dict of its fields, or None for what is found; or joints' names alone. Their
         order is that of the plant's channels.
       name: of the plant; default: the file's.
-      keyframe: one of the model's, by name, in which runs start; default: the model's initial state.
+      keyframe: one of the model's, by name, at whose positions runs start, at rest but for the scenario's v0; default:
+        the model's initial positions.
 
     Raises:
       ScenarioError: a file that cannot be read, or a joint, actuator or keyframe that is not there or does not serve.
@@ -117,21 +121,21 @@ def plant_from(
     """
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"path is {shown(path)}: give the path of an MJCF file (.xml)")
-    file = Path(path).resolve()
+    if str(path).lstrip().startswith("<"):
+        raise ScenarioError(f"path is the text of a model, {shown(path)}: write it into a file and give its path")
+    file = Path(os.path.abspath(path))
     model = mjcf.compiled(file, mjcf.read(file))
     asked = given(channels)
     partners = [channel.partner for _, channel in asked if channel.partner is not None]
     check(file, model, asked, partners)
     if keyframe is not None:
-        find(
-            f"keyframe of {file.name}", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name}
-        )
+        mjcf.pick(file, "keyframe", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name})
     drives = tuple(Drive(joint, motor_of(file, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
     build = OwnModel(str(file), mjcf.digest(file), keyframe, asked, drives)
     joints = [*(joint for joint, _ in asked), *partners]
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
-    fields = OwnFields(mass, gravity)
+    fields, limits = OwnFields(mass, gravity), tuple(drive.motor.limit for drive in drives)
     units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
     why_not = missing(model, joints, drives)
     return Plant(
@@ -151,6 +155,8 @@ def plant_from(
         direct=True,
         smooth=smooth(model),
         unmodelled=why_not,
+        limits=limits if any(limit < math.inf for limit in limits) else (),
+        ranges=ranges(model, joints),
     )
 
 
@@ -188,16 +194,25 @@ def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...])
     ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
     idle = np.ones(model.nactuator, bool)
     idle[[a for drive in drives for a in drive.motor.replaced]] = False
+    if np.any(model.actuator_dyntype[idle] == CURRENT):
+        return "a dcmotor among its other actuators has a current that is not measured: give a law without a model"
     across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
     near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
-    for dof in near:
-        if dof not in ours:
-            joint = model.joint(model.dof_jntid[dof]).name
-            return (
-                f"joint {joint!r} moves with its channels and is not measured: "
-                f"make it a channel, or a partner with smc.Channel(partner={joint!r}), or give a law without a model"
-            )
-    return ""
+    return next((unmeasured(model, int(dof)) for dof in near if dof not in ours), "")
+
+
+def unmeasured(model: mujoco.MjModel, dof: int) -> str:
+    """What there is to say of a degree of freedom that moves with the channels and is none."""
+    number = int(model.dof_jntid[dof])
+    kind, joint = mujoco.mjtJoint(model.jnt_type[number]), model.joint(number).name
+    if kind not in SIMPLE:
+        return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: give a law without a model"
+    if not joint:
+        return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
+    return (
+        f"joint {joint!r} moves with its channels and is not measured: "
+        f"make it a channel, or a partner with smc.Channel(partner={joint!r}), or give a law without a model"
+    )
 
 
 def restored(data: Mapping, name: str) -> Plant:
@@ -207,6 +222,8 @@ def restored(data: Mapping, name: str) -> Plant:
       ScenarioError: the file is gone, or another than it was.
     """
     path = Path(data["path"])
-    if path.is_file() and mjcf.digest(path) != data["sha256"]:
-        raise ScenarioError(f"{path}, or a file that it names, is another than it was in the run: put that one back")
+    if not path.is_file():
+        raise ScenarioError(f"its model {path} is not there: put it back")
+    if mjcf.digest(path) != data["sha256"]:
+        raise ScenarioError(f"its model {path}, or a file that it names, is another than in the run: put that one back")
     return plant_from(path, data["channels"], name=name, keyframe=data["keyframe"])

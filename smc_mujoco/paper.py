@@ -21,6 +21,7 @@ from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.friction import Coulomb, LuGre
 from smc_mujoco.frozen import frozen
+from smc_mujoco.given import U_MAX
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Pulse, Sine, Step
@@ -31,7 +32,7 @@ GAINS = sets.STUDY
 PLANTS = tuple(GAINS)
 FIELDS = [field.name for field in dataclasses.fields(Scenario)]
 NOTHING: Mapping[str, Any] = frozen({})
-DURATION, CONTROL_PERIOD, U_MAX = 10.0, 1e-3, 6.0  # s, s, N or N m
+DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
 # Plant -> parameter -> factor, at half time, with the sine disturbance: a mild and a hard one.
 JUMP_MILD: dict[str, dict[str, float]] = {

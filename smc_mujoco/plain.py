@@ -164,6 +164,7 @@ class Loop:
         """Saturated commands and sliding variables, (n,) each."""
         scenario, law = self.scenario, self.scenario.law
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
+        limits = scenario.limits
         r, dr, ddr = signalled(scenario.reference, t)
         self.r[:] = r
         for i in range(len(x)):
@@ -173,7 +174,7 @@ class Loop:
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
             y = Measurement(
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
-                float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.u_max, float(scenario.model == "nominal"),
+                float(ddr if math.isnan(self.a[i]) else self.a[i]), limits[i], float(scenario.model == "nominal"),
             )  # fmt: skip
             if (j := i + int(np.sum(self.table[:, column.CTRL] >= 0))) < len(x):  # moves with it, without an actuator
                 fq, gq = self.model_at(x, v, j)
@@ -183,11 +184,12 @@ class Loop:
                 y = y._replace(surfaced=1.0, **dict(zip(("s", "eq"), surfaced(scenario.surface, slid), strict=True)))
             out = guarded(law, self.law, i, y, named(law), self.memory[i])
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
-            self.latest[i] = np.clip(u[i], -scenario.u_max, scenario.u_max)
-            asked = min(abs(u[i]), scenario.u_max) * max(1.0, self.scale)
+            self.latest[i] = np.clip(u[i], -limits[i], limits[i])
+            asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < HUGE):
                 raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
-        return np.clip(u, -scenario.u_max, scenario.u_max), s
+            u[i] = self.latest[i]
+        return u, s
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int) -> tuple[float, float]:
         """Nominal f and g of channel i."""

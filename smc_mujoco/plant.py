@@ -98,6 +98,8 @@ class Plant:
       direct: whether disturbances act on its joints themselves, and not on the bodies that they carry.
       smooth: whether its equation is without limits, contacts and dry friction of its own.
       unmodelled: why there is no nominal model, or "".
+      limits: what the motors of the driven channels give at most, N m or N each; empty: no limits of their own.
+      ranges: joint, least and largest position of each channel, rad or m; empty: none has limits of its own.
     """
 
     name: str
@@ -119,6 +121,8 @@ class Plant:
     direct: bool = False
     smooth: bool = True
     unmodelled: str = ""
+    limits: tuple[float, ...] = ()
+    ranges: tuple[tuple[str, float, float], ...] = ()
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed"):

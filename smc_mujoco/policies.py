@@ -59,7 +59,7 @@ class Policy(Uncompiled):
     def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
         """u and s, which is 0."""
         if math.isinf(y.limit):
-            raise ValueError("its action is in parts of u_max, which is inf")
+            raise ValueError("its action is in parts of a limit, and u_max is inf")
         state = [y.x, y.q, y.v, y.dq] if any((y.q, y.dq, y.fq, y.gq)) else [y.x, y.v]
         given = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
         u = np.asarray(self.act(given), float).ravel()
@@ -130,9 +130,9 @@ def policy(act: Any, *, reference: bool = False) -> Law:
     """A policy as a law.
 
     Args:
-      act: a callable from an observation to an action, in parts of u_max, beyond which it saturates; a torch module,
-        taken as it is now and put in evaluation mode; or the path of a file of onnx (.onnx), of torch.export (.pt2) or
-        of TorchScript (.pt, .pth, .ts).
+      act: a callable from an observation to an action, in parts of its limit, beyond which it saturates; a torch
+        module, taken as it is now and put in evaluation mode; or the path of a file of onnx (.onnx), of torch.export
+        (.pt2) or of TorchScript (.pt, .pth, .ts).
       reference: whether its observation ends in r, r', r'', as that of the task `track` does.
 
     The observation is x, v, or x, q, v, q' of a joint with one that moves with it: a float64 array of a single

@@ -16,7 +16,7 @@ import numpy as np
 (
     IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
     CHANNELS, TABLE, POSITIONS, VELOCITIES, STEPS, STAGES, STEP, PERIOD,  # channel table, nq, nv, clock
-    DELAY, RING, RINGS, LIMIT, SCALE, FORCES,  # delay in steps, ring, its samples, u_max, drive, sums of forces
+    DELAY, RING, RINGS, LIMIT, LIMITS, SCALE, FORCES,  # delay in steps, ring, its samples; u_max, or one each; drive
     SEED, SIGMA_X, SIGMA_V, BIAS, COUNTS, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
     LAW, GAINS, MODEL, SURFACE, SURFACE_GAINS, ESTIMATOR, ESTIMATOR_GAINS,
     NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
@@ -24,7 +24,7 @@ import numpy as np
     INPUT, OUTPUT, STATE,
     LAW_MEMORY, LAW_STRIDE, SURFACE_MEMORY, SURFACE_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
     HEADER,
-) = range(52)  # fmt: skip
+) = range(53)  # fmt: skip
 
 # Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
 # whether it is a Cartesian force.
@@ -69,7 +69,8 @@ class Contents:
     step: float  # s
     period: float  # s
     delay: int  # physics steps
-    limit: float
+    limit: float  # on |u|
+    limits: Sequence[float]  # of each driven channel, where they are not all `limit`; else empty
     seed: int
     sigma_x: float
     sigma_v: float
@@ -112,6 +113,8 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     row[LOG], row[SAMPLES] = address(log), log.shape[1]
     row[LAW_STRIDE], row[ESTIMATOR_STRIDE] = c.law.memory, c.estimator.memory
     row[MODEL] = c.model
+    if c.limits:
+        put(LIMITS, c.limits)
     put(GAINS, c.law.values)
     if c.surface is not None:
         row[SURFACE], row[SURFACE_STRIDE] = c.surface.address, c.surface.memory

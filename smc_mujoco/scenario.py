@@ -44,7 +44,8 @@ class Scenario:
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
         equation, up to 0.25 ms with friction, contact, a mechanism or an actuator.
-      u_max: bound on the command, N or N m; may be infinite.
+      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or of a model of yours whose motors have limits, what
+        the strongest of those gives. A motor's own limit holds too: see `limits`.
       x0, v0: initial state, one number or n of them. Default: the plant's x0, and 0.
       reference: r(t), the same for every channel.
       disturbance: d(t), one signal or several to be added, or None.
@@ -73,7 +74,7 @@ class Scenario:
     duration: float = 10.0
     control_period: float = 1e-3
     physics_step: float = MISSING
-    u_max: float = 6.0
+    u_max: float = MISSING
     x0: tuple[float, ...] = MISSING
     v0: tuple[float, ...] = MISSING
     reference: Signal = REST
@@ -103,7 +104,7 @@ class Scenario:
             duration: float = 10.0,
             control_period: float = 1e-3,
             physics_step: float | None = None,
-            u_max: float = 6.0,
+            u_max: float | None = None,
             x0: float | Sequence[float] | None = None,
             v0: float | Sequence[float] | None = None,
             reference: Signal = REST,
@@ -143,7 +144,7 @@ class Scenario:
         put("velocity", given.velocity(self.velocity, self.sensor))
         put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
         put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
-        put("u_max", number("u_max", self.u_max, above=0.0, infinite=True))
+        put("u_max", given.u_max(self.u_max, self.plant))
         put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
         put("physics_step", given.physics_step(self.physics_step, self.control_period, self.realistic, SHORTEST))
         put("x0", given.start(self.x0, self.plant, self.contact.kind))
@@ -171,9 +172,14 @@ class Scenario:
         """Fields whose defaults depend on others: dataclasses.replace finds them anew."""
         return [
             name
-            for name in ("model", "physics_step", "integrator", "velocity", "x0")
+            for name in ("model", "physics_step", "integrator", "velocity", "u_max", "x0")
             if given.left_out(getattr(self, name))
         ]
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """The bound on |u| of each driven channel, N or N m: u_max, or its own motor's limit where that is less."""
+        return tuple(min(self.u_max, limit) for limit in self.plant.limits) or (self.u_max,) * self.plant.driven
 
     @property
     def steps(self) -> int:

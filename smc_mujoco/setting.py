@@ -1,8 +1,9 @@
 """A setting: a plant with a task, ready to be simulated; the same for dm_env, gymnasium and batches.
 
 The physics are those of `smc.run`: an action is the command u of a control sample, held for one control period, as a
-part of u_max: in [-1, 1], beyond which it saturates. Only the law is left out, and what a Scenario puts between plant
-and law: noise, delay, encoder; and disturbances, contacts and jumps.
+part of its channel's limit, which is u_max or what the channel's own motor gives: in [-1, 1], beyond which it
+saturates. Only the law is left out, and what a Scenario puts between plant and law: noise, delay, encoder; and
+disturbances, contacts and jumps.
 """
 
 import dataclasses
@@ -65,6 +66,11 @@ class Setting:
         return math.prod(part.scale for part in self.scenario.actuator)
 
     @functools.cached_property
+    def most(self) -> np.ndarray:
+        """What the model's actuators take at most, (driven,)."""
+        return self.scale * np.array(self.scenario.limits)
+
+    @functools.cached_property
     def size(self) -> int:
         """Numbers in an observation: positions, velocities, and for a moving task r, r', r''."""
         return 2 * self.scenario.plant.n + 3 * self.task.moving
@@ -80,7 +86,7 @@ class Setting:
         return assembly.start(self.model, self.scenario)
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """What ctrl becomes under an action: u_max times it, saturated, in the actuators' unit.
+        """What ctrl becomes under an action: each channel's limit times it, saturated, in the actuators' unit.
 
         Raises:
           ScenarioError: an action of another shape, or with what is no finite number.
@@ -92,7 +98,7 @@ class Setting:
         if a.shape != copies + self.shape or not math.isfinite(np.vdot(a, a)):
             shape = copies + self.shape
             raise ScenarioError(f"action is {_culprit(action, a, shape)}: give finite numbers, of shape {shape}")
-        return self.scale * self.scenario.u_max * np.minimum(np.maximum(a, -1.0), 1.0)
+        return self.most * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """A start: x and v, (n,) each, from a numpy generator of either kind, or as options x0 and v0 say.
@@ -170,7 +176,7 @@ def setting(
         raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(offered)}")
     changes = _checked({} if changes is None else changes, task)
     scenario = Scenario(**({"plant": plant, "law": "none"} | found.fields(plant) | changes))
-    if math.isinf(scenario.u_max):
+    if math.inf in scenario.limits:
         raise ScenarioError("u_max is inf: give a finite one, so that an agent knows what it may ask")
     fixed = np.array(scenario.x0)
     return _built(scenario, found, found.spread(plant) if changes.get("x0") is None else (fixed, fixed), edit)

@@ -5,9 +5,9 @@
     while not timestep.last():
         timestep = environment.step(agent(timestep))
 
-An action is the command of the driven channels, in parts of u_max. Observations are {"position": x, "velocity": v},
-(n,) each, angles unwrapped, and for `track` "reference": r, r', r''; tasks and rewards stand in `tasks`. They open in
-dm_control's viewer: viewer.launch(environment).
+An action is the command of the driven channels, in parts of their limits. Observations are {"position": x,
+"velocity": v}, (n,) each, angles unwrapped, and for `track` "reference": r, r', r''; tasks and rewards stand in
+`tasks`. They open in dm_control's viewer: viewer.launch(environment).
 """
 
 import contextlib
@@ -71,7 +71,7 @@ class PlantTask(control.Task):
         self.over = bool(self.setting.lost(self.x, self.v))
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Commands of the driven channels, in parts of u_max."""
+        """Commands of the driven channels, in parts of their limits."""
         return specs.BoundedArray(self.setting.shape, float, minimum=-1.0, maximum=1.0, name="u")
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]

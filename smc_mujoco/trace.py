@@ -194,8 +194,10 @@ def load(path: str | os.PathLike) -> Trace:
     try:
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
         scenario = record.restore(about)
+    except ScenarioError as error:  # which names a cure of its own
+        raise ScenarioError(f"the scenario of {path} cannot be brought back, {error}") from None
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        why = error if isinstance(error, ScenarioError) else f"{type(error).__name__}, {error}"
+        why = f"{type(error).__name__}, {error}"
         raise ScenarioError(
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None

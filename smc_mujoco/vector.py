@@ -191,13 +191,12 @@ def _mode(mode: object) -> AutoresetMode:
 def strip(spec: mujoco.MjSpec) -> None:
     """Take away what is only looked at, which MuJoCo would move along in every step: a third of its time.
 
-    Models of users stay as they are: a part that is fixed may be a floor, or hold a tendon.
+    Models of users stay as they are, but for sensors: a part that is fixed may be a floor, or hold a tendon.
     """
-    if any(text.name == DIRECTLY for text in spec.texts):
-        return
-    for thing in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
-        spec.delete(thing)
-    spec.compiler.fusestatic = True
+    if not any(text.name == DIRECTLY for text in spec.texts):
+        for thing in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
+            spec.delete(thing)
+        spec.compiler.fusestatic = True
     # nobody reads them here: an observation is taken from the state
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 

@@ -1,6 +1,7 @@
 """Models that nobody here wrote become plants: they move as in MuJoCo, laws get f and g, mistakes get a sentence."""
 
 import dataclasses
+import gc
 import importlib.util
 import math
 import pickle
@@ -9,9 +10,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from episodes import driven_by_dm, run_of
 
 import smc_mujoco as smc
-from smc_mujoco import identity, plain
+from smc_mujoco import assembly, design, identity, linear, plain, setting
+from smc_mujoco import suite as suite_of_ours
+from smc_mujoco.believed import Believed, prepared
+from smc_mujoco.frozen import frozen
 from smc_mujoco.own_model import OwnModel
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
@@ -31,6 +36,10 @@ LINKS = """
 """
 MOTORS = '<motor name="a" joint="shoulder" gear="-4" ctrlrange="-1 2"/><motor name="b" joint="elbow"/>'
 ACTUATED = f"<actuator>{MOTORS}</actuator>"
+MORE_KEYS = """
+  <actuator><motor joint="shoulder"/></actuator>
+  <keyframe><key name="home" qpos="0.2 -0.5" ctrl="1"/><key ctrl="1"/></keyframe>
+"""
 BALL = '<body name="ball"><joint name="ball" type="ball"/><geom size=".1 .1" mass="1"/></body>'
 
 
@@ -129,14 +138,15 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     joints = joints_of(plant, raw)
     places = [j.qposadr[0] for j in joints]
     data.qpos[places], data.ctrl[:] = 0.3, CTRL[name]
-    energies = []
+    energies, built = [], plant.load()  # our model's energy at our state, the file's at its own
+    built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
     for k in range(scenario.samples + 1):
         np.testing.assert_allclose(trace.x[k], data.qpos[places], atol=1e-11)
         np.testing.assert_allclose(trace.v[k], data.qvel[[j.dofadr[0] for j in joints]], atol=1e-10)
-        ours = mujoco.MjData(raw)
+        ours = mujoco.MjData(built)
         ours.qpos[:], ours.qvel[:] = data.qpos, data.qvel
         ours.qpos[places], ours.qvel[[j.dofadr[0] for j in joints]] = trace.x[k], trace.v[k]
-        mujoco.mj_forward(raw, ours)
+        mujoco.mj_forward(built, ours)
         mujoco.mj_forward(raw, data)
         energies.append((ours.energy.sum(), data.energy.sum()))
         mujoco.mj_step(raw, data)
@@ -221,8 +231,20 @@ def test_the_plain_loop_gives_the_same_bits(arm, fields):
 def test_threads_change_nothing(arm):
     base = smc.Scenario(plant=arm(), law=TORQUE, model="nominal", duration=0.2, u_max=20.0)
     many = [dataclasses.replace(base, x0=(0.1 * i, -0.1 * i), mismatch={"mass": 1.0 + 0.1 * i}) for i in range(6)]
-    for one, two in zip(smc.run(many, threads=1), smc.run(many, threads=4), strict=True):
+    for one, two, alone in zip(smc.run(many, threads=1), smc.run(many, threads=4), map(smc.run, many), strict=True):
         np.testing.assert_array_equal(one.x, two.x)
+        np.testing.assert_array_equal(one.x, alone.x)
+
+
+def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
+    plant = arm()
+    base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    many = [dataclasses.replace(base, x0=(0.1 * i, 0.2), v0=0.5) for i in range(7)]
+    first, _, _, again = smc.run(base), smc.run(many), smc.run(many), smc.run(base)
+    np.testing.assert_array_equal(again.x, first.x)
+    gc.collect()
+    assert isinstance(plant.nominal, Believed)
+    assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
 def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
@@ -254,16 +276,85 @@ def test_a_mismatch_is_in_the_true_model_alone(arm):
 def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
     plant = arm()
     assert isinstance(plant.build, OwnModel)
-    (_, motor, _), (_, free, _) = plant.build.drives
-    assert (motor.low, motor.high) == (-8.0, 4.0)  # gear -4, ctrlrange -1 2
-    assert (free.low, free.high) == (-math.inf, math.inf)
+    assert plant.limits == (4.0, math.inf)  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
 
     @smc.law_function
     def much(y, gains, memory):
-        return 30.0, 0.0
+        return 30.0, y.limit
 
-    trace = smc.run(smc.Scenario(plant=plant, law=much(), duration=0.1, u_max=50.0))
-    np.testing.assert_allclose(trace.force[5:], [[4.0, 30.0]] * len(trace.force[5:]))
+    scenario = smc.Scenario(plant=plant, law=much(), duration=0.1, u_max=50.0)
+    assert scenario.limits == (4.0, 50.0)
+    for trace in smc.run(scenario), plain.run(scenario):
+        for told in trace.u, trace.applied, trace.force[1:]:
+            np.testing.assert_array_equal(told, [[4.0, 30.0]] * len(told))
+        np.testing.assert_array_equal(trace.s, [[4.0, 50.0]] * len(trace.s))  # as the law was told
+        assert smc.score(trace)["max_u"] == 30.0
+    weaker = smc.run(dataclasses.replace(scenario, u_max=3.0))
+    np.testing.assert_array_equal(weaker.u, 3.0)
+
+
+LIMITS = {
+    "ctrlrange": ('<motor joint="elbow" gear="3" ctrlrange="-2 2"/>', "", 6.0),
+    "forcerange": ('<motor joint="elbow" gear="-3" forcerange="-1 2"/>', "", 3.0),
+    "both": ('<motor joint="elbow" gear="3" ctrlrange="-2 2" forcerange="-.5 .5"/>', "", 1.5),
+    "the joint's": ('<motor joint="elbow" ctrlrange="-9 9"/>', 'actuatorfrcrange="-2 1"', 1.0),
+    "no clamp": ('<motor joint="elbow" ctrlrange="-2 2"/>', "", math.inf),
+    "ideal": ('<position joint="elbow" forcerange="-1 1"/>', "", math.inf),
+    "ideal, of the joint": ('<position joint="elbow"/>', 'actuatorfrcrange="-2 2"', 2.0),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
+    motor, joint, limit = LIMITS[name]
+    flag = '<option><flag clampctrl="disable"/></option>' if name == "no clamp" else ""
+    arm(["shoulder"])
+    text = LINKS.format(rest=f"<actuator>{motor}</actuator>{flag}", bodies="").replace(
+        'axis="0.6 0.8 0"', f'axis="0.6 0.8 0" {joint}'
+    )
+    (tmp_path / "arm.xml").write_text(text)
+    plant = smc.plant_from(tmp_path / "arm.xml", {"elbow": smc.Channel(motor=name.startswith("ideal"))})
+    assert plant.limits == ((limit,) if limit < math.inf else ())
+    assert smc.Scenario(plant=plant, law="none").limits == (limit if limit < math.inf else 6.0,)
+    raw = read(plant)
+    data = mujoco.MjData(raw)
+    if not name.startswith("ideal"):  # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
+        forces = []
+        for data.ctrl[0] in (-100.0, 100.0):
+            mujoco.mj_forward(raw, data)
+            forces.append(abs(data.qfrc_actuator[raw.joint("elbow").dofadr[0]]))
+        assert min(forces) == min(limit, 100.0)
+
+
+def test_u_max_is_what_the_strongest_limited_motor_gives_unless_it_is_said(arm):
+    both = arm(rest=ACTUATED.replace('joint="elbow"', 'joint="elbow" ctrlrange="-9 9"'))
+    scenario = smc.Scenario(plant=both, law="none")
+    assert (scenario.u_max, scenario.limits) == (9.0, (4.0, 9.0))
+    assert smc.Scenario(plant=both, law="none", u_max=5.0).limits == (4.0, 5.0)
+    elsewhere = dataclasses.replace(scenario, plant=smc.plant("duffing"), v0=0.0)
+    assert (elsewhere.u_max, elsewhere.limits) == (6.0, (6.0,))
+    assert smc.Scenario(plant=arm(["elbow"]), law="none").u_max == 6.0
+
+
+def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
+    """PID against a load: its integrator stays where u is at the bound, however large u_max is."""
+    rest = '<option gravity="0 0 0"/><actuator><motor joint="elbow" ctrlrange="-1 1"/></actuator>'
+    plant = arm(["elbow"], rest)
+    law = smc.law("pid", kp=4.0, ki=4.0, kd=2.0, tt=0.1)
+    load = smc.Pulse(amplitude=-2.0, time=0.0, width=2.0)
+    base = smc.Scenario(plant=plant, law=law, duration=8.0, disturbance=load)
+    told, large = smc.run([base, dataclasses.replace(base, u_max=100.0)])
+    np.testing.assert_array_equal(told.x, large.x)
+    assert np.abs(large.u).max() == 1.0
+
+
+def test_an_environment_clips_actions_at_the_motors_limits_and_starts_in_the_keyframe(arm):
+    rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
+    found = setting.setting(arm(["shoulder"], rest, keyframe="home"), changes={"u_max": 50.0})
+    np.testing.assert_array_equal(found.command([-3.0]), [-4.0])
+    qpos, qvel = np.empty(2), np.empty(2)
+    found.place(qpos, qvel, np.array([0.1]), np.array([0.0]))
+    np.testing.assert_array_equal(qpos, [0.1, -0.5])
 
 
 def test_what_is_no_channel_stays_as_the_model_has_it(arm):
@@ -282,6 +373,16 @@ def test_a_keyframe_is_where_runs_start(arm):
     assert arm({"elbow": smc.Channel(x0=1.0), "shoulder": None}, rest, keyframe="home").x0 == (1.0, 0.2)
     trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest, keyframe="home"), law="none", duration=0.1))
     assert trace.x[0, 0] == -0.5
+    moving = rest.replace('-0.5"', '-0.5" qvel="1 1"').replace(
+        "</keyframe>", '<key name="other" qpos="9 9"/></keyframe>'
+    )
+    driven_otherwise = arm({"elbow": smc.Channel(motor=True)}, MORE_KEYS, keyframe="home")
+    assert smc.run(smc.Scenario(plant=driven_otherwise, law="none", duration=0.1)).failure is None
+    for part in (None, smc.Backlash(0.02)):  # which adds joints
+        scenario = smc.Scenario(plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part)
+        qpos, qvel = assembly.start(model := assembly.model([scenario]), scenario)
+        assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [0.2, -0.5]
+        assert not qvel.any()
     with pytest.raises(smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"):
         arm(rest=rest, keyframe="hme")
 
@@ -300,6 +401,165 @@ def test_includes_and_their_contents_count(tmp_path):
     (tmp_path / "parts" / "motors.xml").write_text(f"<mujoco>{ACTUATED}<!-- other --></mujoco>")
     with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
         smc.run(smc.Scenario(plant=plant, law="none", duration=0.01))
+
+
+def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
+    """An attached model has its own meshdir, and a compiler that is included sets that of the whole."""
+    corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
+    faces = [
+        "f 1 2 3",
+        "f 2 3 4",
+        "f 5 6 7",
+        "f 6 7 8",
+        "f 1 2 5",
+        "f 2 5 6",
+        "f 3 4 7",
+        "f 4 7 8",
+        "f 1 3 5",
+        "f 2 4 6",
+    ]
+    body = (
+        '<asset><mesh name="c" file="c.obj"/></asset><worldbody><body name="b"><joint name="j"/>'
+        '<geom type="mesh" mesh="c" mass="1"/></body></worldbody>'
+    )
+    (tmp_path / "sub" / "assets").mkdir(parents=True)
+    (tmp_path / "sub" / "assets" / "c.obj").write_text("\n".join([*corners, *faces]))
+    (tmp_path / "sub" / "child.xml").write_text(f'<mujoco><compiler meshdir="assets"/>{body}</mujoco>')
+    (tmp_path / "attaching.xml").write_text(
+        '<mujoco><asset><model name="m" file="sub/child.xml"/></asset>'
+        '<worldbody><attach model="m" body="b" prefix="left/"/></worldbody></mujoco>'
+    )
+    (tmp_path / "compiler.xml").write_text('<mujoco><compiler meshdir="sub/assets"/></mujoco>')
+    (tmp_path / "including.xml").write_text(f'<mujoco><include file="compiler.xml"/>{body}</mujoco>')
+    motor = smc.Channel(motor=True)
+    plants = {"attaching": {"left/j": motor}, "including": {"j": motor}}
+    built = [smc.plant_from(tmp_path / f"{name}.xml", joints) for name, joints in plants.items()]
+    with (tmp_path / "sub" / "assets" / "c.obj").open("a") as mesh:
+        mesh.write("\n# another")
+    for plant in built:
+        with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
+            plant.spec()
+
+
+def test_the_file_s_own_sensors_are_no_channels(arm):
+    sensors = '<sensor><jointpos joint="elbow"/><jointvel joint="elbow" delay="0.01" nsample="20"/></sensor>'
+    plant = arm(["shoulder"], ACTUATED + sensors)
+    scenario = smc.Scenario(plant=plant, law="classical", duration=0.1, x0=0.3)
+    trace, plainly = smc.run(scenario), smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"])))
+    assert trace.x.shape == (101, 1)
+    np.testing.assert_array_equal(trace.x, plainly.x)
+
+
+@pytest.mark.parametrize("name", ["passive:x", "elbow", "shoulder", "ä b/c"])
+def test_what_a_motor_is_called_does_not_matter(arm, name):
+    plant = arm(rest=f'<actuator><motor name="{name}" joint="shoulder"/><motor joint="elbow"/></actuator>')
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=(0.3, -0.3)))
+    assert trace.failure is None
+    assert trace.u[0, 0] < 0.0 < trace.u[0, 1]
+
+
+def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
+    plant = arm({"elbow": smc.Channel(motor=True)}, ACTUATED + '<option actuatorgroupdisable="0 1 2 3 4 5"/>')
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=0.3))
+    np.testing.assert_array_equal(trace.force[1:, 0], trace.u[:-1, 0])
+
+
+def test_twice_the_mass_is_twice_all_masses_and_inertias_and_no_armature(arm):
+    plant = arm(rest='<default><joint armature="0.1"/></default>' + ACTUATED)
+    raw = read(plant)
+    raw.body_mass[:] *= 2.0
+    raw.body_inertia[:] *= 2.0
+    data = mujoco.MjData(raw)
+    mujoco.mj_setConst(raw, data)
+    raw.opt.timestep, raw.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+    base = smc.Scenario(plant=plant, law="none", duration=0.5, x0=(0.3, -0.3))
+    heavy, light = smc.run([dataclasses.replace(base, mismatch={"mass": 2.0}), base])
+    mujoco.mj_resetData(raw, data)
+    data.qpos[:] = 0.3, -0.3
+    for _ in range(500):
+        mujoco.mj_step(raw, data)
+    np.testing.assert_allclose(heavy.x[-1], data.qpos, atol=1e-12)
+    assert np.abs(heavy.x[-1] - light.x[-1]).max() > 1e-3
+
+
+def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
+    environment = suite_of_ours.load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
+    law = smc.law("observer_free", lam=60.0, k1=3.0)
+    trace = smc.run(run_of(environment.task.setting, law))
+    states = driven_by_dm(environment, smc.agent(law, environment))
+    assert np.abs(states[:, :4] - np.hstack((trace.x, trace.v))).max() < 1e-9
+    assert np.abs(trace.u).max(axis=0).tolist() == [4.0, 30.0]
+
+
+def test_copies_in_one_batch_touch_the_floor_as_the_single_environment_does(tmp_path):
+    pytest.importorskip("gymnasium")
+    from smc_mujoco import gym, vector
+
+    (tmp_path / "falls.xml").write_text("""
+      <mujoco><worldbody><geom type="plane" size="2 2 .1"/><body pos="0 0 .6"><joint name="j" axis="0 1 0"/>
+        <geom type="capsule" size=".03" fromto="0 0 0 .7 0 0" mass="1"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "falls.xml", {"j": smc.Channel(x0=0.1)})
+    single, many = gym.PlantEnv(plant, changes={"x0": 0.1}), vector.BatchEnv(plant, 2, changes={"x0": 0.1})
+    single.reset(seed=0)
+    many.reset(seed=0)
+    alone, both = np.empty(2), np.empty((2, 2))
+    for _ in range(1000):
+        alone, *_ = single.step(np.zeros(1))
+        both, *_ = many.step(np.zeros((2, 1)))
+    np.testing.assert_allclose(both, [alone, alone], atol=1e-12)
+    assert abs(alone[1]) < 0.01 < alone[0] < 1.0  # it lies
+
+
+# joints without an actuator
+
+
+def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
+    plant = smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1", partner_x0=0.3)})
+    assert plant.x0 == (0.0, 0.3)
+    scenario = smc.Scenario(plant=plant, law="hierarchical")
+    assert (scenario.model, scenario.u_max) == ("nominal", 10.0)
+    trace = smc.run(scenario)
+    assert np.abs(trace.x[-1]).max() < 1e-5
+    assert "hierarchical" in smc.laws(plant)
+    assert "hierarchical" not in smc.laws(acrobot_alone())
+
+
+def acrobot_alone() -> smc.Plant:
+    return smc.plant_from(suite("acrobot"), {"elbow": None})
+
+
+def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
+    for law in ("hierarchical", "swing_up"):
+        with pytest.raises(smc.ScenarioError, match=rf"law '{law}' is for .* alone, not for arm") as caught:
+            smc.Scenario(plant=arm(), law=law)
+        assert ("give each channel a partner" in str(caught.value)) == (law == "hierarchical")
+    with pytest.raises(
+        smc.ScenarioError, match="acrobot's channel 1 has no actuator, and lqr does not see such a joint"
+    ):
+        design.lqr(acrobot())
+    for of in (design.lqr, linear.linear):
+        with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
+            of(arm(["elbow"]))
+
+
+# starts
+
+
+def test_a_start_outside_a_joint_s_range_is_refused(arm, tmp_path):
+    arm()
+    path = tmp_path / "arm.xml"
+    path.write_text(path.read_text().replace('name="elbow"', 'name="elbow" range="-30 60"'))
+    said = smc.plant_from(path, {"elbow": smc.Channel(partner="shoulder", x0=1.2, partner_x0=3.0)})
+    words = r"x0 of joint 'elbow' of arm is 1.2, outside its range from -0.523599 to 1.0472: give another x0"
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.Scenario(plant=said, law="none")
+    scenario = smc.Scenario(plant=said, law="none", x0=(1.0, 3.0))  # the shoulder has no limits
+    with pytest.raises(smc.ScenarioError, match=r"x0 of joint 'elbow' of arm is -0.6,"):
+        dataclasses.replace(scenario, x0=-0.6)
+    path.write_text(path.read_text().replace("</mujoco>", '<option><flag limit="disable"/></option></mujoco>'))
+    free = smc.plant_from(path, {"elbow": smc.Channel(x0=1.2)})
+    assert smc.Scenario(plant=free, law="none").x0 == (1.2,)
 
 
 # errors
@@ -323,13 +583,55 @@ WRONG = {
     "empty": ({"channels": []}, "channels is empty"),
     "text": ({"channels": "elbow"}, "channels is 'elbow': give joints' names"),
     "number": ({"channels": {"elbow": 3}}, "channel 'elbow' is 3: give smc.Channel"),
+    "partner's x0": ({"channels": {"elbow": {"partner_x0": 1.0}}}, "channel 'elbow' has a partner_x0 and no partner"),
+    "set": ({"channels": {"elbow", "shoulder"}}, "channels is .*: give joints' names in order"),
+    "motor": ({"channels": {"elbow": {"motor": "no"}}}, "motor of channel 'elbow' is 'no': give True or False"),
+    "both": (
+        {"channels": {"elbow": {"motor": True, "actuator": "b"}}},
+        "channel 'elbow' has motor=True and actuator 'b': give one of the two",
+    ),
+    "one way": (
+        {"channels": ["elbow"], "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>'},
+        "actuator 'm' gives joint 'elbow' of arm.xml 0 to 2, and a law pushes both ways: give smc.Channel",
+    ),
+    "off": (
+        {"rest": ACTUATED + '<option actuatorgroupdisable="0"/>'},
+        "actuator 'a' of joint 'shoulder' is in a group that actuatorgroupdisable turns off",
+    ),
+    "rotor": (
+        {
+            "channels": {"rotor:a": smc.Channel(motor=True)},
+            "bodies": '<body><joint name="rotor:a"/><geom size=".1 .1" mass="1"/></body>',
+        },
+        "joint 'rotor:a' of arm.xml is named as a drive's rotor: give it another name",
+    ),
+    "no keyframe": ({"keyframe": "home"}, "unknown keyframe of arm.xml 'home': none has a name there, so give it one"),
+    "no actuator": (
+        {"channels": {"elbow": {"actuator": "b"}}, "rest": ""},
+        "unknown actuator of arm.xml 'b': none has a name there",
+    ),
     "x0": ({"channels": {"elbow": {"x0": "a"}}}, "x0 of channel 'elbow' is 'a': give a number"),
     "name": ({"name": "duffing"}, "name is 'duffing': give one that is none of smc.plants"),
     "flag": (
         {"rest": f'{ACTUATED}<option><flag actuation="disable"/></option>'},
         'arm.xml has <flag actuation="disable"/>',
     ),
-    "broken": ({"rest": "<actuator><mtor/></actuator>"}, r"MuJoCo cannot read .*arm.xml \(.*unrecognized element"),
+    "broken": (
+        {"rest": "<actuator>\n<mtor/></actuator>"},
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized element in <mtor>, line 12\): mend the file$",
+    ),
+    "unclosed": (
+        {"rest": "<actuator>\n<motor></actuator>"},
+        r"MuJoCo cannot read \S*arm.xml \(mismatched element <motor>, line 12\): mend the file$",
+    ),
+    "attribute": (
+        {"rest": '<actuator>\n<motor joint="elbow" gaer="1"/></actuator>'},
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized attribute: 'gaer' in <motor>, line 12\): mend the file$",
+    ),
+    "target": (
+        {"rest": '<actuator><motor joint="elbwo"/></actuator>'},
+        r"arm.xml \(unknown transmission target 'elbwo' for actuator id = 0, line 11\): mend the file$",
+    ),
     "compile": ({"bodies": "<body><joint/></body>"}, "MuJoCo cannot read .*mass and inertia of moving bodies"),
 }
 
@@ -342,9 +644,34 @@ def test_a_mistake_is_one_sentence(arm, name):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<foo/>", r"unrecognized element in <foo> in a file that it includes"),
+        ("<foo>", r"mismatched element <foo> in a file that it includes, line 3"),
+    ],
+)
+def test_a_broken_file_that_is_included_is_no_line_of_the_file_that_includes_it(arm, tmp_path, text, words):
+    (tmp_path / "part.xml").write_text(f"<mujoco>\n\n{text}</mujoco>")
+    with pytest.raises(smc.ScenarioError, match=rf"MuJoCo cannot read \S*arm.xml \({words}\): mend the file$"):
+        arm(rest='<include file="part.xml"/>')
+
+
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
     with pytest.raises(smc.ScenarioError, match=r"no model at .*arm.xml: give the path of an MJCF file"):
         smc.plant_from(tmp_path / "arm.xml", ["elbow"])
+    for path in ("a\0.xml", "a" * 5000, tmp_path):
+        with pytest.raises(smc.ScenarioError, match=r"no model at .*: give the path of an MJCF file"):
+            smc.plant_from(path, ["elbow"])
+    with pytest.raises(
+        smc.ScenarioError, match=r"path is the text of a model, '\\n<mujoco>.{,60}: write it into a file"
+    ):
+        smc.plant_from(LINKS, ["elbow"])
+    (tmp_path / "bare.xml").write_text("<mujoco/>")
+    with pytest.raises(
+        smc.ScenarioError, match=r"unknown joint of bare.xml 'elbow': none has a name there, so give it"
+    ):
+        smc.plant_from(tmp_path / "bare.xml", ["elbow"])
     with pytest.raises(smc.ScenarioError, match=r"path is 3: give the path"):
         smc.plant_from(3, ["elbow"])  # pyright: ignore[reportArgumentType]
 
@@ -356,6 +683,13 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
     assert smc.run(smc.Scenario(plant=plant, law=TORQUE, duration=0.1)).failure is None
     tied = '<equality><joint joint1="elbow" joint2="shoulder"/></equality>' + ACTUATED
     assert "equality" in arm(rest=tied).unmodelled
+    across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
+    assert "a ball joint moves with its channels, and can be none" in arm(rest=across, bodies=BALL).unmodelled
+    slide = '<body><joint type="slide"/><geom size=".1 .1" mass="1"/></body>'
+    assert "a joint without a name moves with" in arm(rest=across, bodies=slide).unmodelled
+    wound = '<dcmotor joint="elbow" motorconst="1 1" resistance="1" inductance="0.1 0"/></actuator>'
+    channels = {"shoulder": None, "elbow": smc.Channel(actuator="b")}
+    assert "dcmotor" in arm(channels, rest=ACTUATED.replace("</actuator>", wound)).unmodelled
 
 
 def test_a_force_on_a_body_is_refused(arm):
@@ -376,10 +710,11 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
     assert identity.key(again.scenario) == identity.key(trace.scenario)
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     arm(bodies=BALL)
-    with pytest.raises(smc.ScenarioError, match=r"arm.xml, or a file that it names, is another than it was in the run"):
+    words = r"the scenario of \S*a.npz cannot be brought back, its model \S*arm.xml"
+    with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file that .* than in the run: put that one back$"):
         smc.load(path)
     (tmp_path / "arm.xml").unlink()
-    with pytest.raises(smc.ScenarioError, match=r"no model at .*arm.xml"):
+    with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back$"):
         smc.load(path)
 
 

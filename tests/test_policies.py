@@ -86,7 +86,7 @@ def test_policies_of_one_callable_are_one_law_that_can_be_sent_away():
         (lambda o: [1.0, 2.0], {}, "2 numbers"),
         (lambda o: [np.nan], {}, "returned u = nan"),
         (lambda o: "left", {}, "could not convert"),
-        (lambda o: o[:1], {"u_max": np.inf}, "parts of u_max, which is inf"),
+        (lambda o: o[:1], {"u_max": np.inf}, "u_max is inf"),
     ],
 )
 def test_an_action_that_is_none_ends_the_run_in_words(act, fields, words):

@@ -14,7 +14,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import assembly, plain
-from smc_mujoco.given import REALISTIC_STEP, FilledName, FilledStep
+from smc_mujoco.given import REALISTIC_STEP, FilledName, FilledNumber
 from smc_mujoco.part import dof_ids, joint_ids
 from smc_mujoco.trace import ARRAYS
 
@@ -819,7 +819,7 @@ def test_what_was_given_is_kept():
 
 def test_filled_in_values_are_plain_values():
     s = scenario(friction=LUGRE)
-    assert isinstance(s.physics_step, FilledStep)
+    assert isinstance(s.physics_step, FilledNumber)
     assert isinstance(s.integrator, FilledName)
     explicit = scenario(friction=LUGRE, integrator="implicitfast", physics_step=REALISTIC_STEP)
     assert s == explicit

@@ -58,7 +58,10 @@ NO_NUMBERS = [
 @pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay"])
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=brief)
 def test_a_field_that_is_no_number_is_refused(field, value):
-    refused(lambda: scenario(**{field: value}), field, repr(value))
+    if field == "u_max" and value is None:  # left out
+        assert scenario(u_max=None) == scenario(u_max=6.0) == scenario()
+    else:
+        refused(lambda: scenario(**{field: value}), field, repr(value))
 
 
 @pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None], ids=brief)
@@ -141,6 +144,17 @@ def test_a_run_lasts_the_whole_periods_that_fit(duration, period, samples):
 @pytest.mark.parametrize("step", [2e-3, 3e-4, 0.9e-3, 1.0, 1e-3 / 1.5])
 def test_a_physics_step_that_does_not_divide_the_period_is_refused(step):
     refused(lambda: scenario(physics_step=step), "physics_step", f"{step:g}", "0.001")
+
+
+@pytest.mark.parametrize("name", smc.plants())
+def test_one_parameter_under_two_names_is_refused(name):
+    plant = smc.plant(name)
+    both = {"mass": 1.2, plant.mass: 1.5}
+    words = f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of them"
+    refused(lambda: scenario(plant=name, mismatch=both), "mismatch has", words)
+    refused(lambda: scenario(plant=name, jump=smc.Jump(0.5, both)), "Jump has", words)
+    apart = scenario(plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5}))  # one after the other
+    assert getattr(plant.values(apart.factors(10**6)), plant.mass) == pytest.approx(1.8 * plant.parameters[plant.mass])
 
 
 @pytest.mark.parametrize("count", [1, 3, 7, 1000])

@@ -15,6 +15,9 @@ lie on the left (x + L q is a flat output: its second derivative is grav q). Wit
 a L < 1. The default gains are chosen: p = -2 1/s, three times, for cart_pole. u is singular where a g = -gq, for
 cart_pole at cos q = a L, 63 degrees; past it the pole is lost.
 
+A model of yours takes it where its joint turns as theirs do: q > 0 leans a pole the way x grows, and swings a load the
+other way; else turn the joint's axis round.
+
 Without the model, f = fq = gq = 0 and g = 1: u = -(k sgn(S) + rate S) / a. That has the sign of the crane's a g + gq
 and not of the pole's, where gq < 0 outweighs a g: it brings the crane in and drops the pole.
 Source: W. Wang, J. Yi, D. Zhao & D. Liu, "Design of a stable sliding-mode controller for a class of second-order
