@@ -1,1 +1,1 @@
-"""Commands of the command line, one a file: plain functions that `cli` registers, light to import."""
+"""Commands of the command line: plain functions that `cli` registers, light to import."""
