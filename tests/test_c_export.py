@@ -274,7 +274,7 @@ REFUSED = {
     "u = (lambda a: a)(y.e)": "a call",
     "y = 3.0; u = y": "an assignment to this",
     "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
-    "u = gains.k * y.e": "it reads an unknown gain 'k': there is none",
+    "u = gains.k * y.e": "it reads an unknown gain 'k': there are none",
     "u = halts(y.e)": "halts, whose last line is no return,",
 }
 
