@@ -29,9 +29,12 @@ def path(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst(table: Table) -> list[int]:
-    """For every plant and condition the row that failed first, or else ends with the largest ultimate bound."""
+    """For every plant and condition the row that failed first, or else ends with the largest ultimate bound.
+
+    A plant whose driven channels have two units has no such bound: of it the one that settles last.
+    """
     bounds, failed = table.column("ultimate_bound"), table.column("failure") != np.array(None)
-    badness = np.where(failed, np.inf, np.nan_to_num(bounds, nan=np.inf))
+    badness = np.where(failed, np.inf, np.where(np.isnan(bounds), table.column("settling_time"), bounds))
     found: dict[tuple, int] = {}
     for i, place in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
         if place not in found or (failed[i], badness[i]) > (failed[found[place]], badness[found[place]]):

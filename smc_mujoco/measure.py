@@ -2,9 +2,9 @@
 
 Groups: a metric is of channels that are alike, those of one of the plant's `groups`. Driven channels and free
 joints, which no actuator drives, are scored apart, even where their units agree: what the one is told to do, the other
-only suffers. `score` and each metric are of the driven channels. Where these have several units, each unit is measured
-by itself: a time, a percentage, a share is then the worst of them, and a metric with x's or u's unit is refused.
-`scores` has every group by itself, the free joints' too, without what says something of a command.
+only suffers. Of several groups, `score` and each metric tell a time, a percentage or a share of the motion as the worst
+of them: a law that drops the pole has settled nothing. What has x's unit, or is of the command, they tell of the driven
+channels; where these have several units, a metric with x's or u's unit is refused. `scores` has every group by itself.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
@@ -74,28 +74,34 @@ class Metric:
     formula: Callable[[Trace], float]
 
     def refusal(self, plant: Plant) -> str:
-        """Why this is no metric of the plant's driven channels, or ""."""
-        if self.network and not plant.network:
+        """Why this has no one value for the plant, or ""."""
+        driven = [group for group in groups(plant) if group.driven]
+        if not any(map(self.fits, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
-        if "{" in self.unit and len(units := dict.fromkeys(plant.units[: plant.driven])) > 1:
-            each = " and ".join(units)
+        if "{" in self.unit and len(driven) > 1:
+            each = " and ".join(group.unit for group in driven)
             return f"{self.name} has no one value where channels are in {each}, as in {plant.name}: use smc.scores"
         return ""
 
-    def of(self, trace: Trace) -> float:
-        """The value for the driven channels, of a trace that `refuse` and `refusal` let pass."""
-        driven = [group for group in groups(trace.scenario.plant) if group.driven]
-        return max(float(self.formula(cut(trace, group))) for group in driven)
+    @property
+    def shared(self) -> bool:
+        """Whether free joints count in its one value: it is of the motion, and has no unit of x."""
+        return not self.command and "{" not in self.unit
 
-    def fits(self, group: Group, plant: Plant) -> bool:
+    def of(self, trace: Trace) -> float:
+        """The one value of a trace that `refuse` and `refusal` let pass: the worst of the groups that count."""
+        plant = trace.scenario.plant
+        found = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
+        return max(float(self.formula(cut(trace, group))) for group in found)
+
+    def fits(self, group: Group) -> bool:
         """Whether this is a metric of a group by itself."""
-        if self.network:
-            return plant.network and len(group.channels) > 1
-        return group.driven or not self.command
+        return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
     def unit_for(self, x: str) -> str:
         """The unit where positions have the unit x, "rad" or "m" (as `plant.unit`)."""
-        return self.unit.format(x=x, u=EFFORT[x])
+        u = EFFORT[x]
+        return self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u).format(x=x, u=u)
 
 
 def metric(

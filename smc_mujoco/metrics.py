@@ -28,9 +28,9 @@ def metrics() -> tuple[Metric, ...]:
 
 
 def score(trace: Trace) -> dict[str, float]:
-    """Every metric of the driven channels by name; those that compare channels only of a network.
+    """Every metric by name that has one value for the plant; those that compare channels only of a network.
 
-    Driven channels of several units have the worst time and percentage of any; what has their unit is left to `scores`.
+    Of a cart with a pole: times and percentages of the motion are the worst of both, what has a unit is the cart's.
 
     Raises:
       ScenarioError: the run diverged, failed or holds NaN.
@@ -40,15 +40,15 @@ def score(trace: Trace) -> dict[str, float]:
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
-    """The metrics of each group of channels by itself: {"driven": score(trace), "free": ...} of a cart with a pole.
+    """The metrics of each group of channels by itself: {"driven": {...}, "free": {...}} of a cart with a pole.
 
     Joints without an actuator are free; a kind in several units has a group of each: "driven m". Raises as `score`.
     """
     refuse(trace)
-    plant, found = trace.scenario.plant, {}
-    for group, part in measure.parts(trace).items():
-        found[group.name] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(group, plant)}
-    return found
+    return {
+        group.name: {m.name: float(m.formula(part)) for m in metrics() if m.fits(group)}
+        for group, part in measure.parts(trace).items()
+    }
 
 
 @metric("s")

@@ -5,7 +5,7 @@
     table.scenario(0), table.trace(0)          # what ran, and what it did, by running it again
 
 Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s), every metric of
-`metrics.score`, so of driven channels (null where the run failed or the metric is not for it, inf for "never"), how it
+`metrics.score` (null where the run failed or the metric is not for it, inf for "never"), how it
 failed if it did (`diverged_at` in s, `failure`), and from what to make it again (`versions`, `scenario`, both JSON).
 """
 

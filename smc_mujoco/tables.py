@@ -38,11 +38,12 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
 
     A run that failed says so. Only where there are several groups are they named in the titles.
     """
+    style.same_plant(list(traces.values()))
     plant = next(iter(traces.values())).scenario.plant
     values = {label: metric_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
     tables = []
     for group, heading in headings(plant).items():
-        fit = {m.name: m.unit_for(group.unit) for m in metrics() if m.fits(group, plant)}
+        fit = {m.name: m.unit_for(group.unit) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SHOWN.items() if name in fit}
         table = _table(", ".join(filter(None, (title, heading))))
         for head, name in shown.items():
@@ -70,15 +71,14 @@ def _heading(group: Group, names: Sequence[str]) -> str:
 
 
 def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
-    """The named metrics of the driven channels, of condition -> label -> trace.
+    """The named metrics of condition -> label -> trace: a table a metric, a line a label, a column a condition.
 
-    A table a metric, a line a label, a column a condition.
-
-    Of a single condition: one table, a column a metric.
+    Of a single condition: one table, a column a metric. What has no one value for any of the plants is left out.
     """
-    known = {m.name: m for m in metrics()}
-    plants = {trace.scenario.plant.unit: None for runs in traces.values() for trace in runs.values()}
-    units = {name: dict.fromkeys(known[name].unit_for(x) for x in plants) for name in names}
+    plants = {trace.scenario.plant: None for runs in traces.values() for trace in runs.values()}
+    known = {m.name: m for m in metrics() if not all(map(m.refusal, plants))}
+    names = [name for name in names if name in known]
+    units = {name: dict.fromkeys(known[name].unit_for(plant.unit) for plant in plants) for name in names}
     heads = {name: f"{name} ({' or '.join(units[name])})" for name in names}
     if len(traces) == 1:
         (runs,) = traces.values()

@@ -13,6 +13,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import cli, gl, show, tables
+from smc_mujoco.errors import ScenarioError
 from smc_mujoco.friction import Coulomb
 from smc_mujoco.metrics import metrics, score
 
@@ -357,7 +358,15 @@ def test_a_run_that_failed_has_no_answer():
     wild = smc.plant("duffing", alpha=-1e6, beta=0.0)
     runs = {"wild": smc.run(smc.Scenario(plant=wild, law="none", duration=0.1))}
     (table,) = tables.answers(("peak", "spread_bound"), {"nominal": runs})
-    assert [[str(cell) for cell in column.cells] for column in table.columns] == [["wild"], ["failed"], [""]]
+    shown = [["wild"], ["failed"]]  # and nothing of the spread, which a single mass has not
+    assert [[str(cell) for cell in column.cells] for column in table.columns] == shown
+
+
+def test_runs_with_other_kinds_of_channels_share_no_table():
+    cart = smc.run(smc.Scenario(plant="cart_pole", law="none", duration=0.1))
+    block = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.1))
+    with pytest.raises(ScenarioError, match="draw one plant at a time"):
+        tables.scores("both", {"cart": cart, "block": block})
 
 
 def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace, folder):

@@ -242,6 +242,14 @@ def test_a_pole_on_a_cart_has_metrics_of_its_own_in_its_own_unit(pole):
         pole.spread_bound  # noqa: B018
 
 
+def test_check_takes_metrics_of_a_group_by_its_name(pole):
+    pole.check(**{"free peak": 1.0, "free settling_time": 1.0})
+    with pytest.raises(AssertionError, match=r"^free peak is .* rad, not"):
+        pole.check(**{"free peak": 1e-6})
+    with pytest.raises(smc.ScenarioError, match="unknown metric 'free max_u'"):
+        pole.check(**{"free max_u": 1.0})
+
+
 def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
     golden.record(tmp_path / "a.json", "test", pole, None, {})
     golden.compare(tmp_path / "a.json", "test", pole, None, {})

@@ -341,6 +341,15 @@ def test_without_the_model_it_brings_the_crane_in_and_drops_the_pole():
     assert np.abs(pole.x[:, 1]).max() > math.pi / 2
 
 
+def test_a_law_that_drops_the_pole_settles_nothing_in_a_study(tmp_path):
+    """It may hold the cart meanwhile, where hierarchical moves it to catch the pole."""
+    laws = "hierarchical", "super_twisting"
+    table = smc.study([smc.Scenario(plant="cart_pole", law=law, duration=8.0) for law in laws], tmp_path)
+    assert smc.scores(table.trace(1))["driven"]["settling_time"] < 8.0
+    assert table.column("settling_time")[0] < 8.0
+    assert table.column("settling_time")[1] == math.inf
+
+
 def test_a_pole_past_the_singular_angle_is_lost():
     """At cos q = a L the control changes its direction on S."""
     limit = math.acos(LAW.a * LENGTH["cart_pole"])

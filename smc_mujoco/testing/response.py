@@ -25,8 +25,8 @@ TOLD = ("settling_time", "overshoot", "tv_rate")  # of the metrics, in one line
 class StepResponse:
     """What a law made of a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
 
-    Those are of the driven channels. `r.scores` has each group of channels by itself, as `smc.scores`: of the pole on a
-    cart, r.scores["free"]["settling_time"].
+    Where some joints have no actuator, `r.scores` has each group of channels by itself, as `smc.scores`: of the pole on
+    a cart, r.scores["free"]["ultimate_bound"]. In `check` its name is "free ultimate_bound".
 
     A run that failed has no metrics: to ask for one is a ScenarioError that says when and why it failed.
 
@@ -65,15 +65,16 @@ class StepResponse:
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """Every metric of each group of channels, by the group's name; raises as `metrics`."""
         return {
-            group: {name: Value(value, _label(group, name), self.limits) for name, value in values.items()}
+            group: {name: Value(value, self._label(group, name), self.limits) for name, value in values.items()}
             for group, values in scores(self.trace).items()
         }
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
-        """`metrics`, and those of other groups of channels by the group's name and theirs, "free peak"."""
-        others = {_label(group, name): value for group, each in self.scores.items() for name, value in each.items()}
-        return dict(self.metrics) | others
+        """`metrics`, and of several groups of channels those of each, by its name and theirs: "free peak"."""
+        groups = self.scores.items()
+        each = {self._label(group, name): value for group, values in groups for name, value in values.items()}
+        return dict(self.metrics) | each
 
     @mendable
     def __getattr__(self, name: str) -> float:
@@ -94,7 +95,7 @@ class StepResponse:
     def __repr__(self) -> str:
         how = f"failed, {self.failure}"
         if self.failure is None:
-            how = ", ".join(f"{name} {self._told(name)}" for name in TOLD)
+            how = ", ".join(f"{name} {self._told(name)}" for name in TOLD if name in self.metrics)
         return f"StepResponse({self}: {how})"
 
     def unit(self, name: str) -> str:
@@ -111,6 +112,11 @@ class StepResponse:
             return ScenarioError(CATALOGUE[name].refusal(self.scenario.plant))
         return unknown("metric", name, CATALOGUE)
 
+    def _label(self, group: str, metric: str) -> str:
+        """What a metric of a group is called in tables: by its name alone, where it is the one value of `metrics`."""
+        alone = len(groups(self.scenario.plant)) == 1
+        return metric if alone or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
+
     def tells(self, name: str) -> bool:
         """Whether one of the `values` says something of this run: some are of realistic mechanisms alone."""
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
@@ -119,9 +125,7 @@ class StepResponse:
         """Raise ScenarioError for names that are not among the `values` of this run."""
         plant = self.scenario.plant
         known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
-        known += [
-            _label(group.name, m.name) for group in groups(plant) for m in CATALOGUE.values() if m.fits(group, plant)
-        ]
+        known += [self._label(each.name, m.name) for each in groups(plant) for m in CATALOGUE.values() if m.fits(each)]
         for name in names:
             if name not in known:
                 raise self._unknown(name)
@@ -143,7 +147,7 @@ class StepResponse:
         self.named(limits)
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
-        asked = [bound(name, float(self.metrics[name]), wanted) for name, wanted in limits.items()]
+        asked = [bound(name, float(self.values[name]), wanted) for name, wanted in limits.items()]
         self.limits.extend(asked)
         missed = [limit for limit in asked if not limit.kept]
         if missed:
@@ -162,11 +166,6 @@ class StepResponse:
             kept = answer(all(limit.kept for limit in of)) if of else ""
             rows.append((name, self._told(name), ", ".join(limit.words for limit in of), kept))
         return table(("metric", "value", "limit", "ok"), rows)
-
-
-def _label(group: str, metric: str) -> str:
-    """What a metric of a group is called in tables; all know the driven channels' ones by their name alone."""
-    return metric if group == "driven" else f"{group} {metric}"
 
 
 def respond(
