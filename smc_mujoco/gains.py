@@ -16,8 +16,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from smc_mujoco.component import Component
-from smc_mujoco.errors import ScenarioError, find
+from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.law import law as find_law
+from smc_mujoco.plant import catalogue
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
@@ -83,13 +84,24 @@ def law(plant: str, name: str, gains: str = "tuned") -> Component:
     )
 
 
+def paper_plant(plant: object) -> str:
+    """The name of one of the paper's plants, which have conditions and gains; ScenarioError for any other plant."""
+    if isinstance(plant, str) and (plant in STUDY or plant not in catalogue()):
+        find("plant of the paper's study", plant, STUDY)
+        return plant
+    raise ScenarioError(
+        f"plant is {shown(plant)}, and the paper's plants, which have conditions and gains, are {', '.join(STUDY)}: "
+        "give one of these, or smc.study scenarios of your own"
+    )
+
+
 def file(plant: str, name: str, objective: str) -> Path:
     """Where the tuning of a law on a plant for an objective is kept."""
     return Path(__file__).parent / "tuned_gains" / objective / f"{plant}-{name}.json"
 
 
 def _study(plant: str, name: str, gains: str) -> Mapping[str, float]:
-    laws = find("plant of the paper's study", plant, STUDY)
+    laws = STUDY[paper_plant(plant)]
     return find("law of the paper's study", SAME.get(name, name), laws)
 
 
@@ -97,6 +109,6 @@ def _study(plant: str, name: str, gains: str) -> Mapping[str, float]:
 def _found(plant: str, name: str, gains: str) -> Mapping[str, float]:
     path = file(plant, name, OBJECTIVES[gains])
     if not path.is_file():
-        cure = f'tune it (smc-mujoco tune {plant} {name}) and give the law with its gains, or take the set "default"'
-        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant}: {cure}")
+        cure = f"give the law with gains of its own (smc-mujoco tune {plant} {name} finds them), or take default ones"
+        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant}: {cure} (--gains default)")
     return json.loads(path.read_text())["scenario"]["law"]["gains"]

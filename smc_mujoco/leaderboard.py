@@ -179,7 +179,7 @@ def leaderboard_table(boards: Sequence[Board]) -> "Table":
     for metric, unit in metrics.items():
         head = Text("\n" * (lines - metric.count("_")) + metric.replace("_", "\n"))
         head.append(f"\n{unit.format(x='x', u='u') or '%'}", "dim not bold")
-        table.add_column(head, justify="right")
+        table.add_column(head, justify="right", overflow="fold")  # no digit is cut off
     for group in dict.fromkeys(tuple(board.group.items()) for board in boards):
         own = {board.metric: board for board in boards if tuple(board.group.items()) == group}
         seeds = max(board.seeds for board in own.values())

@@ -160,7 +160,9 @@ def refuse(trace: Trace) -> None:
         why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
     else:
         return
-    raise ScenarioError(f"{label(trace)} has no score, {why}: change the gains or u_max, or end the run earlier")
+    fault = trace.failure is not None and "left the finite world" not in trace.failure  # of a law or a signal
+    cure = "mend that" if fault else "change the gains or u_max, or end the run earlier"
+    raise ScenarioError(f"{label(trace)} has no score, {why}: {cure}")
 
 
 def error(trace: Trace) -> np.ndarray:

@@ -133,7 +133,7 @@ def scenario(
     for name in changes:
         if name not in FIELDS:
             raise unknown("field of a Scenario", name, FIELDS)
-    find("plant of the paper's study", plant, GAINS)
+    sets.paper_plant(plant)
     found = sets.law(plant, law_name, "default" if law_name == "none" else gains)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
     conditioned = fields(condition, plant, duration)

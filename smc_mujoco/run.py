@@ -134,7 +134,7 @@ def _bytes(s: Scenario) -> int:
 
 
 def _listed(scenarios: object) -> list[Scenario]:
-    if not isinstance(scenarios, Iterable):
+    if isinstance(scenarios, str) or not isinstance(scenarios, Iterable):
         raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
     return list(scenarios)
 

@@ -29,8 +29,9 @@ def bench(
 ) -> None:
     """Compare laws on plants in conditions: every combination from every seed, to OUT/results.parquet.
 
-    Finished runs are kept: stop it whenever you like, start it again with the same options, and it goes on. Names are
-    those that `smc-mujoco list` shows. The whole grid is 7,200 runs of 10 s.
+    Finished runs are kept: stop it whenever you like, start it again with the same options, and it goes on. The table
+    is of the last command alone: give each study an --out of its own. Laws and conditions are those that `smc-mujoco
+    list` shows; `tuned` gains are there for the study's six laws, `default` ones for all. 7,200 runs of 10 s in all.
 
     Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 10 --out duffing
     """

@@ -31,7 +31,7 @@ def margins(
     json: Annotated[Path | None, typer.Option(help="Also write the margins to a .json file.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
-    """Find how much a law bears: the largest level at which the plant still ends within 5 % of where it began.
+    """Find how much a law bears: the largest level with which the error still ends below 5 % of the first.
 
     Constant disturbance and dry friction in N or N m, mass as a multiple of the nominal one, noise as the standard
     deviation of the position (the velocity's is 5/s of it), delay of the command in s. Theory is that of the loop

@@ -33,13 +33,13 @@ class StepResponse:
     Attributes:
       trace: the Trace of the run; `scenario` is its Scenario, `failure` what went wrong in it, or None.
       step: height of the step, rad or m.
-      condition: of the study, in which it was run.
+      condition: in which it was run: of the study, and what else the test gave, in words; "" for nothing.
       limits: what the test has asked of the metrics so far.
     """
 
     trace: Trace
     step: float
-    condition: str = "nominal"
+    condition: str = ""
     limits: list[Limit] = dataclasses.field(default_factory=list)
 
     @property
@@ -89,8 +89,9 @@ class StepResponse:
         return sorted({*super().__dir__(), *CATALOGUE})
 
     def __str__(self) -> str:
-        plant, where = self.scenario.plant, "" if self.condition == "nominal" else f", {self.condition}"
-        return f"{plant.name} under {self.scenario.law}, step {self.step:g} {plant.unit}{where}"
+        plant = self.scenario.plant
+        step = f"{plant.name} under {self.scenario.law}, step {self.step:g} {plant.unit}"
+        return ", ".join(filter(None, (step, self.condition)))
 
     def __repr__(self) -> str:
         how = f"failed, {self.failure}"
@@ -199,4 +200,5 @@ def respond(
     name = plant.name if isinstance(plant, Plant) else plant
     of_study = paper.fields(condition, str(name), number("duration", given.get("duration", paper.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
-    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=condition)
+    told = [condition] * (condition != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
+    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(told))
