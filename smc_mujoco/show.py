@@ -1,5 +1,6 @@
 """What the commands do: a scene from its declaration to files, a trace in the terminal, the catalogues."""
 
+import itertools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -12,7 +13,6 @@ from smc_mujoco.chunk import contents
 from smc_mujoco.compiled import NotCompilable
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
-from smc_mujoco.groups import cut
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import catalogue as plants
 from smc_mujoco.progress import bar
@@ -151,18 +151,18 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
 
 
 def summary(trace: Trace, console: Console) -> None:
-    """What a trace is of, the course of the first channel of each group, and its scores."""
+    """What a trace is of, the course of its channels, where a group has many of its first one, and its scores."""
     s = trace.scenario
     console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
-    if s.plant.network:
-        console.print(f"channel 1 of {s.plant.n}:")
     for group, heading in tables.headings(s.plant).items():
         if heading:
             console.print(f"{heading}:", highlight=False, markup=False)
-        part = cut(trace, group)
-        for name in ("x", "v", *("u", "s") * group.driven, *["reaction"] * bool(part.reaction.any())):
-            column = getattr(part, name)[:, 0]
-            line = f"{name} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
+        channels = list(group.channels if len(group.channels) <= tables.MOST else group.channels[:1])
+        rubs = trace.reaction[:, channels].any()
+        for name, i in itertools.product(("x", "v", *("u", "s") * group.driven, *["reaction"] * bool(rubs)), channels):
+            column = getattr(trace, name)[:, i]
+            label = f"{name}{i}" if s.plant.n > 1 else name  # as columns of an export are called
+            line = f"{label} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
             console.print(line, highlight=False, soft_wrap=True)
     if trace.failure:
         console.print(f"failed: {trace.failure}", style="red", highlight=False, markup=False)
