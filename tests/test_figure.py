@@ -1,6 +1,7 @@
 """Figures: readable, small, and honest about what failed."""
 
 import dataclasses
+import itertools
 import re
 import xml.etree.ElementTree as ET
 
@@ -12,6 +13,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco import plain
 from smc_mujoco.draw import charts, envelope, panels, rows, style
+from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.friction import Coulomb
 from smc_mujoco.trace import ARRAYS
@@ -253,10 +255,69 @@ def test_what_does_not_chatter_is_drawn_as_it_is():
     assert np.abs(np.diff(np.sign(y))).sum() == np.abs(np.diff(np.sign(slow))).sum()
 
 
+def triangle(y: np.ndarray, half: int) -> np.ndarray:
+    """Each mean of y that is whole, with weights 1, 2, ... half, ... 2, 1."""
+    weights = np.convolve(np.ones(half), np.ones(half))
+    return np.convolve(y, weights / weights.sum(), "valid")
+
+
+def switching(lengths) -> np.ndarray:
+    """+-6, each held as long as told."""
+    return np.concatenate([np.full(n, 6.0 if i % 2 else -6.0) for i, n in enumerate(lengths)])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_than_the_window(seed):
+    rng = np.random.default_rng(seed)
+    within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])  # 40: the window
+    u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
+    (part,) = envelope.stretches(u, 40)
+    assert (part.start, part.stop) == (300, 300 + len(within))
+    mean, line = triangle(within, 20), envelope.smooth(u, 40)
+    np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)
+    np.testing.assert_allclose(line[300:319], mean[0])  # no needle where it begins, no dip where it ends
+    np.testing.assert_allclose(line[-319:-300], mean[-1])
+    assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
+
+
+def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
+    u = switching([400, *[1, 2, 2, 1] * 100, 39])
+    line = envelope.smooth(u, 40)
+    assert (line[:400] == -6.0).all()
+    np.testing.assert_allclose(line[-20:], triangle(u, 20)[-1])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_line_is_the_same_read_backwards(seed):
+    rng = np.random.default_rng(seed)
+    u = switching(rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03]))
+    u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
+    np.testing.assert_allclose(envelope.smooth(u[::-1], 40)[::-1], envelope.smooth(u, 40), atol=1e-12)
+
+
+def test_steps_without_chatter_and_swings_slower_than_the_window_are_their_own_lines():
+    t = np.arange(3001) * 1e-3
+    for u in (np.where(t < 1.0, -6.0, 6.0), switching([500, 3, 500, 30, 500]), np.sin(2 * np.pi * 4 * t)):
+        assert (envelope.smooth(u, 40) == u).all()
+
+
+def test_the_line_of_a_late_and_noisy_control_stays_within_its_means():
+    late = {"input_delay": 0.005, "noise": smc.Noise(0.01, 0.05), "duration": 3.0}
+    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law=smc.law("classical", k=6.0, c=8.0), **late))
+    t, u = panels.curve(trace, trace.u[:, 0], "u")
+    assert np.ptp(trace.u[500:]) == 12.0
+    assert np.abs(u[t > 0.5]).max() < 2.0
+
+
 def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
     chattering = runs(duration=1.5)
-    assert "band: range of u, s, line: mean over 40 ms" in words(figure(chattering, tmp_path / "a")[0])
-    assert "band: range of u, line: mean over 40 ms" in words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
+    text = words(figure(chattering, tmp_path / "a")[0])
+    alone = words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
+    assert "band: range of u, s" in text
+    assert "band: range of u" in alone
+    assert "band: range of u, s" not in alone
+    assert "line: mean over 40 ms where it chatters" in text
+    assert "line: mean over 40 ms where it chatters" in alone
     assert "band:" not in words(figure(pair, tmp_path / "c")[0])
 
 
@@ -312,3 +373,50 @@ def test_a_realistic_run_that_fails_at_once_is_drawn(tmp_path):
     rubbed = realistic(friction=Coulomb(0.5), duration=1.0)
     for at in (0, 1, 400):
         figure([broken(rubbed, at)], tmp_path / "a")
+
+
+def test_one_trace_is_drawn_like_a_list_of_one(pair, tmp_path):
+    alone, listed = figure(pair[0], tmp_path / "a"), figure(pair[:1], tmp_path / "b")
+    assert alone[0].read_bytes() == listed[0].read_bytes()
+    assert signals(pair[0], tmp_path / "c", ["all"])[0].stat().st_size
+
+
+@pytest.mark.parametrize("level", [-0.596, 0.0])
+def test_the_close_up_shows_no_round_off(pair, level):
+    """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
+    held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
+    ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
+    for u in (ends, held, np.full_like(held, level)):
+        ax = Figure().subplots()
+        panels.last_samples(ax, [dataclasses.replace(pair[0], u=u)], ["#000000"])
+        low, high = ax.get_ylim()
+        assert high - low >= 0.0199 * np.abs(u).max()
+        assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
+    full = Figure().subplots()
+    panels.last_samples(full, [dataclasses.replace(pair[0], u=np.sign(held - level))], ["#000000"])
+    assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
+
+
+def test_names_of_axes_never_touch(tmp_path, monkeypatch):
+    pages = []
+    monkeypatch.setattr(draw_figure, "_write", lambda page, base: pages.append(page))
+    parts = {"friction": Coulomb(0.05), "actuator": smc.DCMotor(), "duration": 0.2}
+    figure([realistic(plant="pendulum_network", **parts)], tmp_path / "a")
+    figure([realistic(**parts)], tmp_path / "a")
+    figure(runs(duration=0.2), tmp_path / "a")
+    for page in pages:
+        page.draw_without_rendering()
+        left = [ax for ax in page.axes if ax.get_subplotspec().is_first_col() and ax.get_position().x0 < 0.2]
+        spans = [ax.yaxis.label.get_window_extent() for ax in left]
+        assert len(spans) >= 3
+        assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(spans))
+
+
+def test_where_a_joint_is_is_drawn_as_it_is(pair):
+    """x that chatters has no mean for a line: the legend speaks of none."""
+    t, ripple = pair[0].t, 0.01 * np.where(np.arange(len(pair[0].t)) % 2, 1.0, -1.0)
+    x = np.exp(-t / 0.02) + ripple
+    for name in ("x", "spread"):
+        _, y = panels.curve(pair[0], x, name)
+        assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
+    assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9

@@ -228,6 +228,15 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
+def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
+    (trace,) = runs(laws=LAWS[:1], duration=0.1)
+    for name, given in (("a.png", trace), ("b.png", [trace])):
+        video.still(given, 0.05, tmp_path / name, size=SIZE)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert video.film(trace, tmp_path / "a.mp4", size=SIZE).stat().st_size
+    assert video.clip(trace, tmp_path / "a.webp", size=SIZE).stat().st_size
+
+
 def test_camera_sees_all_points_as_near_as_it_can():
     points = np.random.default_rng(0).uniform((-3, 0, 0), (3, 2, 1), (200, 3))
     turn = np.array([[1.0, 0, 0], [0, 0.3, -(0.91**0.5)], [0, 0.91**0.5, 0.3]])

@@ -21,6 +21,7 @@ DPI = 100
 FAINT = 0.16  # opacity of what is still to come
 LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
 GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one where there are two
+CHATTERING = " where it chatters"
 CURSOR = np.array(style.rgb(style.MUTED))
 
 
@@ -106,13 +107,11 @@ def draw_axes(axes: Sequence[Axes], charts: Sequence[tuple[str, Group, list[Trac
         name = f"control u ({unit})" if quantity == "u" else f"{style.quantity(group)} {style.letter(group)} ({unit})"
         words = note(n, panels.mean_window(parts), band=True) if quantity == "u" else note(n)
         room = ax.get_window_extent().width - style.width(name, 11 * point, bold=True) - 15 * point
-        if len(charts) > 2:  # they are narrow: what the band is goes without saying before what the line is
-            shorter = (words, words.partition(", ")[2], "")
-            words = next(text for text in shorter if not text or style.width(text, 9.5 * point) <= room)
+        brief = words.replace(CHATTERING, "")  # in a narrow chart, what the band is goes before what the line is
+        shorter = (words, brief, brief.partition(", ")[2], "")
+        words = next(text for text in shorter if not text or style.width(text, 9.5 * point) <= room)
         ax.set_title(name)
-        ax.set_title(
-            style.cropped(words, room, 9.5 * point), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED
-        )
+        ax.set_title(words, loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         ax.set_xlim(0.0, end)
         ax.set_xlabel("time (s)", labelpad=2)
         ax.tick_params(length=0)
@@ -121,7 +120,7 @@ def draw_axes(axes: Sequence[Axes], charts: Sequence[tuple[str, Group, list[Trac
 def note(n: int, window: float | None = None, band: bool = False) -> str:
     """What is drawn of n channels, where a line is a mean over them or over a window of time in s."""
     over = [f"of {n}"] if n > 1 else []
-    over += [f"over {1e3 * window:.3g} ms"] if window else []
+    over += [f"over {1e3 * window:.3g} ms{CHATTERING}"] if window else []
     if not over:
         return ""
     single = len(panels.light(n))
@@ -143,6 +142,6 @@ def frame(ax: Axes, height: int) -> tuple[int, int, int, int]:
 
 def path(ax: Axes, trace: Trace, name: str, height: int) -> tuple[np.ndarray, np.ndarray]:
     """Where a trace's dot is: times in s and px from the top, kept within the frame."""
-    t, y = panels.curve(trace, panels.QUANTITIES[name](trace).mean(axis=1))
+    t, y = panels.curve(trace, panels.QUANTITIES[name](trace).mean(axis=1), name)
     y = np.clip(y, *ax.get_ylim())
     return t, height - ax.transData.transform(np.column_stack([t, y]))[:, 1]

@@ -15,7 +15,7 @@ from smc_mujoco.trace import ARRAYS, Trace
 
 WINDOW = 0.01, 40  # what a mean is taken over: so much of the run, at least so many samples; chosen, see `window`
 STILL = 2e-3  # of the largest value: a smaller step from sample to sample is no move of a chattering signal
-REVERSALS = 6  # this many in a row are chattering, if each comes within a quarter of a window from the last
+REVERSALS = 6  # this many in a row are chattering, if they follow each other within a quarter of a window
 POINTS = 250  # of a line: its least and largest value in each is kept
 
 
@@ -80,33 +80,53 @@ def window(trace: Trace) -> int:
 
 
 def stretches(y: np.ndarray, width: int) -> list[slice]:
-    """Where y (K+1,) chatters: from the first to the last of many reversals that follow each other closely."""
-    near, step = width // 4, np.diff(y)
+    """Where y (K+1,) chatters; elsewhere, as under saturation on the way to a surface, it is its own line.
+
+    A move is a step from one sample to the next of more than STILL of the largest |y|, a reversal two moves in a row of
+    opposite signs. Reversals follow each other within n samples if neither the value held in one nor the way to the
+    next takes longer. Chattering is REVERSALS of them within a quarter of the width, with all that follow each other
+    within the width before and after: from the first of their moves to the last, and to an end of y that is as near.
+    The rule is the same read backwards.
+    """
+    step = np.diff(y)
     moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
-    turns = moves[1:][np.sign(step[moves[1:]]) != np.sign(step[moves[:-1]])]
-    groups = np.split(turns, np.flatnonzero(np.diff(turns) > near) + 1)
-    ends = [(group[0] + 1, group[-1] + 1) for group in groups if len(group) >= REVERSALS]
-    return [slice(a if a > near else 0, b if b < len(y) - near else len(y)) for a, b in ends]
+    turns = np.flatnonzero(np.diff(np.sign(step[moves])))
+    first, last = moves[turns], moves[turns + 1]
+    seeds = [part for part in _following(first, last, width // 4) if len(part) >= REVERSALS]
+    starts = np.array([first[part[0]] for part in seeds])
+    found = []
+    for part in _following(first, last, width):
+        a, b = first[part[0]] + 1, last[part[-1]] + 1
+        if ((starts + 1 >= a) & (starts < b)).any():
+            found.append(slice(a if a > width else 0, b if b < len(y) - width else len(y)))
+    return found
+
+
+def _following(first: np.ndarray, last: np.ndarray, near: int) -> list[np.ndarray]:
+    """The reversals, from move `first` to move `last`, by number: those together that follow each other."""
+    brief = np.flatnonzero(last - first <= near)
+    parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
+    return [part for part in parts if len(part)]
 
 
 def smooth(y: np.ndarray, width: int) -> np.ndarray:
     """y (K+1,), replaced where it chatters by its mean over `width` samples, the nearer ones weighing more.
 
     It is the mean of means over half the width each: a triangle, which leaves far less of a periodic signal than one
-    mean does.
+    mean does. Within half a width of a stretch's ends it is that of the nearest whole triangle; in a stretch shorter
+    than the width, one triangle as long as the stretch.
     """
     line = y.astype(float)
     for part in stretches(y, width):
-        line[part] = running(running(line[part], width // 2), width // 2)
+        half = min(width // 2, (part.stop - part.start + 1) // 2)
+        line[part] = np.pad(running(running(line[part], half), half), half - 1, "edge")
     return line
 
 
 def running(y: np.ndarray, width: int) -> np.ndarray:
-    """Mean of y (K,) over windows of `width` samples; towards its ends they shrink about their middles, to a half."""
-    total, i = np.concatenate([[0.0], np.cumsum(y)]), np.arange(len(y))
-    size = np.minimum(2 * np.clip(np.minimum(i, len(y) - i), width // 4, width // 2), len(y))
-    start = np.clip(i - size // 2, 0, len(y) - size)
-    return (total[start + size] - total[start]) / size
+    """Mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
+    total = np.concatenate([[0.0], np.cumsum(y)])
+    return (total[width:] - total[:-width]) / width
 
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:

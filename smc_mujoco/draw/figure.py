@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from smc_mujoco import metrics
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.envelope import end, finite
-from smc_mujoco.draw.rows import REALISM, Row, axis, rows_of
+from smc_mujoco.draw.rows import REALISM, Row, axis, rows_of, titles
 from smc_mujoco.draw.state import HOLD
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
@@ -26,11 +26,12 @@ from smc_mujoco.trace import Trace
 
 WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
 DPI = 150
+HEAD = 1.2  # inches: above and below the panels
 LETTERS = 11  # points, of the legend
 
 
 def figure(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     path: str | os.PathLike,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -43,6 +44,7 @@ def figure(
     which is marked; the instant at which a plant changes is marked too.
 
     Args:
+      traces: several, or a single one.
       path: without an ending, or with .svg or .png, which give way to both.
       labels: one a trace, shown as it is; default: the laws' names.
       title: default: the plant's name.
@@ -54,7 +56,8 @@ def figure(
       ScenarioError: no traces, several plants, another ending, or a path that cannot be written.
     """
     base = _base(path)
-    names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
+    traces = style.same_plant(traces)
+    names, colours = style.labels(traces, labels), style.colours(traces)
     traces = [finite(trace) for trace in traces]
     rows, held = rows_of(traces), [panels.rests(trace) for trace in traces]
     with style.page():
@@ -79,7 +82,7 @@ def figure(
 
 
 def signals(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     path: str | os.PathLike,
     labels: Sequence[str],
     title: str | None = None,
@@ -92,7 +95,8 @@ def signals(
     Returns, raises: as `figure`; also ScenarioError for two traces of one law under one condition, or u in two units.
     """
     base = _base(path)
-    given = style.labels(style.same_plant(traces), labels)
+    traces = style.same_plant(traces)
+    given = style.labels(traces, labels)
     traces = [finite(trace) for trace in traces]
     cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
     if len(cells) < len(traces):
@@ -101,19 +105,20 @@ def signals(
     if others:
         raise ScenarioError(f"u of {traces[0].scenario.plant.name} has several units: draw it with smc.figure")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
+    colours = dict(zip(laws, style.law_colours(laws), strict=True))
     with style.page():
         page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
         axes = page.subplots(len(laws), len(conditions), sharex=True, sharey=True, squeeze=False)
         room = 72 * WIDTH / len(conditions)  # points, a column's width
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
-            panels.over_time(ax, [cut(trace, group)], [style.law_colour(law)], "u", group)
+            panels.over_time(ax, [cut(trace, group)], [colours[law]], "u", group)
             panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
             ax.set_title(_variation(trace, group), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
         for law, ax in zip(laws, axes[:, 0], strict=True):
             ax.set_ylabel(axis(Row("u", group, traces), "u").replace("control ", ""))
             words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
-            ax.set_title(words, color=style.law_colour(law), parse_math=False)
+            ax.set_title(words, color=colours[law], parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
             words = style.cropped(condition, 0.85 * room, 13)
             place = (0.5, 1.0), (0, 22), "axes fraction", "offset points"
@@ -132,14 +137,15 @@ def _overview(
 ) -> None:
     """The quantities over time, one below the other."""
     column, axes = place.subgridspec(len(rows), 1), []
-    for i, row in enumerate(rows):
+    pitch = 72 * (page.get_figheight() - HEAD) / len(rows)
+    for i, (row, words) in enumerate(zip(rows, titles(rows, pitch), strict=True)):
         ax = page.add_subplot(column[i], sharex=axes[0] if axes else None)
         axes.append(ax)
         if row.name == "x":
             panels.target(ax, row.traces)
         panels.over_time(ax, row.traces, colours, row.name, row.group)
         panels.jumps(ax, changes, named=ax is axes[0])
-        ax.set_ylabel(axis(row, row.name))
+        ax.set_ylabel(words)
         ax.tick_params(labelbottom=row is rows[-1])
     axes[-1].set_xlabel("time (s)")
     axes[-1].set_xlim(0.0, end(rows[0].traces))
@@ -198,9 +204,12 @@ def _meaning(driven: Sequence[Sequence[Trace]], names: str) -> list[Line2D | Pat
     """What the bands and the lines of the named quantities are, where they need words."""
     n = max(traces[0].x.shape[1] for traces in driven)
     over = max(filter(None, map(panels.mean_window, driven)), default=None)
-    words = [] if over is None and n == 1 else [f"band: range of {names}"]
-    words += [f"line: mean over {1e3 * over:.3g} ms"] if over else []
-    handles: list[Line2D | Patch] = [Patch(color=style.MUTED, alpha=0.3, label=", ".join(words))] if words else []
+    handles: list[Line2D | Patch] = []
+    if over or n > 1:
+        handles.append(Patch(color=style.MUTED, alpha=0.3, label=f"band: range of {names}"))
+    if over:
+        words = f"line: mean over {1e3 * over:.3g} ms where it chatters"
+        handles.append(Line2D([], [], color=style.MUTED, lw=1.5, label=words))
     if n > 1:
         shown = len(panels.light(n))
         which = "single channels" if shown == n else f"{shown} of {n} channels"

@@ -20,6 +20,7 @@ from smc_mujoco.trace import Trace
 
 COLUMNS = 360  # of a panel
 LAST = 60  # control samples in the close-up of u
+LEAST = 0.02  # of the largest |u| of the runs: the close-up is no less high, so that it shows no round-off; chosen
 LIGHT = 9  # channels of a network drawn one by one
 BRIEF = 0.98  # of a run: a reaction that is larger for the rest of it is blows; chosen
 MARKED = 12  # rests in a phase portrait
@@ -46,9 +47,10 @@ def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace,
     return [(trace, colours[i], 0.5 * i) for i, trace in reversed(list(enumerate(traces)))]
 
 
-def curve(trace: Trace, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The line of a signal y (K+1,) on paper. Few samples are drawn as they are."""
-    return line(trace.t, y, window(trace)) if smoothed(trace) else (trace.t, y)
+def curve(trace: Trace, y: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """The line of a quantity y (K+1,) on paper. Few samples are drawn as they are, and so is where a joint is."""
+    width = 0 if name in ("x", "spread") else window(trace)
+    return line(trace.t, y, width) if smoothed(trace) else (trace.t, y)
 
 
 def smoothed(trace: Trace) -> bool:
@@ -79,8 +81,8 @@ def over_time(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], name: s
         drawn.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1:
             for i in light(y.shape[1]):
-                drawn += ax.plot(*curve(trace, y[:, i]), color=colour, alpha=0.3, lw=0.8, drawstyle=held)
-        drawn += ax.plot(*curve(trace, mean), color=colour, lw=1.5 + wider, drawstyle=held)
+                drawn += ax.plot(*curve(trace, y[:, i], name), color=colour, alpha=0.3, lw=0.8, drawstyle=held)
+        drawn += ax.plot(*curve(trace, mean, name), color=colour, lw=1.5 + wider, drawstyle=held)
         if trace.diverged_at is not None:
             last = np.clip(mean[-1], *ax.get_ylim())
             drawn += ax.plot(trace.t[-1], last, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
@@ -167,7 +169,10 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> N
     if all(trace.diverged_at is not None for trace in traces):
         ax.text(0.5, 0.5, "no run lasted", transform=ax.transAxes, ha="center", color=style.MUTED)
     ax.set_xlim(1e3 * (begin - stop), 0.0)
-    ax.margins(y=0.12)
+    low, high = ax.dataLim.intervaly
+    if low <= high:
+        half = max(0.62 * (high - low), LEAST / 2 * max(map(abs, span(traces, "u")))) or 1.0
+        ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
 
 
 def light(n: int) -> np.ndarray:

@@ -6,6 +6,7 @@ Down and to the left is better. Of the gains that a search tried, a front has th
 that it tried lies below the staircase. The chosen gains are where the objective is least, see `objective`.
 """
 
+import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,7 +40,8 @@ def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None 
     with style.page():
         page = figure._page(HEIGHT)
         ax = page.subplots()
-        handles = [_front(ax, one, MARKS[i % len(MARKS)]) for i, one in enumerate(best)]
+        looks = zip(best, itertools.cycle(MARKS), style.law_colours([one.law.name for one in best]), strict=False)
+        handles = [_front(ax, *look) for look in looks]
         ax.set(xscale="log", yscale="log")
         ax.set_xlabel("tracking: ITAE / |x₀|, summed over conditions (s²)")
         ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
@@ -55,9 +57,9 @@ def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None 
         return figure._write(page, base)
 
 
-def _front(ax: Axes, tuned: Tuned, mark: str) -> Line2D:
+def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     """Draw a law's front with its chosen gains; what the legend says of it."""
-    colour, words = style.law_colour(tuned.law.name), style.law_name(tuned.law.name)
+    words = style.law_name(tuned.law.name)
     if not tuned.front:
         return Line2D([], [], color=colour, lw=3, label=f"{words}: every run failed")
     x = [one.tracking for one in tuned.front]

@@ -1,5 +1,6 @@
 """What an overview shows over time: quantities of groups of channels, one a row, and what their axes are called."""
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ from smc_mujoco.groups import Group
 from smc_mujoco.trace import Trace
 
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
+GAP = 4  # points, between the names of two axes
 
 
 class Row(NamedTuple):
@@ -34,6 +36,14 @@ def rows_of(traces: Sequence[Trace]) -> list[Row]:
     for group, parts in shown.items():
         rows += [Row("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
     return rows + [Row("s", group, parts) for group, parts in driven.items()]
+
+
+def titles(rows: Sequence[Row], pitch: float) -> list[str]:
+    """The axes' names of rows `pitch` points apart: of two that would touch, the units stand on a second line."""
+    words = [axis(row, row.name) for row in rows]
+    wide = [style.width(text, style.RC["font.size"]) for text in words]
+    close = {i for i, (a, b) in enumerate(itertools.pairwise(wide)) if (a + b) / 2 > pitch - GAP}
+    return [text.replace(" (", "\n(") if {i - 1, i} & close else text for i, text in enumerate(words)]
 
 
 def axis(row: Row, name: str) -> str:

@@ -25,7 +25,10 @@ COLOURS = {
     "adaptive_leak": "#56B4E9",
     "none": "#6E7781",
 }
-OTHERS = ("#8C5A2B", "#1A936F", "#B5179E", "#3D405B", "#7F9C1E")  # chosen: apart from those above
+# Of a grid of colours those farthest in CIEDE2000 from the ones above, from each other and from what else is drawn,
+# as seen by most eyes (18 and more) and with any colour blindness (7.5; red or green 9). A just noticeable difference
+# is about 1, and the closest two above are at 16 and 6.
+OTHERS = ("#005A3C", "#960000", "#96B469", "#78784B", "#B42D69", "#7887FF")
 NAMES = {  # a law of your own is called as you call it
     "observer_free": "Observer-free",
     "classical": "Classical",
@@ -87,7 +90,12 @@ def law_colour(law: str) -> str:
 
 def colours(traces: Sequence[Trace]) -> list[str]:
     """One colour a trace: its law's, or another where an earlier trace has taken that."""
-    wanted = [law_colour(trace.scenario.law.name) for trace in traces]
+    return law_colours([trace.scenario.law.name for trace in traces])
+
+
+def law_colours(laws: Sequence[str]) -> list[str]:
+    """One colour for each of these laws in one picture: its own, or another where an earlier one has taken that."""
+    wanted = [law_colour(law) for law in laws]
     free = [c for c in (*OTHERS, *COLOURS.values()) if c not in wanted]
     given: list[str] = []
     for colour in wanted:
@@ -159,12 +167,13 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
     return text if cut == text else f"{cut.rstrip()}…"
 
 
-def same_plant(traces: Sequence[Trace]) -> Sequence[Trace]:
-    """The traces, if they can share axes.
+def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
+    """The traces, or the single one, if they can share axes.
 
     Raises:
       ScenarioError: none, or of several plants.
     """
+    traces = [traces] if isinstance(traces, Trace) else list(traces)
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
     plants = sorted({trace.scenario.plant.name for trace in traces})

@@ -36,7 +36,7 @@ Report = Callable[[int], None]
 
 
 def film(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     path: str | os.PathLike,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -47,6 +47,7 @@ def film(
     """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
 
     Args:
+      traces: several, or a single one.
       labels: one a trace; default: the laws' names.
       title: default: the plant's name.
       size: width and height in px, even.
@@ -111,7 +112,7 @@ def deaf() -> Iterator[None]:
 
 
 def clip(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     path: str | os.PathLike,
     labels: Sequence[str] | None = None,
     title: str | None = None,
@@ -141,7 +142,7 @@ def clip(
 
 
 def still(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     time: float,
     path: str | os.PathLike,
     labels: Sequence[str] | None = None,
@@ -160,23 +161,24 @@ def still(
     return path
 
 
-def clock(traces: Sequence[Trace], fps: float) -> np.ndarray:
+def clock(traces: Trace | Sequence[Trace], fps: float) -> np.ndarray:
     """The times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
-    style.same_plant(traces)
+    traces = style.same_plant(traces)
     if not 1.0 <= fps <= 120.0:
         raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
     return np.arange(int(end(traces) * fps + 1e-6) + 1) / fps
 
 
 def frames(
-    traces: Sequence[Trace],
+    traces: Trace | Sequence[Trace],
     times: np.ndarray,
     labels: Sequence[str] | None,
     title: str | None,
     size: tuple[int, int],
 ) -> Generator[np.ndarray]:
     """The film's pictures at the given times, each (height, width, 3) uint8."""
-    names, colours = style.labels(style.same_plant(traces), labels), style.colours(traces)
+    traces = style.same_plant(traces)
+    names, colours = style.labels(traces, labels), style.colours(traces)
     if len(traces) > MOST:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MOST}")
     if any(side % 2 or not low <= side <= high for side, low, high in zip(size, LEAST, LARGEST, strict=True)):
