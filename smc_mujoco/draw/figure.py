@@ -76,7 +76,7 @@ def figure(
         panels.last_samples(close, first.traces, colours)
         close.set_xlabel("time before the end (ms)")
         several = traces[0].scenario.plant.driven > 1
-        close.set_ylabel(f"control u ({style.units(first.group)['u']})" + (", channel 1" if several else ""))
+        close.set_ylabel(f"control u ({style.units(first.group)['u']})" + (", channel 0" if several else ""))
         _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours, rows))
         return _write(page, base)
 
