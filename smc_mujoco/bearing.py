@@ -35,7 +35,7 @@ class Kind:
       put: a scenario with a level of it.
       none: the level at which there is none.
       periods: whether a level is a whole number of control periods.
-      theory: the largest level by linear theory, or None where there is none.
+      theory: the largest level by linear theory, or None where there is none; it may refuse the plant.
     """
 
     unit: str
@@ -58,6 +58,13 @@ class Kind:
         if not self.periods:
             return level
         return max(1, round(level / base.control_period)) * base.control_period
+
+    def expected(self, base: Scenario) -> float | None:
+        """The largest level by linear theory; None where that has nothing to say of the law or the plant."""
+        try:
+            return self.theory(base)
+        except ScenarioError:
+            return None
 
 
 def bears(trace: Trace) -> bool:
@@ -85,6 +92,11 @@ def _at_rest(base: Scenario) -> float | None:
     return theory.borne(base.plant, base.law, most, min(base.limits))
 
 
+def _heavier(base: Scenario, level: float) -> Scenario:
+    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"  # which has two names
+    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level * base.mismatch.get(mass, 1.0)})
+
+
 SPECS: dict[str, Kind] = {
     "delay": Kind(
         unit="s",
@@ -108,7 +120,7 @@ SPECS: dict[str, Kind] = {
     "mass": Kind(
         unit="1",
         levels=tuple(float(factor) for factor in np.geomspace(1.0, HEAVIEST, 10)[1:]),
-        put=lambda base, level: dataclasses.replace(base, mismatch=dict(base.mismatch) | {"mass": level}),
+        put=_heavier,
         none=1.0,
     ),
     "noise": Kind(

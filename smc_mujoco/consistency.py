@@ -7,12 +7,12 @@ from smc_mujoco import given
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.frozen import frozen
 from smc_mujoco.law import fits
+from smc_mujoco.own_channels import RECORDED, within
 from smc_mujoco.signals import Impulse, OrnsteinUhlenbeck
 
 if TYPE_CHECKING:
     from smc_mujoco.scenario import Scenario
 
-BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
 MOST_STEPS = 100_000_000  # per run: minutes of computing
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
@@ -22,7 +22,8 @@ def check(scenario: "Scenario") -> None:
     check_clock(scenario)
     check_signals(scenario)
     check_law(scenario)
-    check_start(scenario)
+    within(scenario.plant.name, scenario.plant.ranges, scenario.x0)
+    check_names(scenario)
     check_mechanism(scenario)
 
 
@@ -86,22 +87,17 @@ def check_law(s: "Scenario") -> None:
         )
 
 
-def check_start(s: "Scenario") -> None:
-    """Every channel of a user's own model starts within its joint's range."""
-    for (joint, low, high), x in zip(s.plant.ranges, s.x0, strict=False):
-        if not low - BEYOND <= x <= high + BEYOND:
-            raise ScenarioError(
-                f"x0 of joint {joint!r} of {s.plant.name} is {x:g}, outside its range from {low:g} to {high:g}: "
-                "give another x0"
-            )
+def check_names(s: "Scenario") -> None:
+    """A run that is to be names no parameter twice."""
+    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
+        twice = "mass" in factors and s.plant.mass in factors and s.plant.mass != "mass"
+        if twice and not RECORDED.get():
+            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
+            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
 
 
 def check_mechanism(s: "Scenario") -> None:
     """The integrator takes the parts' states, and mechanism and contact all parameters of the run."""
-    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
-        if "mass" in factors and s.plant.mass in factors and s.plant.mass != "mass":
-            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
-            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
     if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
         raise ScenarioError(
             f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"

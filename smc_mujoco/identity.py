@@ -7,6 +7,7 @@ from typing import Any
 
 from smc_mujoco import fingerprint, paper, record, source
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.own_channels import recorded
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
 
@@ -95,9 +96,12 @@ def _conditions(plant: Plant, duration: float) -> dict[str, str]:
     for name in paper.CONDITIONS:
         try:
             given = paper.fields(name, plant.name, duration)
-            common = {"plant": plant, "law": "none", "duration": duration}
-            chosen: dict[str, Any] = common | {"control_period": paper.CONTROL_PERIOD, "u_max": paper.U_MAX} | given
-            scenario = Scenario(**chosen)
+            common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
+            common |= {"control_period": paper.CONTROL_PERIOD}
+            if not plant.limits:  # else it is what its motors give, unless somebody says another
+                common |= {"u_max": paper.U_MAX}
+            with recorded():  # nor is it to be run: the start that its model has may be outside a joint's range
+                scenario = Scenario(**common | given)
         except ScenarioError:  # it is not for this plant, or for runs as short as this
             continue
         found.setdefault(_compared(described(scenario)), name)

@@ -48,7 +48,8 @@ def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
       factors: parameter name -> factor, for the true plant of a mismatch; None: the nominal one.
 
     Raises:
-      ScenarioError: channels without an actuator, of unlike inertia or damping, or coupled otherwise than by springs.
+      ScenarioError: channels without an actuator, of two units, of unlike inertia or damping, or coupled otherwise
+        than by springs.
     """
     return _linear(plant, frozen(factors or {}))
 
@@ -60,7 +61,7 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
     n, p = plant.n, SimpleNamespace(**vars(plant.values(factors)))
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
-    if plant.underactuated or g.min() <= 0.0 or np.ptp(g) > SAME * g.max():
+    if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > SAME * g.max():
         raise ScenarioError(
             f"{plant.name} has no theory here: give a plant with an actuator on each of its like joints"
         )

@@ -136,8 +136,7 @@ class _Search:
     @property
     def steps(self) -> int:
         """Simulated steps of a run, as `run` reports them."""
-        scenario = self.scenario(self.levels[0])
-        return scenario.samples * scenario.steps * scenario.plant.n
+        return self.scenario(self.levels[0]).work
 
     @property
     def bracket(self) -> tuple[float, float]:
@@ -184,7 +183,7 @@ class _Search:
             unit=self.kind.unit_for(self.base.plant.unit),
             resolution=high - low if self.fine and high < math.inf else 0.0,
             searched=self.levels[-1],
-            theory=self.kind.theory(self.base),
+            theory=self.kind.expected(self.base),
         )
 
 
@@ -198,7 +197,7 @@ class _Work:
     def borne(self, scenarios: Sequence[Scenario]) -> list[bool]:
         """Whether each of the scenarios is borne; their traces are dropped at once."""
         start = self.done
-        now = sum(s.samples * s.steps * s.plant.n for s in scenarios)
+        now = sum(s.work for s in scenarios)
         later = sum(s.left * s.steps for s in self.searches)
 
         def told(steps: int) -> None:

@@ -1,8 +1,10 @@
 """The channels of an own model as its user names them, checked against the model."""
 
+import contextlib
+import contextvars
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -11,7 +13,11 @@ from smc_mujoco.errors import ScenarioError, find, number, shown
 from smc_mujoco.mjcf import pick
 from smc_mujoco.part import ROTOR
 
+BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
+
+RECORDED = contextvars.ContextVar("RECORDED", default=False)  # whether a run that has been is being read
+Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -22,7 +28,8 @@ class Channel:
       actuator: name of the motor that drives it; None: the only one that does.
       motor: whether an ideal motor takes the place of whatever actuators drive the joint, servos or none.
       partner: a joint without an actuator that moves with it, as a pole on its cart: measured and scored as a channel
-        of its own, after the driven ones, and seen by this one's law in y.q, y.dq, y.fq, y.gq.
+        of its own, after the driven ones, and seen by this one's law in y.q, y.dq, y.fq, y.gq. An actuator that it has
+        nevertheless stays at ctrl = 0, where a motor does nothing, and a servo holds.
       x0, partner_x0: rad or m, where it starts, and its partner; None: where the keyframe, or the model, has it.
     """
 
@@ -88,17 +95,43 @@ def check(file: Path, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], .
 
 
 def starts(
-    model: mujoco.MjModel, joints: list[str], asked: tuple[tuple[str, Channel], ...], keyframe: str | None
+    plant: str, model: mujoco.MjModel, joints: list[str], asked: tuple[tuple[str, Channel], ...], keyframe: str | None
 ) -> tuple[float, ...]:
-    """x0: as the channels say, else as the keyframe, else as the model has it."""
+    """x0: as the channels say, else as the keyframe, else as the model has it.
+
+    The last alone may be outside a range, for nobody asked for it, and a scenario can have another.
+    """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
     held = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints}
     said = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
     said |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
-    return tuple((held | said).values())
+    found = held | said
+    told = [one for one in ranges(model, joints) if keyframe is not None or one[0] in said]
+    within(plant, told, [found[joint] for joint, _, _ in told])
+    return tuple(found.values())
 
 
-def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[tuple[str, float, float], ...]:
+def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
+    """Raise ScenarioError for a start outside a joint's range, in a run that is to be."""
+    for (joint, low, high), x in zip(ranges, x0, strict=False):
+        if not (low - BEYOND <= x <= high + BEYOND or RECORDED.get()):
+            raise ScenarioError(
+                f"x0 of joint {joint!r} of {plant} is {x:g}, outside its range from {low:g} to {high:g}: "
+                "give another x0"
+            )
+
+
+@contextlib.contextmanager
+def recorded() -> Iterator[None]:
+    """Within it, what is read was run already, and is not refused for what would be today."""
+    token = RECORDED.set(True)
+    try:
+        yield
+    finally:
+        RECORDED.reset(token)
+
+
+def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
     """Joint, least and largest position of each channel, rad or m; empty where none has limits."""
     found = []
     for joint in map(model.joint, joints):

@@ -30,6 +30,7 @@ from smc_mujoco.part import ROTOR, START
 from smc_mujoco.plant import DIRECTLY, Field, Plant, catalogue
 
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+WITHOUT = "give a law without a model"
 CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
 
 
@@ -114,7 +115,8 @@ def plant_from(
         the model's initial positions.
 
     Raises:
-      ScenarioError: a file that cannot be read, or a joint, actuator or keyframe that is not there or does not serve.
+      ScenarioError: a file that cannot be read, a joint, actuator or keyframe that is not there or does not serve, or
+        a start that is asked for and outside its joint's range.
 
     Laws may have model="nominal" where all joints that move with the channels are channels or partners, and no equality
     constraint holds any; `plant.unmodelled` says why not. Films show the model plainly, in its own colours.
@@ -137,14 +139,14 @@ def plant_from(
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = OwnFields(mass, gravity), tuple(drive.motor.limit for drive in drives)
     units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not = missing(model, joints, drives)
+    why_not, called = missing(model, joints, drives), named(name, file)
     return Plant(
-        name=named(name, file),
+        name=called,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
         mass="m",
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
-        x0=starts(model, joints, asked, keyframe),
+        x0=starts(called, model, joints, asked, keyframe),
         n=len(joints),
         sizes=(len(joints), len(joints)),
         build=build,
@@ -188,31 +190,41 @@ def smooth(model: mujoco.MjModel) -> bool:
 def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...]) -> str:
     """Why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
-        return "equality constraints hold its joints together, and M^-1 knows of none: give a law without a model"
+        return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT
     if model.nplugin or model.nflex:
-        return "it has plugins or flexible bodies: give a law without a model"
+        return "it has plugins or flexible bodies: " + WITHOUT
     ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
     idle = np.ones(model.nactuator, bool)
     idle[[a for drive in drives for a in drive.motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == CURRENT):
-        return "a dcmotor among its other actuators has a current that is not measured: give a law without a model"
+        return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT
     across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
     near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
-    return next((unmeasured(model, int(dof)) for dof in near if dof not in ours), "")
+    loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in ours))
+    return unmeasured(model, loose, drives) if loose else ""
 
 
-def unmeasured(model: mujoco.MjModel, dof: int) -> str:
-    """What there is to say of a degree of freedom that moves with the channels and is none."""
-    number = int(model.dof_jntid[dof])
-    kind, joint = mujoco.mjtJoint(model.jnt_type[number]), model.joint(number).name
-    if kind not in SIMPLE:
-        return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: give a law without a model"
-    if not joint:
-        return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
-    return (
-        f"joint {joint!r} moves with its channels and is not measured: "
-        f"make it a channel, or a partner with smc.Channel(partner={joint!r}), or give a law without a model"
-    )
+def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...]) -> str:
+    """What there is to say of joints, by number, that move with the channels and are none."""
+    for number in loose:
+        kind = mujoco.mjtJoint(model.jnt_type[number])
+        if kind not in SIMPLE:
+            return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: {WITHOUT}"
+        if not model.joint(number).name:
+            return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
+    moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, MOTOR), 0].tolist())
+    bare = [number for number in loose if number not in moved]
+    partners = len(bare) + sum(drive.partner is not None for drive in drives)
+    driven = len(drives) + len(loose) - len(bare)
+    first = model.joint(loose[0]).name
+    said = f"joint {first!r} moves with its channels and is not measured"
+    if partners not in (0, driven):
+        return (
+            f"{said}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take one "
+            f"partner each or none: {WITHOUT}"
+        )
+    cure = f"a partner with smc.Channel(partner={first!r})" if loose[0] in bare else "a channel"
+    return f"{said}: make it {cure}, or {WITHOUT}"
 
 
 def restored(data: Mapping, name: str) -> Plant:

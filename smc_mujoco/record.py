@@ -12,6 +12,7 @@ from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
+from smc_mujoco.own_channels import recorded
 from smc_mujoco.own_model import OwnModel, restored
 from smc_mujoco.part import Part
 from smc_mujoco.plant import Plant
@@ -56,7 +57,15 @@ def _versions() -> dict[str, str]:
 
 
 def restore(data: dict) -> Scenario:
-    """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code."""
+    """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code.
+
+    A run that has been is not refused for a start or a mismatch that would be today.
+    """
+    with recorded():
+        return _restore(data)
+
+
+def _restore(data: dict) -> Scenario:
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}

@@ -21,11 +21,12 @@ from smc_mujoco.channels import CTRL, QPOS, QVEL, channels
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.guarded import Failure, signalled
 from smc_mujoco.harness import HUGE, WORLD
+from smc_mujoco.own_channels import within
 from smc_mujoco.part import ROTOR, joint_ids
 from smc_mujoco.plant import Plant, ready
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
-from smc_mujoco.tasks import TASKS, Pair, Task, reward, tasks
+from smc_mujoco.tasks import TASKS, Pair, Task, reward, starts, tasks
 
 FIELDS = (  # of a Scenario that an environment takes
     "duration", "control_period", "physics_step", "integrator", "u_max", "x0", "v0", "reference", "mismatch",
@@ -104,7 +105,7 @@ class Setting:
         """A start: x and v, (n,) each, from a numpy generator of either kind, or as options x0 and v0 say.
 
         Raises:
-          ScenarioError: another option, or not n finite numbers.
+          ScenarioError: another option, not n finite numbers, or an x0 outside a joint's range.
         """
         x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
         if not isinstance(options, Mapping | None):
@@ -113,6 +114,8 @@ class Setting:
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
             found = np.array(given.state(name, value, self.scenario.plant.n))
+            if name == "x0":
+                within(self.scenario.plant.name, self.scenario.plant.ranges, found)
             x, v = (found, v) if name == "x0" else (x, found)
         return x, v
 
@@ -179,7 +182,7 @@ def setting(
     if math.inf in scenario.limits:
         raise ScenarioError("u_max is inf: give a finite one, so that an agent knows what it may ask")
     fixed = np.array(scenario.x0)
-    return _built(scenario, found, found.spread(plant) if changes.get("x0") is None else (fixed, fixed), edit)
+    return _built(scenario, found, starts(found, plant) if changes.get("x0") is None else (fixed, fixed), edit)
 
 
 def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:

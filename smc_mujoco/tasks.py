@@ -10,6 +10,8 @@ Suite, 2018), and the form is its cart-pole's; the margins, 1 (rad or m) for e a
     track         x - r in driven channels, x in others      x' - r', x'        the plant's x0
     swing_up      1 - cos x of toppling hinges, x of others  x'                 hanging within 0.1 rad, 0 in others
     synchronise   x - the channels' mean                     x' - its mean      the largest of the plant's x0
+
+and within the ranges that the joints of a model of yours have.
 """
 
 import dataclasses
@@ -52,7 +54,7 @@ class Task:
 
     Attributes:
       fits: whether a plant has this task.
-      spread: plant -> the lowest and the highest start of its channels, (n,) each.
+      spread: plant -> the lowest and the highest start of its channels, (n,) each, whatever their ranges.
       errors: (x, v, r, which) -> e and w; x and v are (..., n), r the reference and its derivatives, (..., 3).
       which: plant -> the channels that the task singles out, (n,) of bool.
       fields: plant -> Scenario fields that it sets unless told.
@@ -81,6 +83,19 @@ def tasks(plant: Plant | str) -> list[str]:
     return [name for name, task in TASKS.items() if task.fits(kind)]
 
 
+def starts(task: Task, plant: Plant) -> Pair:
+    """The lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
+    low, high = task.spread(plant)
+    least, most = _ranges(plant)
+    return np.clip(low, least, most), np.clip(high, least, most)
+
+
+def _ranges(plant: Plant) -> Pair:
+    """The least and the largest positions that the joints have, (n,) each."""
+    found = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
+    return found[:, 0], found[:, 1]
+
+
 @functools.lru_cache(maxsize=64)
 def toppling(plant: Plant) -> np.ndarray:
     """Which channels fall further when they lean: hinges for which x = 0 is unstable, (n,) of bool."""
@@ -102,7 +117,11 @@ def _any(plant: Plant) -> bool:
 
 
 def _topples(plant: Plant) -> bool:
-    return bool(toppling(plant).any())
+    """Whether it has what can hang and be swung up, and be driven weakly: one u_max has one unit."""
+    down, (least, most) = toppling(plant), _ranges(plant)
+    hangs = (least[down] <= math.pi) & (most[down] >= math.pi)
+    one = plant.free or {"rad"}.issuperset(plant.units)
+    return bool(down.any() and hangs.all() and one)
 
 
 def _way(plant: Plant) -> dict[str, Any]:
@@ -125,12 +144,13 @@ def _apart(plant: Plant) -> Pair:
 
 
 def _weak(plant: Plant) -> dict[str, Any]:
-    """Torques too weak to push the pendulums up at once; a cart keeps its force, its pole has none to be weak."""
+    """Torques too weak to push the heaviest pendulum up at once; a cart keeps its force, its pole has no torque."""
     if plant.free:
         return {}
-    level, p = np.full(plant.n, math.pi / 2), Values(**plant.parameters)
-    f, g = plant.nominal(level, 0.0 * level, 0, p)
-    return {"u_max": WEAK * abs(f / g)}
+    down, p = toppling(plant), Values(**plant.parameters)
+    level = math.pi / 2 * down
+    pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
+    return {"u_max": WEAK * max(abs(f / g) for f, g in pulls)}
 
 
 def _regulate(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:

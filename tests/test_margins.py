@@ -173,6 +173,59 @@ def test_only_laws_with_a_linear_part_have_theory(found):
     assert [margin.kind for margin in found if margin.theory is not None] == ["delay", "disturbance", "friction"]
 
 
+POLES = """
+<mujoco><option integrator="RK4"/><worldbody>
+  <body><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
+  <body pos="0 2 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
+</worldbody><actuator>{motors}</actuator>{rest}</mujoco>"""
+MOTORS = '<motor joint="a" gear="40" ctrlrange="-1 1"/><motor joint="b" gear="15" ctrlrange="-1 1"/>'
+
+
+@pytest.fixture
+def poles(tmp_path):
+    """A function that makes a plant of two poles whose motors are of unlike strength."""
+
+    def make(rest="", channels=("a", "b")) -> smc.Plant:
+        path = tmp_path / f"{'tied' if rest else 'free'}.xml"
+        path.write_text(POLES.format(motors=MOTORS, rest=rest))
+        return smc.plant_from(path, channels)
+
+    return make
+
+
+def test_theory_knows_the_weakest_motor(poles):
+    strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
+    base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
+    at = 15.0 / (30.0 * 5.0 / 0.01)  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
+    expected = bearing.SPECS["disturbance"].expected(base)
+    assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
+
+
+def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
+    """Of a model that is not known, of two units, and of a pole without an actuator."""
+    law, runs = smc.law("boundary_layer", k=30.0, phi=0.1, c=5.0), {"duration": 1.5}
+    tied = poles('<equality><joint joint1="a" joint2="b"/></equality>', ["a"])
+    bases = [
+        smc.Scenario(plant=tied, law=law, x0=0.2, **runs),
+        smc.Scenario(plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs),
+        smc.Scenario(plant="cart_pole", law=law, x0=0.0, **runs),
+    ]
+    found = margins.of(bases, ["disturbance"], COARSE)
+    assert [margin.theory for margin in found] == [None] * 3
+    assert found[0].value > 0.1
+    assert found[1].value > 0.1
+
+
+def test_the_mass_ratio_is_upon_what_the_mass_is_under_whichever_name():
+    heavier = bearing.SPECS["mass"].put
+    for name in ("mass", "M"):
+        known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
+        assert heavier(known, 2.0).mismatch == {name: 3.0, "alpha": 2.0}
+    assert heavier(BASE, 2.0).mismatch == {"mass": 2.0}
+    (margin,) = margins.of([dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE)
+    assert margin.kind == "mass"
+
+
 # files and the command
 
 

@@ -13,7 +13,7 @@ import pytest
 from episodes import driven_by_dm, run_of
 
 import smc_mujoco as smc
-from smc_mujoco import assembly, design, identity, linear, plain, setting
+from smc_mujoco import assembly, consistency, design, identity, linear, own_channels, paper, plain, setting, tasks
 from smc_mujoco import suite as suite_of_ours
 from smc_mujoco.believed import Believed, prepared
 from smc_mujoco.frozen import frozen
@@ -546,20 +546,143 @@ def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
 # starts
 
 
-def test_a_start_outside_a_joint_s_range_is_refused(arm, tmp_path):
-    arm()
-    path = tmp_path / "arm.xml"
-    path.write_text(path.read_text().replace('name="elbow"', 'name="elbow" range="-30 60"'))
-    said = smc.plant_from(path, {"elbow": smc.Channel(partner="shoulder", x0=1.2, partner_x0=3.0)})
-    words = r"x0 of joint 'elbow' of arm is 1.2, outside its range from -0.523599 to 1.0472: give another x0"
-    with pytest.raises(smc.ScenarioError, match=words):
-        smc.Scenario(plant=said, law="none")
-    scenario = smc.Scenario(plant=said, law="none", x0=(1.0, 3.0))  # the shoulder has no limits
+LEAST, MOST = math.radians(-30.0), math.radians(60.0)  # of the elbow
+REFUSED = r"x0 of joint 'elbow' of arm is 1.2, outside its range from -0.523599 to 1.0472: give another x0"
+ELBOW = {"elbow": smc.Channel(partner="shoulder", partner_x0=3.0)}
+
+
+@pytest.fixture
+def bounded(arm, tmp_path):
+    """A function that writes an arm whose elbow has a range, and makes a plant of it."""
+
+    def make(channels=("elbow",), more="", keyframe=None) -> smc.Plant:
+        arm(rest=ACTUATED + more)
+        path = tmp_path / "arm.xml"
+        path.write_text(path.read_text().replace('name="elbow"', 'name="elbow" range="-30 60"'))
+        return smc.plant_from(path, channels, keyframe=keyframe)
+
+    return make
+
+
+def test_a_start_outside_a_joint_s_range_is_refused(bounded):
+    scenario = smc.Scenario(plant=bounded(ELBOW), law="none", x0=(1.0, 3.0))  # the shoulder has no limits
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        dataclasses.replace(scenario, x0=(1.2, 3.0))
     with pytest.raises(smc.ScenarioError, match=r"x0 of joint 'elbow' of arm is -0.6,"):
         dataclasses.replace(scenario, x0=-0.6)
-    path.write_text(path.read_text().replace("</mujoco>", '<option><flag limit="disable"/></option></mujoco>'))
-    free = smc.plant_from(path, {"elbow": smc.Channel(x0=1.2)})
+    other = bounded({"shoulder": smc.Channel(partner="elbow")})
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        smc.Scenario(plant=other, law="none", x0=(0.0, 1.2))
+    free = bounded({"elbow": smc.Channel(x0=1.2)}, '<option><flag limit="disable"/></option>')
     assert smc.Scenario(plant=free, law="none").x0 == (1.2,)
+
+
+def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
+    plant = bounded()
+    for x0 in (MOST + 5e-4, LEAST - 5e-4):
+        assert smc.Scenario(plant=plant, law="none", x0=x0).x0 == (x0,)
+    for x0 in (MOST + 2e-3, LEAST - 2e-3):
+        with pytest.raises(smc.ScenarioError, match="outside its range"):
+            smc.Scenario(plant=plant, law="none", x0=x0)
+
+
+def test_a_start_that_is_asked_for_is_refused_with_the_plant_and_the_model_s_own_with_the_run(bounded):
+    key = '<keyframe><key name="home" qpos="0.2 1.2"/><key name="in" qpos="9 0.1"/></keyframe>'
+    for asked in ({"elbow": {"x0": 1.2}}, {"shoulder": {"partner": "elbow", "partner_x0": 1.2}}):
+        with pytest.raises(smc.ScenarioError, match=REFUSED):
+            bounded(asked)
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        bounded(more=key, keyframe="home")
+    assert bounded(more=key, keyframe="in").x0 == (0.1,)
+    assert bounded({"elbow": {"x0": 1.0}}, key, "home").x0 == (1.0,)
+    own = bounded(more='<default><joint ref="80"/></default>')
+    assert own.x0 == pytest.approx((math.radians(80.0),))
+    with pytest.raises(smc.ScenarioError, match="outside its range"):
+        smc.Scenario(plant=own, law="none")
+    scenario = smc.Scenario(plant=own, law="none", x0=0.0)
+    assert scenario.x0 == (0.0,)
+    assert identity.condition(scenario) == "nominal"
+
+
+def test_environments_start_where_runs_may(bounded):
+    plant = bounded({"shoulder": smc.Channel(x0=2.0), "elbow": smc.Channel(x0=0.8)})
+    starts = {"regulate": (2.0, 0.8), "track": (2.0, 0.8), "synchronise": (2.0, MOST)}
+    assert list(starts) == tasks.tasks(plant)
+    for task, highest in starts.items():
+        found = setting.setting(plant, task)
+        assert found.low.tolist() == [-2.0, LEAST]
+        assert found.high.tolist() == list(highest)
+        for random in map(np.random.default_rng, range(20)):
+            smc.Scenario(plant=plant, law="none", x0=found.draw(random)[0])
+    found, random = setting.setting(plant), np.random.default_rng(0)
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        found.draw(random, {"x0": (0.0, 1.2)})
+    assert found.draw(random, {"x0": (9.0, 1.0)})[0].tolist() == [9.0, 1.0]
+
+
+# swing-ups
+
+POLE = """
+<mujoco model="pole"><worldbody>
+  <body><joint name="slide" type="slide" axis="1 0 0"/><geom size=".1" mass="1" contype="0"/>
+    <body><joint name="pole" axis="0 1 0" {range}/><geom size=".1" pos="0 0 1" mass="2" contype="0"/></body></body>
+</worldbody>
+<actuator><motor name="s" joint="slide" gear="20" ctrlrange="-1 1"/><motor joint="pole"/></actuator></mujoco>"""
+HANGING = {"": True, 'range="-190 190"': True, 'range="-180 180"': True, 'range="-170 170"': False}
+
+
+@pytest.mark.parametrize("joint", HANGING)
+def test_what_cannot_hang_is_not_asked_to_swing_up(tmp_path, joint):
+    (tmp_path / "pole.xml").write_text(POLE.format(range=joint))
+    plant = smc.plant_from(tmp_path / "pole.xml", {"slide": smc.Channel(partner="pole")})
+    assert ("swing_up" in tasks.tasks(plant)) == HANGING[joint]
+    if HANGING[joint]:
+        found = setting.setting(plant, "swing_up")
+        x = found.draw(np.random.default_rng(0))[0]
+        assert abs(smc.Scenario(plant=plant, law="none", x0=x).x0[1] - math.pi) <= 0.1
+        assert found.scenario.u_max == 20.0
+
+
+def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of_its_own(tmp_path):
+    (tmp_path / "pole.xml").write_text(POLE.format(range=""))
+    for order in (("slide", "pole"), ("pole", "slide")):
+        assert tasks.tasks(smc.plant_from(tmp_path / "pole.xml", order)) == ["regulate", "track"]
+    body = '<body pos="0 {y} 0"><joint name="{name}" axis="{axis}"/><geom size=".01" pos="0 0 1" mass="{mass}"/></body>'
+    three = [("light", "0 1 0", 1.0), ("heavy", "0 1 0", 2.0), ("upright", "0 0 1", 1.0)]
+    bodies = [body.format(y=y, name=name, axis=axis, mass=mass) for y, (name, axis, mass) in enumerate(three)]
+    (tmp_path / "three.xml").write_text(f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>")
+    for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
+        plant = smc.plant_from(tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True)))
+        scenario = setting.setting(plant, "swing_up").scenario
+        assert scenario.u_max == pytest.approx(0.5 * 2.0 * 9.81)
+
+
+# what was recorded
+
+
+def test_a_recorded_run_is_read_whatever_would_be_refused_today(bounded, tmp_path, monkeypatch):
+    """As versions wrote them that looked at neither ranges nor the names of a mass."""
+    with monkeypatch.context() as older:
+        for module in (consistency, own_channels):
+            older.setattr(module, "within", lambda *a: None)
+        older.setattr(consistency, "check_names", lambda s: None)
+        for name, fields in {"start": {"x0": 1.2}, "names": {"mismatch": {"m": 1.1, "mass": 1.2}}}.items():
+            smc.run(smc.Scenario(plant=bounded(), law="none", duration=0.05, **fields)).save(tmp_path / name)
+        smc.run(smc.Scenario(plant=bounded({"elbow": {"x0": 1.2}}), law="none", duration=0.05)).save(tmp_path / "own")
+    for name, words in {"start": REFUSED, "own": REFUSED, "names": "which are the same parameter of arm"}.items():
+        trace = smc.load(tmp_path / f"{name}.npz")
+        assert trace.x.shape == (51, 1)
+        with pytest.raises(smc.ScenarioError, match=words):
+            dataclasses.replace(trace.scenario, law="classical")
+
+
+def test_conditions_of_a_model_with_motors_have_the_paper_s_names(arm):
+    plant = arm(["shoulder"])
+    assert plant.limits
+    for name in ("nominal", "noise", "delay_5ms"):
+        fields = paper.fields(name, "arm")
+        assert identity.condition(smc.Scenario(plant=plant, law="classical", **fields)) == name
+    assert identity.condition(smc.Scenario(plant=plant, law="classical", u_max=6.0)) == "u_max=6.0"
 
 
 # errors
@@ -687,9 +810,20 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
     assert "a ball joint moves with its channels, and can be none" in arm(rest=across, bodies=BALL).unmodelled
     slide = '<body><joint type="slide"/><geom size=".1 .1" mass="1"/></body>'
     assert "a joint without a name moves with" in arm(rest=across, bodies=slide).unmodelled
+    bare = slide.replace("<joint", '<joint name="slide"')
+    assert "there are 1, of driven ones 2," in arm(rest=across, bodies=bare).unmodelled
+    assert "make it a channel, or give a law" in plant.unmodelled
+    assert "make it a partner with smc.Channel(partner='shoulder')" in acrobot_alone().unmodelled
     wound = '<dcmotor joint="elbow" motorconst="1 1" resistance="1" inductance="0.1 0"/></actuator>'
     channels = {"shoulder": None, "elbow": smc.Channel(actuator="b")}
     assert "dcmotor" in arm(channels, rest=ACTUATED.replace("</actuator>", wound)).unmodelled
+
+
+@pytest.mark.parametrize("partner", [None, "hinge", "hinge2"])
+def test_what_no_channels_or_partners_can_mend_is_not_advised(partner):
+    """Two poles on one cart, of which one could be a partner."""
+    plant = smc.plant_from(gym("inverted_double_pendulum"), {"slider": smc.Channel(partner=partner)})
+    assert "there are 2, of driven ones 1, which take one partner each or none: give a law without" in plant.unmodelled
 
 
 def test_a_force_on_a_body_is_refused(arm):
