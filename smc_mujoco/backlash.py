@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.errors import number
+from smc_mujoco.hook import compiled
 from smc_mujoco.part import ROTOR, Actuator, driven, driven_ids, drives
 from smc_mujoco.plant import LARGEST, Field
 
@@ -43,7 +44,7 @@ class Backlash(Actuator):
             object.__setattr__(self, name, value)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        rigid = spec.copy().compile()
+        rigid = compiled(spec.copy())
         pose = mujoco.MjData(rigid)
         mujoco.mj_kinematics(rigid, pose)
         for actuator, joint in list(zip(drives(spec), driven(spec), strict=True)):

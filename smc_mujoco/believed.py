@@ -80,7 +80,7 @@ class Believed(Coupled):
         if self.why_not:
             return Native(unknown().address, (), ())
         model, places, _, spare = prepared(self, frozen(parameters))
-        lent = Lent(model, spare)
+        lent = lend(model, spare)
         data, seen = lent.data, np.full(2 * len(places.qpos), np.nan)
         table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
         solved = np.zeros(2 * model.nv)
@@ -90,20 +90,24 @@ class Believed(Coupled):
         return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, lent, *arrays))
 
 
+@dataclasses.dataclass(eq=False)
 class Lent:
     """An mjData for one simulation, which the next takes over: freed and made anew, they leave holes in memory."""
 
-    def __init__(self, model: mujoco.MjModel, spare: list[mujoco.MjData]):
-        self.spare = spare
-        try:
-            self.data = spare.pop()
-        except IndexError:
-            self.data = mujoco.MjData(model)
-        else:
-            mujoco.mj_resetData(model, self.data)
+    data: mujoco.MjData
+    spare: list[mujoco.MjData]
 
     def __del__(self):
         self.spare.append(self.data)
+
+
+def lend(model: mujoco.MjModel, spare: list[mujoco.MjData]) -> Lent:
+    """A spare mjData, or else another: whoever had it wrote only what each simulation writes before it reads."""
+    try:
+        data = spare.pop()
+    except IndexError:
+        data = mujoco.MjData(model)
+    return Lent(data, spare)
 
 
 @functools.lru_cache(maxsize=32)

@@ -12,8 +12,6 @@ whose userdata hold no row of ours are left alone.
 import contextlib
 import functools
 import hashlib
-import os
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -23,20 +21,11 @@ from numba import carray, cfunc, types
 from smc_mujoco import layout
 from smc_mujoco.compiled import integers, pointer
 from smc_mujoco.harness import control as run_row
+from smc_mujoco.hook import held, uninstalled
 from smc_mujoco.row import HEADER, IS_ROW
 
-_lock = threading.RLock()
-
-
-def _after_fork() -> None:
-    """A child has none of its parent's threads: neither who holds the lock, nor the run whose callback is installed."""
-    global _lock  # noqa: PLW0603
-    _lock = threading.RLock()
-    mujoco.set_mjcb_control(None)
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
+with uninstalled():  # this import compiles a model: done here, before a run of ours that it would have to wait for
+    import mujoco.batch
 
 
 @functools.cache
@@ -95,32 +84,14 @@ def _compiled(signature, function: Callable):
 
 
 @contextlib.contextmanager
-def uninstalled() -> Iterator[None]:
-    """No control callback for the length of a with block: MuJoCo compiles no model while a Python one is installed.
-
-    Other threads' runs, which would go on without their laws, are waited for.
-    """
-    with _lock:
-        before = mujoco.get_mjcb_control()
-        mujoco.set_mjcb_control(None)
-        try:
-            yield
-        finally:
-            mujoco.set_mjcb_control(before)
-
-
-@contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
     """Install the harness, or another control callback, for the length of a with block; other threads wait."""
-    with _lock:
-        before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
-        with uninstalled():
-            function = harness().ctypes if control is None else control
-            silent = silence().ctypes
-        try:
-            mujoco.set_mjcb_control(function)
-            mujoco.set_mju_user_warning(silent)
-            yield
-        finally:
-            mujoco.set_mjcb_control(before[0])
-            mujoco.set_mju_user_warning(before[1])
+    with uninstalled():
+        function, silent = harness().ctypes if control is None else control, silence().ctypes
+        before = mujoco.get_mju_user_warning()
+        with held(function):
+            try:
+                mujoco.set_mju_user_warning(silent)
+                yield
+            finally:
+                mujoco.set_mju_user_warning(before)

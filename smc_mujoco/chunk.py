@@ -15,8 +15,8 @@ from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
 from smc_mujoco.trace import Trace, from_log
 
-with callback.uninstalled():  # this import compiles a model
-    from mujoco.batch import Batch, SimulationError
+# isort: split
+from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 PERFECT = Encoder(counts=math.inf)
 SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second

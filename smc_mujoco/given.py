@@ -13,6 +13,7 @@ from smc_mujoco.component import Component, Template
 from smc_mujoco.contact import Contact
 from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.estimators import estimator
+from smc_mujoco.hook import compiled
 from smc_mujoco.law import law
 from smc_mujoco.part import Part
 from smc_mujoco.plant import Plant
@@ -207,7 +208,7 @@ def built(plant: Plant, name: str) -> mujoco.MjModel:
     """A plant's other mechanism, compiled."""
     spec = plant.spec()
     plant.mechanisms[name].edit(spec)
-    return spec.compile()
+    return compiled(spec)
 
 
 def several(value: object) -> tuple[Any, ...]:

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.errors import find, number
+from smc_mujoco.hook import compiled
 from smc_mujoco.plant import Plant, write
 from smc_mujoco.plant import plant as find_plant
 
@@ -28,7 +29,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
     most = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
     spec = plant.spec()
     variant.edit(spec)
-    model = spec.compile()
+    model = compiled(spec)
     values = plant.values({})
     write(model, variant.fields(model, values))
     data = mujoco.MjData(model)

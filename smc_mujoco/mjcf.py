@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 
+from smc_mujoco import hook
 from smc_mujoco.errors import ScenarioError, find, shown
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
@@ -39,7 +40,7 @@ def compiled(path: Path, spec: mujoco.MjSpec) -> mujoco.MjModel:
       ScenarioError: MuJoCo cannot compile it.
     """
     try:
-        return spec.compile()
+        return hook.compiled(spec)
     except ValueError as error:
         raise broken(path, error) from None
 

@@ -22,6 +22,7 @@ from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
 from smc_mujoco.files import shipped
 from smc_mujoco.frozen import frozen
+from smc_mujoco.hook import compiled
 
 DIRECTLY = "smc:direct"  # a text in the MJCF of own models: disturbances act on their joints, not on bodies
 EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
@@ -194,7 +195,7 @@ def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     spec.nuserdata = nuserdata
     # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
-    return spec.compile()
+    return compiled(spec)
 
 
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:

@@ -136,7 +136,8 @@ def policy(act: Any, *, reference: bool = False) -> Law:
       reference: whether its observation ends in r, r', r'', as that of the task `track` does.
 
     The observation is x, v, or x, q, v, q' of a joint with one that moves with it: a float64 array of a single
-    channel, for onnx and torch a batch of one in the network's own type.
+    channel, for onnx and torch a batch of one in the network's own type. A policy that looks ahead makes and steps its
+    environments in its own thread: in others they wait for the run to end, and it for them.
 
     Raises:
       ScenarioError: nothing of these, no such file, or a library that is not installed.

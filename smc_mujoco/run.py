@@ -80,8 +80,7 @@ def stream(
             warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
             slow.append(index)
     for indices in [*groups.values(), *([index] for index in slow)]:
-        with callback.uninstalled():  # it compiles models, and may be asked for by a law in the plain loop
-            assembly.check_starts([scenarios[i] for i in indices])
+        assembly.check_starts([scenarios[i] for i in indices])
     for indices in groups.values():
         for chunk in _chunks(scenarios, indices, threads):
             with callback.installed():

@@ -16,7 +16,6 @@ import mujoco
 import numpy as np
 
 from smc_mujoco import assembly, given
-from smc_mujoco.callback import uninstalled
 from smc_mujoco.channels import CTRL, QPOS, QVEL, channels
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.guarded import Failure, signalled
@@ -199,9 +198,8 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
 
 def _built(scenario: Scenario, task: Task, spread: Pair, edit: Callable[[mujoco.MjSpec], None]) -> Setting:
     """The Setting of a scenario and its task, compiled."""
-    with uninstalled():
-        model = _compiled(scenario, edit)
-        table = channels(model)
+    model = _compiled(scenario, edit)
+    table = channels(model)
     rotors = []
     for i, joint in enumerate(joint_ids(model)):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)

@@ -24,7 +24,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.callback import uninstalled
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.part import joint_ids
 from smc_mujoco.plant import Plant, Values
@@ -99,8 +98,7 @@ def _ranges(plant: Plant) -> Pair:
 @functools.lru_cache(maxsize=64)
 def toppling(plant: Plant) -> np.ndarray:
     """Which channels fall further when they lean: hinges for which x = 0 is unstable, (n,) of bool."""
-    with uninstalled():
-        model = plant.load()
+    model = plant.load()
     hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
     lean = 0.1 * hinged
     f = [plant.nominal(lean, 0.0 * lean, i, Values(**plant.parameters))[0] for i in range(plant.n)]

@@ -25,8 +25,8 @@ from smc_mujoco.plant import DIRECTLY, Plant
 from smc_mujoco.run import cores
 from smc_mujoco.setting import bounded, setting
 
-with callback.uninstalled():  # this import compiles a model
-    from mujoco.batch import Batch, SimulationError
+# isort: split
+from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 MOST = 1_000_000  # copies: a number that is surely meant as something else
 SEEDS = 2**64

@@ -90,7 +90,7 @@ def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
     assert environment.physics.data.qpos[1] == 3.0  # a joint without a channel, where the keyframe has it
 
 
-def test_what_makes_an_environment_waits_for_the_runs_of_other_threads():
+def test_what_makes_an_environment_waits_for_other_threads_runs_in_the_plain_loop():
     """Which would go on without their laws: MuJoCo's callback, which it takes away for a moment, is everybody's."""
     made = threading.Event()
 
@@ -99,7 +99,7 @@ def test_what_makes_an_environment_waits_for_the_runs_of_other_threads():
         made.set()
 
     thread = threading.Thread(target=other)
-    with callback.installed():
+    with callback.installed(lambda model, data: None):
         thread.start()
         assert not made.wait(0.3)
         assert mujoco.get_mjcb_control() is not None

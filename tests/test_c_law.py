@@ -1,5 +1,6 @@
 """Laws of one's own in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
 
+import copy
 import os
 import pickle
 import re
@@ -159,6 +160,29 @@ def test_a_shared_library_is_taken_as_it_is_and_anew_where_it_was_built_again(fi
         traces.append(smc.run(scenario(mine, noise=None)))
         assert same(traces[-1], plain.run(traces[-1].scenario))
     assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
+
+
+def test_two_laws_of_one_library_are_two(file, tmp_path):
+    target, text = tmp_path / "laws.so", law("out[0] = -y->e;")
+    second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
+    source = file(text + "int " + second)
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    subprocess.run(line, check=True)
+    one, other = (scenario(smc.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other"))
+    assert one != other
+    assert identity.key(one) != identity.key(other)
+    assert repr(other.law.function) == "<C function other of laws.so>"
+
+
+def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
+    path = file(MINE)
+    first = scenario(smc.law_from_c(path)(lam=4.0))
+    copies = [pickle.loads(pickle.dumps(first)), copy.deepcopy(first), scenario(smc.law_from_c(path)(lam=4.0))]
+    assert all(each == first and hash(each.law.function) == hash(first.law.function) for each in copies)
+    wider, renamed = smc.law_from_c(path, memory=20), smc.law_from_c(path, name="other")
+    edited = smc.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
+    functions = {each.function for each in (first.law, wider(), renamed(), edited())}
+    assert len(functions) == 4
 
 
 def test_a_library_s_int_is_read_as_an_int(file, tmp_path):

@@ -247,6 +247,33 @@ def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
+def test_what_the_nominal_model_of_a_run_gone_astray_worked_on_does_as_well(arm):
+    plant = arm(bodies=BALL)
+    good = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    bad = dataclasses.replace(good, law=smc.law("computed_torque", kp=1e9, kd=1e9), u_max=math.inf)
+    first, astray, again = smc.run(good), smc.run(bad), smc.run(good)
+    assert astray.failure is not None
+    np.testing.assert_array_equal(again.x, first.x)
+    gc.collect()
+    assert isinstance(plant.nominal, Believed)
+    assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == 1
+
+
+def test_no_room_for_what_a_nominal_model_works_on_is_said_once(arm, monkeypatch):
+    nominal, parameters = (plant := arm()).nominal, frozen(plant.parameters)
+    assert isinstance(nominal, Believed)
+    spare = prepared(nominal, parameters)[3]
+
+    def full(model):
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(mujoco, "MjData", full)
+    with pytest.raises(MemoryError, match="no room"):
+        nominal.native(parameters)
+    gc.collect()  # where a destructor that raises would be heard
+    assert spare == []
+
+
 def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
     """A constant d in every channel is what the same u does."""
     plant = arm(rest='<option gravity="0 0 0"/>' + ACTUATED)

@@ -65,6 +65,19 @@ class CLaw(AtAddress):
         self.sizes = gains, memory
         trial.sized(self.library, gains, memory)
 
+    def __repr__(self) -> str:
+        return f"<C function {self.symbol} of {self.path.name}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CLaw) and self._told() == other._told()
+
+    def __hash__(self) -> int:
+        return hash(self._told())
+
+    def _told(self) -> tuple:
+        """What tells it from others; a copy of it, pickled or loaded again, is the same law."""
+        return self.digest, self.sizes, self.__name__
+
     def __reduce__(self):
         """By its machine code: another process runs this one, whatever its file holds by then."""
         return _again, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)

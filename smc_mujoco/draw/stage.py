@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco import assembly
+from smc_mujoco import assembly, hook
 from smc_mujoco.draw import arrows, camera, own, style
 from smc_mujoco.draw.state import shapes
 from smc_mujoco.part import ROTOR, joints
@@ -231,7 +231,7 @@ def compose(scenarios: Sequence[Scenario], size: tuple[int, int]) -> mujoco.MjMo
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)
     width = np.linalg.norm(step) * len(scenarios)
     spec.stat.center, spec.stat.extent, spec.stat.meansize = (0.0, 0.0, 0.5), 0.6 * width + 1.5, 0.1
-    return spec.compile()
+    return hook.compiled(spec)
 
 
 def bare(machine: mujoco.MjSpec) -> mujoco.MjSpec:
