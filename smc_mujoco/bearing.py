@@ -94,7 +94,7 @@ def _at_rest(base: Scenario) -> float | None:
 
 def _heavier(base: Scenario, level: float) -> Scenario:
     mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"  # which has two names
-    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level * base.mismatch.get(mass, 1.0)})
+    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})  # of the nominal one
 
 
 SPECS: dict[str, Kind] = {

@@ -29,15 +29,16 @@ def path(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst(table: Table) -> list[int]:
-    """For every plant and condition the row that failed first, or else ends with the largest ultimate bound.
-
-    A plant whose driven channels have two units has no such bound: of it the one that settles last.
+    """For every plant and condition the first row that failed, else of those that never settle, else of all, the one
+    with the largest ultimate bound, or where channels of two units have none, with the largest overshoot.
     """
-    bounds, failed = table.column("ultimate_bound"), table.column("failure") != np.array(None)
-    badness = np.where(failed, np.inf, np.where(np.isnan(bounds), table.column("settling_time"), bounds))
+    failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
+    ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
+    lost = table.column("settling_time") == np.inf
+    badness = list(zip(failed, lost & ~failed, np.where(failed, 0.0, ends), strict=True))
     found: dict[tuple, int] = {}
     for i, place in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
-        if place not in found or (failed[i], badness[i]) > (failed[found[place]], badness[found[place]]):
+        if place not in found or badness[i] > badness[found[place]]:
             found[place] = i
     return list(found.values())
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 KEY = (
     "median, #place by mean rank over the shared runs, {level:.3g} % interval over seeds; * may be the best: "
-    "no winner where several may, inside the noise; x in rad or m, u in N m or N"
+    "no winner where several may, inside the noise; x, u of driven joints, in rad or m, N m or N"
 )
 
 
@@ -175,7 +175,7 @@ def leaderboard_table(boards: Sequence[Board]) -> "Table":
     metrics = {board.metric: board.unit for board in boards}
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
     lines = max((metric.count("_") for metric in metrics), default=0)
-    table.add_column("law", no_wrap=True)
+    table.add_column("law", no_wrap=True, min_width=0 if boards else 30)
     for metric, unit in metrics.items():
         head = Text("\n" * (lines - metric.count("_")) + metric.replace("_", "\n"))
         head.append(f"\n{unit.format(x='x', u='u') or '%'}", "dim not bold")

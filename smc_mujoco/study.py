@@ -133,8 +133,8 @@ def study(
       executor: "local", or "dask://HOST:PORT" for the workers of that scheduler.
       threads: simulations at once, if local; None for one per available core.
       progress: whether to show a progress bar.
-      traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": the run with the
-        largest ultimate bound, or one that failed.
+      traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": a run that
+        failed, else one that never settles, else any, with the largest ultimate bound.
 
     Raises:
       ScenarioError: what cannot be run, a folder that cannot be written, no scheduler; what was finished stays.

@@ -250,6 +250,16 @@ def test_check_takes_metrics_of_a_group_by_its_name(pole):
         pole.check(**{"free max_u": 1.0})
 
 
+def test_a_golden_metric_that_there_is_no_longer_is_told_with_its_cure(pole, tmp_path):
+    golden.record(tmp_path / "a.json", "test", pole, None, {"free peak": 0.1})
+    text = (tmp_path / "a.json").read_text().replace("free peak", "hinge peak")
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(
+        smc.ScenarioError, match=r"a\.json, test: unknown metric 'hinge peak'.*; or run pytest --smc-update"
+    ):
+        golden.compare(tmp_path / "a.json", "test", pole, None, {})
+
+
 def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
     golden.record(tmp_path / "a.json", "test", pole, None, {})
     golden.compare(tmp_path / "a.json", "test", pole, None, {})

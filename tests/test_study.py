@@ -4,6 +4,7 @@ import dataclasses
 import math
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -291,6 +292,18 @@ def test_the_worst_trace_of_each_plant_and_condition_is_saved(tmp_path):
     assert [trace.failure is not None for trace in traces] == [False, True]  # noise, nominal
     noisy = table.select(condition="noise")
     assert smc.score(traces[0])["ultimate_bound"] == noisy.column("ultimate_bound").max()
+
+
+def test_what_failed_is_worst_then_what_never_settles_then_the_largest_bound_or_without_one_the_largest_overshoot():
+    columns = {
+        "plant": np.array(["pole"] * 3 + ["arm"] * 3 + ["cart"] * 2),
+        "condition": np.array(["nominal"] * 8),
+        "failure": np.array([None] * 7 + ["it fell"]),
+        "settling_time": np.array([4.0, np.inf, 1.0, np.inf, np.inf, 2.0, np.inf, np.nan]),
+        "ultimate_bound": np.array([0.0045, 0.0007, 0.1, *[np.nan] * 3, 9.0, np.nan]),
+        "overshoot": np.array([1.0, 1.0, 1.0, 5.0, 20.0, 90.0, 1.0, np.nan]),
+    }
+    assert keep.worst(SimpleNamespace(column=columns.get)) == [1, 4, 7]
 
 
 def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):

@@ -16,6 +16,7 @@ from smc_mujoco.draw.envelope import columns, end, line, stretches, window
 from smc_mujoco.draw.state import HOLD, resting, rubs
 from smc_mujoco.groups import Group
 from smc_mujoco.measure import BAND, scale
+from smc_mujoco.plain import LEFT_THE_WORLD
 from smc_mujoco.trace import Trace
 
 COLUMNS = 360  # of a panel
@@ -190,9 +191,12 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Least and largest value of the runs that lasted; where none did, of all runs without their ends."""
+    """Least and largest value of the runs that lasted; where none did, of all, without the ends of those that left."""
     seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
-    seen = seen or [y[: max(1, int(0.8 * len(y)))] for y in (QUANTITIES[name](trace) for trace in traces)]
+    for trace in traces if not seen else ():
+        y = QUANTITIES[name](trace)
+        left = trace.failure is None or trace.failure.startswith(LEFT_THE_WORLD)
+        seen.append(y[: max(1, int(0.8 * len(y)))] if left else y)
     seen = [y for y in seen if np.isfinite(y).all()] or [np.zeros(1)]
     return float(min(y.min() for y in seen)), float(max(y.max() for y in seen))
 

@@ -54,7 +54,7 @@ def axis(row: Row, name: str) -> str:
         words = {"spread": "max − min x", "force": "delivered", "reaction": "reaction" + " on q" * (not group.driven)}
         return f"{'mean ' * (several and name != 'spread')}{words[name]} ({unit})"
     if name == "s" and row.traces[0].scenario.plant.free:
-        return "sliding variable s"  # of both joints, in a unit that the law alone knows
+        return f"{'mean ' * several}sliding variable s"  # of both joints, in a unit that the law alone knows
     if name == "s" and row.traces[0].scenario.plant.mixed:
         return f"{'mean ' * several}s ({unit})"  # rows of it are many, and low
     words = {"x": style.quantity(group), "v": "velocity", "u": "control", "s": "sliding variable"}

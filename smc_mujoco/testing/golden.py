@@ -70,7 +70,10 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
     if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
     names = list(tolerances if tolerances and rel is None else known)
-    response.named(dict.fromkeys(names))
+    try:
+        response.named(dict.fromkeys(names))
+    except ScenarioError as error:  # recorded by another version, or of another plant
+        raise ScenarioError(f"{file.name}, {key}: {error}; or {UPDATE}") from None
     golden = {name: _number(file, key, name, known, "value") for name in names}
     asked = []
     for name, value in golden.items():
