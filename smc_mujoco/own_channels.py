@@ -47,10 +47,7 @@ def given(channels: object) -> tuple[tuple[str, Channel], ...]:
     items = list(channels.items()) if isinstance(channels, Mapping) else [(joint, None) for joint in channels]
     if not items:
         raise ScenarioError("channels is empty: give at least one joint's name")
-    found = []
-    for joint, value in items:
-        found.append((joint, channel(joint, value)))
-    return tuple(found)
+    return tuple((joint, channel(joint, value)) for joint, value in items)
 
 
 def channel(joint: object, value: object) -> Channel:

@@ -169,20 +169,7 @@ def _synchronise(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray)
 
 TASKS = {
     "regulate": Task(fits=_any, spread=_within_start, errors=_regulate),
-    "track": Task(
-        fits=_any,
-        spread=_within_start,
-        errors=_track,
-        which=driven,
-        fields=_way,
-        moving=True,
-    ),
-    "swing_up": Task(
-        fits=_topples,
-        spread=_hanging,
-        errors=_swing_up,
-        which=toppling,
-        fields=_weak,
-    ),
+    "track": Task(fits=_any, spread=_within_start, errors=_track, which=driven, fields=_way, moving=True),
+    "swing_up": Task(fits=_topples, spread=_hanging, errors=_swing_up, which=toppling, fields=_weak),
     "synchronise": Task(fits=operator.attrgetter("network"), spread=_apart, errors=_synchronise),
 }
