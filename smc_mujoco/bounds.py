@@ -7,9 +7,10 @@ The plant gives four scales, and they give every gain its own:
     M = 1 / g(0)        inertia, kg m^2 or kg
     T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
 
-A gain with the unit of F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. `SCALES` states a,
-b, c for each gain of a law, or that the gain is held at the value the law came with: initial values, exponents, table
-sizes and the filters of a sensor are no gains. A law of your own enters its gains here before it is tuned:
+A gain with the unit of F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a
+force by itself, such as lambda of -lambda tanh(s), is searched up to F: what the actuator cannot give is not a gain.
+`SCALES` states a, b, c for each gain of a law, or that the gain is held at the value the law came with: initial values,
+exponents, table sizes and the filters of a sensor are no gains. Enter the gains of a law of your own before tuning it:
 
     smc_mujoco.bounds.SCALES["my_law"] = {"lam": FORCE, "k1": RATE}
 """
@@ -117,7 +118,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
             raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {gain!r}: {cure}")
         if (unit := known[gain]) is not None:
             scale = unit.of(plant_scales)
-            found[gain] = (scale * 10**-DECADES, scale * 10**DECADES)
+            found[gain] = (scale * 10**-DECADES, scale if unit == FORCE else scale * 10**DECADES)
     if not found:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
     return found
@@ -133,8 +134,13 @@ def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     return found
 
 
+def movable(law: Component, sides: Mapping[str, str]) -> dict[str, str]:
+    """What `at_bound` found, less the gains that are at the actuator's own bound, which is not moved."""
+    return {gain: side for gain, side in sides.items() if side == "lower" or SCALES[law.name][gain] != FORCE}
+
+
 def widened(bounds: Box, sides: Mapping[str, str]) -> dict[str, tuple[float, float]]:
-    """The bounds with those that `at_bound` found moved outwards by a decade."""
+    """The bounds with those that `movable` found moved outwards by a decade."""
     by = 10**WIDENING
     moved = {"lower": lambda low, high: (low / by, high), "upper": lambda low, high: (low, high * by)}
     return {name: moved[sides[name]](*ends) if name in sides else ends for name, ends in bounds.items()}

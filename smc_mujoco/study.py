@@ -14,14 +14,13 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from smc_mujoco import cluster, identity, keep, paper
 from smc_mujoco import executor as executors
 from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import ScenarioError, find, shown, whole
 from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
+from smc_mujoco.initial_states import seeded
 from smc_mujoco.law import Law
 from smc_mujoco.progress import Counter, counter
 from smc_mujoco.run import cores
@@ -50,7 +49,6 @@ REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
 QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=6, duration=5.0)
 MOST = 1_000_000  # runs of a grid, some kB each; chosen
-SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
 
 
 def grid(
@@ -81,7 +79,7 @@ def grid(
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
     return [
-        _seeded(_scenario(plant, law, condition, duration, gains), seed)
+        seeded(_scenario(plant, law, condition, duration, gains), seed)
         for plant in plants
         for condition in conditions
         for law in laws
@@ -99,18 +97,6 @@ def _scenario(plant: str, law: str | Law | Template, condition: str, duration: f
     if isinstance(law, Component | Template):
         return paper.scenario(plant, "none", condition, duration=duration, changes={"law": law})
     return paper.scenario(plant, law, condition, duration=duration, gains=gains)
-
-
-def _seeded(scenario: Scenario, seed: int) -> Scenario:
-    """The scenario from a seed, and from the start that belongs to it."""
-    seed = whole("seed", seed, 0, 2**53 - 1)
-    if seed == 0:
-        return scenario
-    z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
-    kind = scenario.contact.kind
-    inward = z if kind == "none" else [-abs(factor) for factor in z]
-    x0 = [x * (1.0 + SPREAD * factor) for x, factor in zip(scenario.x0, inward, strict=True)]
-    return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
 
 
 def study(

@@ -9,8 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from smc_mujoco import __version__, gains, record
-from smc_mujoco.bounds import DECADES, Box, at_bound
+from smc_mujoco.bounds import Box, at_bound, box
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.files import replacing
@@ -54,7 +56,8 @@ class Tuned:
     Attributes:
       law: with the best gains.
       objective: what they cost, s^2.
-      history: every evaluation, in order.
+      history: every evaluation of the search, in order.
+      finals: the best of them, run accurately; one of these has the gains.
       before: what the gains cost with which the law was given, which the search did not know; s^2.
       plant: the plant.
       definition: what was minimised, its conditions and u_max among it.
@@ -70,6 +73,7 @@ class Tuned:
     law: Component
     objective: float
     history: tuple[Evaluation, ...]
+    finals: tuple[Evaluation, ...]
     before: float
     plant: Plant
     definition: Objective
@@ -117,9 +121,10 @@ class Tuned:
             "at_bound": self.at_bound,
             "scenario": record.describe(scenario),
             "history": [dataclasses.astuple(e) for e in self.history],
+            "finals": [dataclasses.astuple(e) for e in self.finals],
         }
         with replacing(path) as file:
-            file.write_text(json.dumps(data, indent=1) + "\n")
+            file.write_text(json.dumps(data) + "\n")
         return path
 
 
@@ -142,12 +147,17 @@ def load(path: str | os.PathLike) -> Tuned:
         scenario = record.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
+        evaluations = {
+            name: tuple(_evaluation(*entry) for entry in data.get(name, ())) for name in ("history", "finals")
+        }
+        if not evaluations["finals"]:  # tuned before there was a second round: the best of the first one
+            evaluations["finals"] = (min(evaluations["history"], key=lambda e: e.objective),)
         return Tuned(
             **fields,
+            **evaluations,
             law=scenario.law,
             plant=scenario.plant,
             definition=Objective(**data["definition"]),
-            history=tuple(_evaluation(*entry) for entry in data["history"]),
         )
     except FileNotFoundError:
         raise ScenarioError(f"no tuning at {path}: give the path of a .json file that Tuned.save wrote") from None
@@ -156,13 +166,13 @@ def load(path: str | os.PathLike) -> Tuned:
         raise ScenarioError(f"{path} is no tuning ({why}): give a .json file that Tuned.save wrote") from None
 
 
-def shipped(plant: str, law: str, objective: str = "balanced") -> Tuned:
+def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) -> Tuned:
     """The tuning that comes with the package, from which the gains of a set in `gains` are.
 
     Raises:
       ScenarioError: there is none.
     """
-    return load(gains.file(plant, law, objective))
+    return load(gains.file(plant, law, objective, seed))
 
 
 def _evaluation(gains: Sequence[float], objective: float, tracking: float, variation: float) -> Evaluation:
@@ -188,11 +198,10 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         if len(one.history) != one.budget:
             counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
             raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
-        for gain, (low, high) in one.bounds.items():
-            decades = math.log10(high / low)
-            if abs(decades - 2 * DECADES) > 1e-9:
-                width = f"{one.law.name}'s {gain} has {decades:.3g} decades, not {2 * DECADES:g}"
-                raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {width}: tune them alike")
+        for gain, ends in box(one.law, one.scales).items():
+            if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
+                pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
+                raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
     return sorted(tuned, key=lambda one: one.objective)
 
 

@@ -1,17 +1,25 @@
 """Gains by one rule for every law: same actuator bound, objective, budget and search space.
 
-    tuned = tune("duffing", "classical", budget=256, seed=0)     # Tuned(law, objective, history)
+    tuned = tune("duffing", "classical", budget=128, seed=0)     # Tuned(law, objective, history)
     tuned.save("duffing-classical.json")
     compare([tuned, tune("duffing", "observer_free")])           # refuses what was not tuned alike
 
-The rule: a differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin,
-weight 0.2 to 0.7, 16 members, no polishing) in the logarithm of the gains, from a Latin hypercube that has the scales
-themselves in it, never from gains that someone tuned before. Each generation is one batch of runs. Gains are rounded to
-four digits, so that what is printed is what was run; a set that was evaluated before costs no budget. Bounds are those
-of `bounds`. After every 64 evaluations those at which the best lies are moved out by a decade, half of the members are
-drawn anew between them, and the search goes on; `Tuned.at_bound` names gains that are at a bound in the end. A
-population that has collapsed starts anew. Nothing in this depends on the budget, so a longer search repeats a shorter
-one and goes on: it is never worse. `objective` says what is minimised.
+The rule has two rounds, as in successive halving (K. Jamieson & A. Talwalkar, AISTATS 2016): many candidates are run
+cheaply, and the best of them accurately.
+
+1. A differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin, weight 0.2 to
+   0.7, 16 members, no polishing) in the logarithm of the gains. It begins with a Latin hypercube that has the scales
+   themselves in it, never with gains that someone tuned before. Its runs take Euler's method at 1 ms where a plant's own
+   method is RK4: a third of the cost, and an objective within 0.5 % for laws that do not chatter.
+2. After every 64 evaluations the eight best candidates that have not yet been run accurately are run so. The gains are
+   those with the best accurate objective.
+
+Each generation is one batch of runs. Gains are rounded to four digits, so that what is printed is what was run; a set
+that was evaluated before costs no budget. Bounds are those of `bounds`. After every 64 evaluations those at which the
+best lies are moved out by a decade, half of the members are drawn again between them, and the search goes on;
+`Tuned.at_bound` names gains that are at a bound in the end. A population that has collapsed starts again. Nothing in
+this depends on the budget, so a search with a larger budget repeats a shorter one and goes on: it is never worse than
+one whose budget is a multiple of 64. `objective` says what is minimised.
 """
 
 import contextlib
@@ -36,11 +44,13 @@ __all__ = ["Tuned", "compare", "load", "tune"]
 
 RULE = (
     "differential evolution best1bin (16 members, weight 0.2 to 0.7) in the logarithm of the gains, within 1.5 decades"
-    " about their scale by dimension; after every 64 evaluations bounds that the best is at are widened by a decade and"
-    " half of the members drawn anew"
+    " about their scale by dimension, forces up to u_max, under Euler's method at 1 ms; after every 64 evaluations the"
+    " eight best that were not yet run under RK4 are, bounds that the best is at are widened by a decade and half of the"
+    " members drawn again; the best under RK4 is taken"
 )
-MEMBERS, STAGE = 16, 64  # of the population; evaluations after which the bounds are looked at, again and again
-DITHER = (0.2, 0.7)  # differential weight, drawn anew each generation; of three tried the best within 128 evaluations
+MEMBERS, STAGE = 16, 64  # of the population; evaluations after which the best are run accurately, again and again
+FINALISTS = 8  # of a stage
+DITHER = (0.2, 0.7)  # differential weight, drawn each generation; of three tried the best within 128 evaluations
 DIGITS = 4  # of a gain
 LONGEST = 1_000_000  # candidates
 Report = Callable[[int], None]
@@ -49,7 +59,7 @@ Report = Callable[[int], None]
 def tune(
     plant: Plant | str,
     law: Component | Template | str,
-    budget: int = 256,
+    budget: int = 128,
     seed: int = 0,
     objective: Objective | str = "balanced",
     threads: int | None = None,
@@ -60,7 +70,7 @@ def tune(
     Args:
       law: its gains are the starting point of nothing: `Tuned.before` says what they cost. Those held keep their value.
       budget: how many sets of gains are evaluated, each in as many runs as the objective has conditions.
-      seed: of the search, and of the noise that all candidates see alike.
+      seed: of the search, and of the starts and the noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", which has no price on the variation of u.
       threads, progress: as of `run`.
 
@@ -69,7 +79,7 @@ def tune(
     """
     goal = find_objective(objective)
     budget = whole("budget", budget, 1, LONGEST)
-    whole("seed", seed, 0, 2**53 - 1)
+    whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, given.component(law, "law"), seed)
     plant, law = cases[0].plant, cases[0].law
     scales = bounds.scales(plant, goal.u_max, cases[0].model == "nominal")
@@ -78,11 +88,12 @@ def tune(
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
         ledger = _Ledger(goal, cases, tuple(start), budget, threads, drawn.advance)
         box = _search(ledger, start, seed)
-    best = ledger.best
+    best = min(ledger.finals, key=lambda e: e.objective)
     return Tuned(
         law=_with(law, tuple(start), best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
+        finals=tuple(ledger.finals),
         before=before[0] + goal.weight * before[1],
         plant=plant,
         definition=goal,
@@ -101,7 +112,7 @@ class _Spent(Exception):
 
 
 class _Ledger:
-    """What was evaluated, in order; raises _Spent when it is as much as the budget."""
+    """What was evaluated, cheaply and accurately, in order; raises _Spent when it is as much as the budget."""
 
     def __init__(
         self,
@@ -113,8 +124,10 @@ class _Ledger:
         report: Report,
     ):
         self.goal, self.cases, self.names = goal, cases, names
+        self.cheap = [_cheap(case) for case in cases]
         self.budget, self.threads, self.report = budget, threads, report
         self.evaluations: list[Evaluation] = []
+        self.finals: list[Evaluation] = []
         self.known: dict[tuple[float, ...], float] = {}
 
     @property
@@ -127,22 +140,41 @@ class _Ledger:
         asked = [tuple(float(f"{10.0**z:.{DIGITS}g}") for z in column) for column in logs.T.tolist()]
         new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
         left = self.budget - len(self.evaluations)
-        self.evaluate(new[:left])
+        found = self.evaluate(new[:left], self.cheap)
+        self.evaluations += found
+        self.known |= {one.gains: one.objective for one in found}
+        self.report(len(found))
         if len(new) >= left:
             raise _Spent
         return np.array([self.known[gains] for gains in asked])
 
-    def evaluate(self, candidates: Sequence[tuple[float, ...]]) -> None:
-        """Run candidates, all in one batch."""
-        size = len(self.cases)
-        laws = [_with(self.cases[0].law, self.names, gains) for gains in candidates]
-        traces = run([dataclasses.replace(case, law=law) for law in laws for case in self.cases], self.threads)
-        for i, gains in enumerate(candidates):
-            tracking, variation = self.goal.terms(traces[i * size : (i + 1) * size])
-            cost = tracking + self.goal.weight * variation
-            self.known[gains] = cost
-            self.evaluations.append(Evaluation(gains=gains, objective=cost, tracking=tracking, variation=variation))
-        self.report(len(candidates))
+    def decide(self, count: int) -> None:
+        """Run the best of the first candidates accurately, as many as a stage has finalists."""
+        ran = {one.gains for one in self.finals}
+        ranked = sorted(self.evaluations[:count], key=lambda e: e.objective)
+        best = [one for one in ranked if one.gains not in ran][:FINALISTS]
+        self.finals += best if self.cheap == self.cases else self.evaluate([one.gains for one in best], self.cases)
+
+    def evaluate(self, candidates: Sequence[tuple[float, ...]], cases: Sequence[Scenario]) -> list[Evaluation]:
+        """Run candidates in all cases, as one batch."""
+        size = len(cases)
+        laws = [_with(cases[0].law, self.names, gains) for gains in candidates]
+        traces = run([dataclasses.replace(case, law=law) for law in laws for case in cases], self.threads)
+        terms = [self.goal.terms(traces[i : i + size]) for i in range(0, len(traces), size)]
+        return [
+            Evaluation(
+                gains=gains,
+                objective=tracking + self.goal.weight * variation,
+                tracking=tracking,
+                variation=variation,
+            )
+            for gains, (tracking, variation) in zip(candidates, terms, strict=True)
+        ]
+
+
+def _cheap(case: Scenario) -> Scenario:
+    """The case under Euler's method, if its own is RK4."""
+    return dataclasses.replace(case, integrator="Euler") if case.integrator == "RK4" else case
 
 
 def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
@@ -158,9 +190,12 @@ def _search(ledger: _Ledger, start: bounds.Box, seed: int) -> bounds.Box:
         for stage in itertools.count(STAGE, STAGE):
             while len(ledger.evaluations) < stage:
                 members = _evolve(ledger, box, members, random, until=stage)
-            if sides := bounds.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box):
+            ledger.decide(stage)
+            sides = bounds.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box)
+            if sides := bounds.movable(ledger.cases[0].law, sides):
                 box = bounds.widened(box, sides)
                 members[MEMBERS // 2 :] = _hypercube(box, random)[MEMBERS // 2 :]  # or they would stay crowded at it
+    ledger.decide(ledger.budget)
     return box
 
 
