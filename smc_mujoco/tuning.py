@@ -9,8 +9,8 @@ cheaply, and the best of them accurately.
 
 1. A differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin, weight 0.2 to
    0.7, 16 members, no polishing) in the logarithm of the gains. It begins with a Latin hypercube that has the scales
-   themselves in it, never with gains that someone tuned before. Its runs take Euler's method at 1 ms where a plant's own
-   method is RK4: a third of the cost, and an objective within 0.5 % for laws that do not chatter.
+   themselves in it, never with gains that someone tuned before. Its runs take Euler's method at 1 ms where a plant's
+   own method is RK4: a third of the cost, and an objective within 0.5 % for laws that do not chatter.
 2. After every 64 evaluations the eight best candidates that have not yet been run accurately are run so. The gains are
    those with the best accurate objective.
 
@@ -45,8 +45,8 @@ __all__ = ["Tuned", "compare", "load", "tune"]
 RULE = (
     "differential evolution best1bin (16 members, weight 0.2 to 0.7) in the logarithm of the gains, within 1.5 decades"
     " about their scale by dimension, forces up to u_max, under Euler's method at 1 ms; after every 64 evaluations the"
-    " eight best that were not yet run under RK4 are, bounds that the best is at are widened by a decade and half of the"
-    " members drawn again; the best under RK4 is taken"
+    " eight best that were not yet run under RK4 are, bounds that the best is at are widened by a decade and half of"
+    " the members drawn again; the best under RK4 is taken"
 )
 MEMBERS, STAGE = 16, 64  # of the population; evaluations after which the best are run accurately, again and again
 FINALISTS = 8  # of a stage
