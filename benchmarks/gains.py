@@ -13,7 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco import bounds, gains
 from smc_mujoco.paper import PLANTS
 
-BUDGET = 128
+BUDGET = 96
 
 
 def tunings() -> Iterator[tuple[str, str, int]]:

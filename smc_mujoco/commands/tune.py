@@ -14,7 +14,7 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
     ] = "balanced",
-    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to evaluate.")] = 128,
+    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to evaluate.")] = 96,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
     front: Annotated[
@@ -28,7 +28,7 @@ def tune(
     5 s), same number of gains tried, same width of search about the scale that each gain has by dimension. The same
     seed gives the same gains; a larger budget never worse ones.
 
-    Example: smc-mujoco tune duffing observer_free --budget 128 --out duffing.json
+    Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
     with mendable():
         with loading():
