@@ -48,6 +48,7 @@ STILL = 1e-6  # of X, V and u_max
 LEAVING, SHRINKING, NEAR, ROUNDING = 1.05, 0.9, (0.1 * BAND) ** 2, 1e-12  # of the squared distance: factors, sizes
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about how fast the study's plants swing
+LEAST_SAMPLES = 10  # of the shortest runs: two halves of the last fifth of them have one each
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 Report = Callable[[float, float], None]  # told the work done and the most that there can be
@@ -132,14 +133,23 @@ def of(
 
     Args:
       early: whether decided states leave; False runs all of them to the end.
+
+    Raises:
+      ScenarioError: channels of two units, a grid of nothing, or a duration too short for the rule.
     """
     if base.plant.mixed:
         raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
+    horizons = HORIZONS if early else HORIZONS[-1:]
+    least = math.ceil(LEAST_SAMPLES / horizons[0])
+    if base.samples < least:
+        raise ScenarioError(
+            f"duration {base.duration:g} s is too short to tell what comes to rest: "
+            f"give at least {least * base.control_period:g} s"
+        )
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
     open_, done = list(np.ndindex(*outcome.shape)), 0.0
-    horizons = HORIZONS if early else HORIZONS[-1:]
     for i, part in enumerate(horizons):
         first = dataclasses.replace(base, duration=part * base.duration)
         most = done + len(open_) * base.work * sum(horizons[i:])
