@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType, SimpleNamespace
 
+from smc_mujoco import errors
 from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.frozen import frozen
 
@@ -164,7 +165,8 @@ def template(
     """A decorator that makes a Template of a function.
 
     Raises:
-      ScenarioError: a gain's name is no identifier, its default no number, or memory no whole number in 1 .. 10000.
+      ScenarioError: a gain's name is no identifier, its default no number, memory no whole number in 1 .. 10000, or
+        the function's name longer than 100 characters.
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
@@ -182,7 +184,7 @@ def template(
             raise unknown("gain with a sign", name, defaults)
 
     def decorate(function: Callable) -> Template:
-        name = getattr(function, "__name__", type(function).__name__)
+        name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
         except TypeError as error:

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 T = TypeVar("T")
+LONGEST_NAME = 100  # characters: chosen, for tables and figures
 
 
 class ScenarioError(ValueError):
@@ -81,3 +82,12 @@ def whole(what: str, value: object, least: int, most: int) -> int:
     if isinstance(value, bool | np.bool_) or not integral or not least <= value <= most:  # pyright: ignore
         raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
     return int(value)  # pyright: ignore
+
+
+def name(what: str, value: object) -> str:
+    """`value` if it is a name: one line of 1 to 100 printable characters; else ScenarioError naming `what`."""
+    if not isinstance(value, str) or not value.isprintable() or not value.strip():
+        raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
+    if len(value) > LONGEST_NAME:
+        raise ScenarioError(f"{what} is {shown(value)}, {len(value)} characters: give at most {LONGEST_NAME}")
+    return value
