@@ -51,7 +51,8 @@ def run(
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
 
-    MuJoCo's control callback is global to the process: while a run lasts, another thread's own callback is not called.
+    MuJoCo's callbacks are global to the process: while a run lasts, no other one is called, and a run during which
+    somebody sets the control callback is a failure.
     """
     many = [scenarios] if isinstance(scenarios, Scenario) else _listed(scenarios)
     found: list[Trace | None] = [None] * len(many)
