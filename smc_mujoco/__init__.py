@@ -156,7 +156,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = importlib.import_module(f"{__name__}.{_HOME[name]}")
     value = module if name == _HOME[name] == "paper" else getattr(module, name)
-    globals()[name] = value
+    value = globals()[name] = importlib.import_module(f"{__name__}.arguments").explained(value)
     return value
 
 

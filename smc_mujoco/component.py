@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType, SimpleNamespace
 
 from smc_mujoco import errors
-from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.errors import ScenarioError, number, shown, unknown, users_frame, whole
 from smc_mujoco.frozen import frozen
 
 
@@ -105,14 +105,14 @@ class Template:
 
     def __call__(self, **gains: float) -> Component:
         """The function with some of its gains changed; errors and warnings as `bind`."""
-        return self.bind(gains, level=3)
+        return self.bind(gains, warn=True)
 
-    def bind(self, gains: Mapping[str, float], level: int | None = None) -> Component:
+    def bind(self, gains: Mapping[str, float], warn: bool = False) -> Component:
         """The function with some of its gains changed.
 
         Args:
           gains: name -> value.
-          level: of the stack, to which a GainWarning points; None: gains that were warned of before.
+          warn: whether to warn; not of gains that were warned of before.
 
             Raises:
               ScenarioError: unknown gain, not a finite number, or not positive where it must be.
@@ -128,9 +128,9 @@ class Template:
             least = 0.0 if key in self.nonnegative else -math.inf
             values[key] = number(f"{self.name}'s {key}", value, above=above, least=least)
         for words, holds in self.conditions.items():
-            if level is not None and not _holds(holds, SimpleNamespace(**values)):
+            if warn and not _holds(holds, SimpleNamespace(**values)):
                 given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, stacklevel=level)
+                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, users_frame())
         return Component(
             kind=self.kind,
             name=self.name,
