@@ -46,7 +46,7 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        gains = {name: number(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
+        gains = {name: number(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
@@ -126,7 +126,8 @@ class Template:
                 raise unknown(f"gain of {self.name}", key, values)
             above = 0.0 if key in self.positive else -math.inf
             least = 0.0 if key in self.nonnegative else -math.inf
-            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least)
+            endless = math.isinf(self.defaults[key])
+            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=endless)
         for words, holds in self.conditions.items():
             if warn and not _holds(holds, SimpleNamespace(**values)):
                 given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
@@ -173,7 +174,7 @@ def template(
     for key in gains or {}:
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
-    defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
+    defaults = {key: number(f"default of gain {key}", value, infinite=True) for key, value in (gains or {}).items()}
     size, degree = whole("memory", memory, 1, 10_000), whole("degree", degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
