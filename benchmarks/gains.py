@@ -10,16 +10,15 @@ import argparse
 from collections.abc import Iterator
 
 import smc_mujoco as smc
-from smc_mujoco import bounds, gains
+from smc_mujoco import gains
 from smc_mujoco.paper import PLANTS
 
 BUDGET = 96
 
 
 def tunings() -> Iterator[tuple[str, str, int]]:
-    """Objective, law and seed of all tunings: the laws of the first page, all others, their other seeds."""
-    others = sorted(bounds.SCALES.keys() - gains.FORMS.keys() - set(gains.LAWS))
-    yield from (("balanced", law, 0) for law in (*gains.LAWS, *others))
+    """Objective, law and seed of all tunings: every law once, then the laws of the first page from their other seeds."""
+    yield from (("balanced", law, 0) for law in gains.general())
     for name, objective in gains.OBJECTIVES.items():
         first = 1 if name == "tuned" else 0
         yield from ((objective, law, seed) for seed in range(first, gains.SEEDS[name]) for law in gains.LAWS)

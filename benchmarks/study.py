@@ -23,8 +23,9 @@ import smc_mujoco as smc
 from smc_mujoco import executor, paper
 from smc_mujoco.callback import installed
 from smc_mujoco.chunk import Chunk
+from smc_mujoco.grids import grid
 from smc_mujoco.run import cores
-from smc_mujoco.study import grid, study
+from smc_mujoco.study import study
 
 QUICK = "--quick" in sys.argv
 # All at the control period of 1 ms, with the plant's plain equation.

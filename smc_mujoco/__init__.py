@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from smc_mujoco.friction import Coulomb as Coulomb
     from smc_mujoco.friction import LuGre as LuGre
     from smc_mujoco.friction import Viscous as Viscous
+    from smc_mujoco.grids import grid as grid
+    from smc_mujoco.initial_states import starts as starts
     from smc_mujoco.law import Law as Law
     from smc_mujoco.law import law as law
     from smc_mujoco.law import law_function as law_function
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from smc_mujoco.mechanism import deviation as deviation
     from smc_mujoco.metrics import score as score
     from smc_mujoco.metrics import scores as scores
+    from smc_mujoco.named_conditions import condition as condition
     from smc_mujoco.own_model import Channel as Channel
     from smc_mujoco.own_model import plant_from as plant_from
     from smc_mujoco.plant import Plant as Plant
@@ -79,7 +82,6 @@ if TYPE_CHECKING:
     from smc_mujoco.signals import Signal as Signal
     from smc_mujoco.signals import Sine as Sine
     from smc_mujoco.signals import Step as Step
-    from smc_mujoco.study import grid as grid
     from smc_mujoco.study import study as study
     from smc_mujoco.surfaces import Surface as Surface
     from smc_mujoco.surfaces import surface as surface
@@ -111,11 +113,14 @@ _HOMES = {
     "errors": ("ScenarioError",),
     "estimators": ("estimator", "estimator_function", "estimators"),
     "friction": ("Coulomb", "LuGre", "Viscous"),
+    "grids": ("grid",),
+    "initial_states": ("starts",),
     "law": ("Law", "law", "law_function", "laws"),
     "leaderboard": ("leaderboard",),
     "margins": ("margins",),
     "mechanism": ("deviation",),
     "metrics": ("score", "scores"),
+    "named_conditions": ("condition",),
     "own_model": ("Channel", "plant_from"),
     "paper": ("paper",),
     "plant": ("Plant", "plant", "plants"),
@@ -128,7 +133,7 @@ _HOMES = {
     "sensors": ("Encoder",),
     "series": ("TimeSeries",),
     "signals": ("BandLimited", "Constant", "Gust", "Impulse", "OrnsteinUhlenbeck", "Pulse", "Signal", "Sine", "Step"),
-    "study": ("grid", "study"),
+    "study": ("study",),
     "surfaces": ("Surface", "surface", "surface_function", "surfaces"),
     "table": ("Table",),
     "trace": ("Trace", "load"),
@@ -156,7 +161,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = importlib.import_module(f"{__name__}.{_HOME[name]}")
     value = module if name == _HOME[name] == "paper" else getattr(module, name)
-    globals()[name] = value
+    value = globals()[name] = importlib.import_module(f"{__name__}.arguments").explained(value)
     return value
 
 

@@ -32,10 +32,14 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco import paper
+from smc_mujoco.component import Template
 from smc_mujoco.errors import ScenarioError, shown, whole
 from smc_mujoco.files import ended, replacing
+from smc_mujoco.grids import case
+from smc_mujoco.law import Law
 from smc_mujoco.linear import ASIDE
 from smc_mujoco.measure import BAND, last
+from smc_mujoco.named_conditions import Condition
 from smc_mujoco.plant import Plant
 from smc_mujoco.run import stream
 from smc_mujoco.scenario import Scenario
@@ -48,6 +52,7 @@ STILL = 1e-6  # of X, V and u_max
 LEAVING, SHRINKING, NEAR, ROUNDING = 1.05, 0.9, (0.1 * BAND) ** 2, 1e-12  # of the squared distance: factors, sizes
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about how fast the study's plants swing
+LEAST_SAMPLES = 10  # of the shortest runs: two halves of the last fifth of them have one each
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 Report = Callable[[float, float], None]  # told the work done and the most that there can be
@@ -89,8 +94,8 @@ class Basin:
 
 
 def basin(
-    plant: str,
-    law: str,
+    plant: str | Plant,
+    law: str | Law | Template,
     points: tuple[int, int] = (50, 50),
     x: Sequence[float] | np.ndarray | None = None,
     v: Sequence[float] | np.ndarray | None = None,
@@ -98,23 +103,27 @@ def basin(
     duration: float = paper.DURATION,
     threads: int | None = None,
     report: Report = lambda done, most: None,
+    condition: str | Condition = "nominal",
 ) -> Basin:
-    """The map of one of the study's laws on one of its plants.
+    """The map of a law on a plant.
 
     Args:
+      plant, law: names, or a plant and a law of your own.
       points: how many positions and velocities where x or v is not given: then -X .. X and -V .. V, X a half turn, or
         twice the study's start on a rail, and V = 3 X per second.
       gains: a set of `gains.SETS`.
       threads: as of `run`.
       report: called with the work done and the most that there can be, in simulated steps; the latter shrinks as states
         are decided.
+      condition: what holds besides, such as "coulomb".
 
     Raises:
-      ScenarioError: an unknown plant, law or set, or a grid of nothing.
+      ScenarioError: an unknown plant, law, set or condition, or a grid of nothing.
     """
-    changes = {"integrator": "implicitfast"}
-    base = paper.scenario(plant, law, duration=duration, gains=gains, changes=changes)
+    base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     reach = TURN[base.plant.unit](base.plant)
+    if not reach and (x is None or v is None):
+        raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", points, strict=True))
     xs = np.linspace(-reach, reach, nx) if x is None else x
     return of(base, xs, np.linspace(-PACE * reach, PACE * reach, nv) if v is None else v, threads, report)
@@ -132,14 +141,23 @@ def of(
 
     Args:
       early: whether decided states leave; False runs all of them to the end.
+
+    Raises:
+      ScenarioError: channels of two units, a grid of nothing, or a duration too short for the rule.
     """
     if base.plant.mixed:
         raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
+    horizons = HORIZONS if early else HORIZONS[-1:]
+    least = math.ceil(LEAST_SAMPLES / horizons[0])
+    if base.samples < least:
+        raise ScenarioError(
+            f"duration {base.duration:g} s is too short to tell what comes to rest: "
+            f"give at least {least * base.control_period:g} s"
+        )
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
     open_, done = list(np.ndindex(*outcome.shape)), 0.0
-    horizons = HORIZONS if early else HORIZONS[-1:]
     for i, part in enumerate(horizons):
         first = dataclasses.replace(base, duration=part * base.duration)
         most = done + len(open_) * base.work * sum(horizons[i:])

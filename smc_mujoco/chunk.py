@@ -68,7 +68,7 @@ class Chunk:
     def __init__(self, scenarios: Sequence[Scenario], threads: int):
         first = self.first = scenarios[0]
         self.scenarios = scenarios
-        self.logs = [np.empty((row.LOGS, first.samples + 1, first.plant.n)) for _ in scenarios]
+        self.logs = [np.full((row.LOGS, first.samples + 1, first.plant.n), np.nan) for _ in scenarios]
         self.table = np.empty((first.plant.n, COLUMNS), np.int64)
         self.contents = [contents(scenario) for scenario in scenarios]  # whose addresses the rows hold
         rows = [
@@ -89,6 +89,7 @@ class Chunk:
             qpos[i], qvel[i] = assembly.start(self.model, scenario)
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}
+        self.calls = 0  # of the callback that each simulation has had
         self.spare = mujoco.MjData(self.model)
         self.retold = False  # whether a failure was run again for its words
         self.set_parameters(0, range(len(scenarios)))
@@ -103,7 +104,7 @@ class Chunk:
             if start:
                 self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
             self.advance(end - start, report)
-        self.attempt(self.batch.forward)  # the callback's last sample, at the end
+        self.attempt(self.batch.forward, 1)  # the callback's last sample, at the end
         return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
@@ -135,13 +136,18 @@ class Chunk:
         while steps:
             most = FOREIGN_STEPS if self.first.plant.direct else SLICE_STEPS // size
             count = min(steps, max(1, most))
-            self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count))
+            self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count), count * self.first.stages)
             report(count * size)
             steps -= count
 
-    def attempt(self, action: Callable[[np.ndarray], None]) -> None:
-        """Do something to the simulations that still run; note those in which MuJoCo raises."""
+    def attempt(self, action: Callable[[np.ndarray], None], calls: int) -> None:
+        """Do something to the simulations that still run; note those in which MuJoCo raises, or that lack calls.
+
+        Args:
+          calls: how often it has the callback called in each.
+        """
         alive = np.flatnonzero(self.rows[:, row.FAILURE] == row.FINE).astype(np.int32)
+        before, self.calls = self.calls, self.calls + calls
         try:
             action(alive)
         except SimulationError as error:
@@ -149,6 +155,10 @@ class Chunk:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
                 self.rows[i, row.FAILURE] = row.DIVERGED
                 self.rows[i, row.FAILED_STEP] = self.rows[i, row.CALLS] // self.rows[i, row.STAGES]
+        except (ValueError, mujoco.UnexpectedError):
+            pass  # someone's Python function took the callback's place; the count of calls tells
+        short = [i for i in alive if i not in self.errors and self.rows[i, row.CALLS] != self.calls]
+        self.rows[short, row.FAILURE], self.rows[short, row.FAILED_STEP] = row.INTERRUPTED, before // self.first.stages
 
     def trace(self, i: int) -> Trace:
         """The Trace of simulation i."""
@@ -167,7 +177,7 @@ class Chunk:
     def reason(self, i: int, failure: int) -> str:
         """What went wrong in simulation i."""
         scenario = self.scenarios[i]
-        if failure >= row.NOT_FINITE and not self.retold:
+        if row.NOT_FINITE <= failure < row.INTERRUPTED and not self.retold:
             self.retold = True  # Python knows what was raised, and where; it is slow, so one run a chunk tells for all
             if told := plain.run(scenario).failure:
                 return told.rpartition(", at t = ")[0]
@@ -181,6 +191,7 @@ class Chunk:
             row.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
             row.LAW_RAISED: f"{law} raised an exception",
             row.DISTURBANCE_RAISED: "a disturbance raised an exception",
+            row.INTERRUPTED: plain.INTERRUPTED,
             row.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[failure]
 

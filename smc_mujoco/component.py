@@ -16,7 +16,8 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import ModuleType, SimpleNamespace
 
-from smc_mujoco.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco import errors
+from smc_mujoco.errors import ScenarioError, number, shown, unknown, users_frame, whole
 from smc_mujoco.frozen import frozen
 
 
@@ -45,7 +46,7 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        gains = {name: number(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
+        gains = {name: number(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
@@ -104,14 +105,14 @@ class Template:
 
     def __call__(self, **gains: float) -> Component:
         """The function with some of its gains changed; errors and warnings as `bind`."""
-        return self.bind(gains, level=3)
+        return self.bind(gains, warn=True)
 
-    def bind(self, gains: Mapping[str, float], level: int | None = None) -> Component:
+    def bind(self, gains: Mapping[str, float], warn: bool = False) -> Component:
         """The function with some of its gains changed.
 
         Args:
           gains: name -> value.
-          level: of the stack, to which a GainWarning points; None: gains that were warned of before.
+          warn: whether to warn; not of gains that were warned of before.
 
             Raises:
               ScenarioError: unknown gain, not a finite number, or not positive where it must be.
@@ -125,11 +126,12 @@ class Template:
                 raise unknown(f"gain of {self.name}", key, values)
             above = 0.0 if key in self.positive else -math.inf
             least = 0.0 if key in self.nonnegative else -math.inf
-            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least)
+            endless = math.isinf(self.defaults[key])
+            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=endless)
         for words, holds in self.conditions.items():
-            if level is not None and not _holds(holds, SimpleNamespace(**values)):
+            if warn and not _holds(holds, SimpleNamespace(**values)):
                 given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, stacklevel=level)
+                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, users_frame())
         return Component(
             kind=self.kind,
             name=self.name,
@@ -164,14 +166,15 @@ def template(
     """A decorator that makes a Template of a function.
 
     Raises:
-      ScenarioError: a gain's name is no identifier, its default no number, or memory no whole number in 1 .. 10000.
+      ScenarioError: a gain's name is no identifier, its default no number, memory no whole number in 1 .. 10000, or
+        the function's name longer than 100 characters.
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     for key in gains or {}:
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
-    defaults = {key: number(f"default of gain {key}", value) for key, value in (gains or {}).items()}
+    defaults = {key: number(f"default of gain {key}", value, infinite=True) for key, value in (gains or {}).items()}
     size, degree = whole("memory", memory, 1, 10_000), whole("degree", degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
@@ -182,7 +185,7 @@ def template(
             raise unknown("gain with a sign", name, defaults)
 
     def decorate(function: Callable) -> Template:
-        name = getattr(function, "__name__", type(function).__name__)
+        name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
         except TypeError as error:

@@ -1,14 +1,17 @@
 """The one error users see: a sentence that names the thing, the value and the cure; and the checks that raise it."""
 
 import difflib
+import itertools
 import math
 import numbers
+import sys
 from collections.abc import Iterable, Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 T = TypeVar("T")
+LONGEST_NAME = 100  # characters: chosen, for tables and figures
 
 
 class ScenarioError(ValueError):
@@ -16,9 +19,22 @@ class ScenarioError(ValueError):
 
 
 def shown(value: object) -> str:
-    """A value on one line, cut where it is long."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    """A value on one line, cut where it is long; its class in <> where its repr fails."""
+    try:
+        text = " ".join(_brief(value).split())
+    except Exception:  # of a user's class, in a list too; RecursionError where lists nest deep
+        text = f"<{type(value).__name__}>"
+    text = text if len(text) <= 60 else f"{text[:57]}..."
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def _brief(value: object) -> str:
+    """repr, of long texts, lists and dicts that of their beginning."""
+    if isinstance(value, str | bytes | list | tuple):
+        value = value[:60]
+    elif isinstance(value, dict):
+        value = dict(itertools.islice(value.items(), 60))
+    return repr(value)
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
@@ -54,12 +70,11 @@ def number(
     infinite: bool = False,
 ) -> float:
     """`value` as a float in (above, inf) and [least, most], or ScenarioError naming `what`."""
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value.item()
-    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+    real = _real(value)
+    if real is None:
         raise ScenarioError(f"{what} is {shown(value)}: give a number")
     try:
-        x = float(value)
+        x = float(real)
     except OverflowError:
         x = math.inf
     if math.isnan(x) or (math.isinf(x) and not infinite):
@@ -75,9 +90,32 @@ def number(
 
 def whole(what: str, value: object, least: int, most: int) -> int:
     """`value` as an int in [least, most], or ScenarioError naming `what`."""
+    real = _real(value)
+    if real is None or not least <= real <= most or real != real // 1:
+        raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
+    return int(real)
+
+
+def _real(value: Any) -> Any:
+    """The real number that a value is, also in an array without axes; None for another value, flag or duration."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    integral = isinstance(value, numbers.Integral) or (isinstance(value, numbers.Real) and value == value // 1)
-    if isinstance(value, bool | np.bool_) or not integral or not least <= value <= most:  # pyright: ignore
-        raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
-    return int(value)  # pyright: ignore
+    number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
+    return value if number else None
+
+
+def name(what: str, value: object) -> str:
+    """`value` if it is a name: one line of 1 to 100 printable characters; else ScenarioError naming `what`."""
+    if not isinstance(value, str) or not value.isprintable() or not value.strip():
+        raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
+    if len(value) > LONGEST_NAME:
+        raise ScenarioError(f"{what} is {shown(value)}, {len(value)} characters: give at most {LONGEST_NAME}")
+    return value
+
+
+def users_frame() -> int:
+    """The stacklevel of a warning for which it points to the user's line: the nearest that is not in this package."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "smc_mujoco":
+        frame, level = frame.f_back, level + 1
+    return level

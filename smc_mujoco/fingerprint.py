@@ -98,7 +98,8 @@ def _all(things: Iterable[Any], seen: Seen) -> Iterator[bytes]:
 
 
 def _written(thing: Any) -> Any:
-    """The function as it was written, of one that numba compiles, a static method, or one whose results are kept."""
+    """The function as it was written, of one that is compiled, a static method, kept results or a public one."""
+    thing = getattr(thing, "explains", thing) if isinstance(thing, FunctionType) else thing
     if not isinstance(thing, FunctionType | MethodType | type):
         for name in ("py_func", "__func__", "__wrapped__"):
             thing = getattr(thing, name, thing)

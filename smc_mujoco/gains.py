@@ -18,6 +18,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from smc_mujoco import bounds
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.law import law as find_law
@@ -33,11 +34,13 @@ LAWS = (
 )  # fmt: skip
 SEEDS = {"tuned": 3, "tracking": 1}  # set -> from how many seeds the laws of LAWS are tuned
 
-# The same law computed otherwise, as firmware would: it takes the gains of the law itself.
+# The same law computed otherwise, or under the name of its published form: it takes the gains of the law itself.
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
-SAME = {"conditioned_super_twisting": "super_twisting"}  # in the first set, whose gains it was not given: its rival's
+FORMS["super_twisting_unclamped"] = "super_twisting"
+SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the first set, whose gains it was not given
+UNTUNED = {"none", "swing_up", *FORMS}  # laws that have units, and are no rivals
 
-# The first set: plant -> law -> gains.
+# The first set: plant -> law -> gains. Super-twisting's were found with its integral held within u_max, and are run so.
 STUDY: dict[str, dict[str, dict[str, float]]] = {
     "inverted_pendulum": {
         "observer_free": {"lam": 4.364, "k1": 9.708},
@@ -45,7 +48,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
         "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
         "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
         "adaptive_leak": {"gamma": 20.31, "c": 12.0, "leak": 8.865, "deadzone": 0.2114, "k0": 0.0},
-        "super_twisting": {"k1": 2.489, "k2": 16.92, "c": 10.04},
+        "super_twisting": {"k1": 2.489, "k2": 16.92, "c": 10.04, "w_max": 6.0},
     },
     "van_der_pol": {
         "observer_free": {"lam": 6.0, "k1": 1.976},
@@ -53,7 +56,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
         "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
         "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
         "adaptive_leak": {"gamma": 7.738, "c": 2.821, "leak": 0.9379, "deadzone": 0.03367, "k0": 0.0},
-        "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16},
+        "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16, "w_max": 6.0},
     },
     "duffing": {
         "observer_free": {"lam": 6.0, "k1": 3.076},
@@ -61,7 +64,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
         "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
         "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
         "adaptive_leak": {"gamma": 13.87, "c": 4.256, "leak": 2.979, "deadzone": 0.009447, "k0": 0.0},
-        "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061},
+        "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061, "w_max": 6.0},
     },
     "pendulum_network": {
         "observer_free": {"lam": 2.922, "k1": 6.19},
@@ -69,7 +72,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
         "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
         "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
         "adaptive_leak": {"gamma": 24.32, "c": 9.468, "leak": 9.259, "deadzone": 0.3184, "k0": 0.0},
-        "super_twisting": {"k1": 1.87, "k2": 1.145, "c": 6.256},
+        "super_twisting": {"k1": 1.87, "k2": 1.145, "c": 6.256, "w_max": 6.0},
     },
     "inverted_pendulum_network": {
         "observer_free": {"lam": 3.961, "k1": 9.362},
@@ -77,7 +80,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
         "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
         "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
         "adaptive_leak": {"gamma": 28.47, "c": 11.36, "leak": 11.46, "deadzone": 0.153, "k0": 0.0},
-        "super_twisting": {"k1": 1.95, "k2": 1.057, "c": 9.086},
+        "super_twisting": {"k1": 1.95, "k2": 1.057, "c": 9.086, "w_max": 6.0},
     },
 }
 
@@ -96,7 +99,12 @@ def law(plant: str, name: str, gains: str = "tuned", seed: int = 0) -> Component
     if gains == "default":
         return base
     found = _study(plant, name) if gains == "study" else _found(plant, FORMS.get(name, name), gains, seed)
-    return dataclasses.replace(base, gains=dict(base.gains) | dict(found))
+    return dataclasses.replace(base, gains={gain: found.get(gain, value) for gain, value in base.gains.items()})
+
+
+def general() -> tuple[str, ...]:
+    """Every law that can be a rival on any of the paper's plants: those of LAWS, then all others by name."""
+    return *LAWS, *sorted(bounds.SCALES.keys() - UNTUNED - set(LAWS))
 
 
 def tunings(gains: str, name: str) -> int:

@@ -1,7 +1,8 @@
-"""Who holds MuJoCo's control callback, which is one for the whole process; and models compiled whoever does.
+"""Who holds MuJoCo's callbacks, which are the whole process's; and models compiled whoever does.
 
-MuJoCo compiles no model while a Python callback is installed: it would call that with a model Python does not know. The
-plain loop installs one; the harness is native, and a model compiles under it.
+Of its eight callbacks a run installs the control callback and takes the others away, as a trace is to depend on its
+scenario alone. MuJoCo compiles no model while one of them is a Python function: it would call that with a model Python
+does not know. The plain loop installs one; the harness is native, and a model compiles under it.
 """
 
 import contextlib
@@ -12,6 +13,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import mujoco
+
+CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 
 _lock = threading.RLock()  # whoever has replaced the callback
 _free = threading.RLock()  # whoever compiles where no Python callback is; held shortly, and nothing waited for under it
@@ -30,21 +33,22 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def held(control: Any) -> Iterator[None]:
-    """That control callback, None for none, for the length of a with block; then again what was there before.
+    """That control callback, None for none, and no other callback for the length of a with block.
 
-    Other threads, whose runs would go on without their laws, are waited for, and wait.
+    Then all are again what they were before. Other threads, whose runs would go on without their laws, are waited for,
+    and wait.
     """
     with _lock:
-        before = mujoco.get_mjcb_control()
+        before = _installed()
         try:
-            _put(control)
+            _put(dict.fromkeys(CALLBACKS) | {"control": control})
             yield
         finally:
             _put(before)
 
 
 def uninstalled() -> contextlib.AbstractContextManager[None]:
-    """No control callback for the length of a with block."""
+    """No callback for the length of a with block."""
     return held(None)
 
 
@@ -58,16 +62,24 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
       ValueError: MuJoCo cannot compile it.
     """
     with _free:
-        if not _python(mujoco.get_mjcb_control()):
+        if not any(map(_python, _installed().values())):
             return spec.compile()
     with uninstalled():
         return spec.compile()
 
 
-def _put(control: Any) -> None:
-    with _free if _python(control) else contextlib.nullcontext():
-        mujoco.set_mjcb_control(control)
+def _installed() -> dict[str, Any]:
+    """Every callback by its name, None where there is none."""
+    return {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
 
 
-def _python(control: Any) -> bool:
-    return control is not None and not isinstance(control, ctypes._CFuncPtr)
+def _put(callbacks: dict[str, Any]) -> None:
+    """Install callbacks, as `_installed` gives them, where they are not there yet."""
+    with _free if any(map(_python, callbacks.values())) else contextlib.nullcontext():
+        for name, callback in callbacks.items():
+            if getattr(mujoco, f"get_mjcb_{name}")() is not callback:
+                getattr(mujoco, f"set_mjcb_{name}")(callback)
+
+
+def _python(callback: Any) -> bool:
+    return callback is not None and not isinstance(callback, ctypes._CFuncPtr)

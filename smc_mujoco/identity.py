@@ -7,13 +7,14 @@ from typing import Any
 
 from smc_mujoco import fingerprint, paper, record, source
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.named_conditions import NAMED
 from smc_mujoco.own_channels import recorded
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
 
 OURS = "smc_mujoco."
 # Of a description: what tells no condition from another, for it is of the plant, the law or the run.
-NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions")
+NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
 TELL = ("claims", "draw", "testing", "tuned_gains")  # folders that say something of runs, and change none
 LONGEST = 60  # characters of a condition's name
 
@@ -50,7 +51,7 @@ def row(scenario: Scenario) -> dict[str, Any]:
 
 
 def condition(scenario: Scenario) -> str:
-    """The name that `paper.CONDITIONS` has for the run's conditions, or what sets them apart from the nominal ones.
+    """The name of the run's condition: given, the suite's own, or what sets it apart from the nominal one.
 
     Plant, law, start, seed and duration are no conditions.
     """
@@ -58,6 +59,8 @@ def condition(scenario: Scenario) -> str:
 
 
 def _key(scenario: Scenario, data: dict[str, Any]) -> str:
+    if scenario.condition in NAMED:  # which the fields tell
+        data = data | {"condition": None}
     text = json.dumps([data, _codes(scenario), source.code(*TELL)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -75,6 +78,8 @@ def _codes(s: Scenario) -> list[str]:
 
 
 def _condition(scenario: Scenario, data: dict[str, Any]) -> str:
+    if scenario.condition:
+        return scenario.condition
     known = _conditions(scenario.plant, scenario.duration)
     if (text := _compared(data)) in known:
         return known[text]
@@ -93,9 +98,9 @@ def _compared(data: dict[str, Any]) -> str:
 def _conditions(plant: Plant, duration: float) -> dict[str, str]:
     """What runs of a plant look like in the paper's conditions -> their names, the nominal one first."""
     found: dict[str, str] = {}
-    for name in paper.CONDITIONS:
+    for name in NAMED:
         try:
-            given = paper.fields(name, plant.name, duration)
+            given = paper.fields(name, plant, duration)
             common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
             common |= {"control_period": paper.CONTROL_PERIOD}
             if not plant.limits:  # else it is what its motors give, unless somebody says another

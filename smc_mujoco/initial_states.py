@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.errors import number, whole
+from smc_mujoco.errors import number
 from smc_mujoco.scenario import Scenario
 
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
@@ -40,6 +40,11 @@ class Starts:
     def __post_init__(self):
         number("spread", self.spread, least=0.0)
         number("by", self.by, least=0.0)
+
+    def reach(self, scenario: Scenario) -> float:
+        """The largest distance from 0 of any channel at a start, rad or m."""
+        middle = scenario.x0 if self.x0 is None else self.x0
+        return max(abs(x) for x in middle) or self.by
 
     def place(self, scenario: Scenario, seed: int) -> Scenario:
         """The scenario with a seed, from the start that belongs to it."""
@@ -70,8 +75,3 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     """
     items = x0 if isinstance(x0, Sequence) and not isinstance(x0, str) else (x0,)
     return Starts(x0=None if x0 is None else tuple(number("x0", item) for item in items), spread=spread, by=by)
-
-
-def seeded(scenario: Scenario, seed: int, around: Starts | None = None) -> Scenario:
-    """A scenario of a grid: with one of the seeds that grids take, from its start."""
-    return (around or Starts()).place(scenario, whole("seed", seed, 0, SEEDS - 1))

@@ -14,7 +14,6 @@ from smc_mujoco.scene import slug
 from smc_mujoco.table import Table
 
 CHOICES = ("none", "worst", "all")
-LONGEST = 40  # characters of a condition in a file's name
 
 
 def folder(out: str | os.PathLike) -> Path:
@@ -24,8 +23,8 @@ def folder(out: str | os.PathLike) -> Path:
 
 def path(folder: Path, row: Mapping[str, Any]) -> Path:
     """The file of a row's trace."""
-    condition = slug(row["condition"])[:LONGEST]
-    return folder / f"{row['plant']}-{condition}-{slug(row['law'])}-{row['seed']}-{row['hash'][:8]}.npz"
+    names = "-".join(slug(row[column]) for column in ("plant", "condition", "law"))
+    return folder / f"{names}-{row['seed']}-{row['hash'][:8]}.npz"
 
 
 def worst(table: Table) -> list[int]:

@@ -155,7 +155,7 @@ def law(name: str, **gains: float) -> Law:
     Raises:
       ScenarioError: unknown law or gain, or a gain out of its range.
     """
-    return find("law", name, catalogue()).bind(gains, level=3)
+    return find("law", name, catalogue()).bind(gains, warn=True)
 
 
 def fits(law: Law | Template, plant: Plant) -> bool:

@@ -26,8 +26,14 @@ from typing import Any
 from smc_mujoco import gains as sets
 from smc_mujoco import paper
 from smc_mujoco.bearing import SPECS, bears
+from smc_mujoco.component import Template
 from smc_mujoco.errors import ScenarioError, find
 from smc_mujoco.files import ended, replacing
+from smc_mujoco.grids import case, listed
+from smc_mujoco.initial_states import Starts
+from smc_mujoco.law import Law
+from smc_mujoco.named_conditions import Condition
+from smc_mujoco.plant import Plant
 from smc_mujoco.run import stream
 from smc_mujoco.scenario import Scenario
 
@@ -69,28 +75,42 @@ class Margin:
 
 
 def margins(
-    plants: Sequence[str] = paper.PLANTS,
-    laws: Sequence[str] = sets.LAWS,
-    kinds: Sequence[str] = KINDS,
+    plants: str | Plant | Sequence[str | Plant] = paper.PLANTS,
+    laws: str | Law | Template | Sequence[str | Law | Template] = sets.LAWS,
+    kinds: str | Sequence[str] = KINDS,
     gains: str = "tuned",
     quick: bool = False,
     threads: int | None = None,
     report: Report = lambda done, whole: None,
+    condition: str | Condition = "nominal",
+    starts: Starts | None = None,
 ) -> list[Margin]:
-    """The margins of the study's laws on its plants: plant by plant, law by law, kind by kind.
+    """The margins of laws on plants: plant by plant, law by law, kind by kind.
 
     Args:
+      plants, laws: names, or plants and laws of your own, one or several.
+      kinds: of KINDS, one or several.
       gains: a set of `gains.SETS`.
       quick: runs of 5 s, to within 5 control periods or 10 %: for a look.
       threads: as of `run`.
       report: called with the work done and the whole, in simulated steps; the whole grows while it is being found out.
+      condition: what holds besides, such as "coulomb".
+      starts: where runs begin. Default: the plant's own x0.
 
     Raises:
-      ScenarioError: an unknown plant, law, kind or set.
+      ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
     """
     duration = QUICK if quick else paper.DURATION
-    bases = [paper.scenario(plant, law, duration=duration, gains=gains) for plant in plants for law in laws]
-    return of(bases, kinds, COARSE if quick else FINE, threads, report)
+    bases = [
+        case(plant, law, condition, duration, gains, starts=starts)
+        for plant in listed("plants", plants)
+        for law in listed("laws", laws)
+    ]
+    for base in bases:
+        if not any(base.x0):
+            cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
+            raise ScenarioError(f"{base.plant.name} starts at 0, of which no margin is a part: {cure}")
+    return of(bases, [kinds] if isinstance(kinds, str) else kinds, COARSE if quick else FINE, threads, report)
 
 
 def of(

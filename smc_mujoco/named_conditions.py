@@ -34,7 +34,7 @@ from smc_mujoco.part import Part
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.sensors import Encoder
-from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
+from smc_mujoco.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
 
@@ -205,7 +205,7 @@ def _kinds() -> dict[str, Callable[..., Any]]:
     bases: list[type] = [Part, Signal]
     for base in bases:
         bases += base.__subclasses__()
-    return {kind.__name__: kind for kind in (*found, *bases)}
+    return {kind.__name__: kind for kind in (*found, *bases) if not kind.__subclasses__() and kind is not Recorded}
 
 
 def _text(value: Any) -> str:

@@ -17,6 +17,8 @@ that does not fail, and less the later it fails.
 
 import dataclasses
 import functools
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -24,12 +26,14 @@ from smc_mujoco import metrics, paper
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, find, number, shown
 from smc_mujoco.initial_states import SEEDS, Starts
+from smc_mujoco.named_conditions import NAMED, Condition, find_condition
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.trace import Trace
 
 DURATION = 5.0  # s, chosen: half the study's, 8 T and more of its plants; settled runs add little after it
-CONDITIONS = ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy")
+CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
+AROUND = Starts()
 RUNS = 1000  # seeds of runs that a seed of tuning has: one a condition
 FAILED = 1e9  # s^2; a run fails beyond |x| = 1e6, so ITAE / |x0| is less for any |x0| > 0.05, and is cut there
 
@@ -39,7 +43,8 @@ class Objective:
     """J as data; two tunings are comparable only if theirs are equal.
 
     Attributes:
-      conditions: names of conditions of the paper's study; each is one run of a candidate.
+      conditions: names, or conditions of your own; each is one run of a candidate.
+      starts: where its runs begin, see `starts`.
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
@@ -49,37 +54,42 @@ class Objective:
       ScenarioError: an unknown condition, or a number out of its range.
     """
 
-    conditions: tuple[str, ...] = CONDITIONS
+    conditions: tuple[Condition, ...] = CONDITIONS
+    starts: Starts = AROUND
     weight: float = 1e-3
     duration: float = DURATION
     control_period: float = paper.CONTROL_PERIOD
     u_max: float = paper.U_MAX
 
     def __post_init__(self):
-        if isinstance(self.conditions, str) or not self.conditions:
+        found = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
+        if not 0 < len(found) <= RUNS:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
-        object.__setattr__(self, "conditions", tuple(self.conditions))
-        for name in self.conditions:
-            find("condition of the paper's study", name, paper.CONDITIONS)
+        object.__setattr__(self, "conditions", tuple(find_condition(one) for one in found))
+        if not isinstance(self.starts, Starts):
+            raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
         number("weight", self.weight, least=0.0)
         for name in ("duration", "control_period", "u_max"):
             number(name, getattr(self, name), above=0.0)
 
     def __str__(self) -> str:
         terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
-        return f"sum over {', '.join(self.conditions)} of {terms}, |u| <= {self.u_max:g}"
+        return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}, |u| <= {self.u_max:g}"
+
+    def described(self) -> dict[str, Any]:
+        """As plain data that JSON holds, from which `described` makes it again."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return values | {
+            "conditions": [str(one) for one in self.conditions],
+            "starts": dataclasses.asdict(self.starts),
+        }
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
         """One run for each condition; every candidate has the same starts and the same noise."""
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
-        return [
-            Starts().place(
-                dataclasses.replace(first, **paper.fields(name, first.plant.name, self.duration)),
-                SEEDS + RUNS * seed + i,
-            )
-            for i, name in enumerate(self.conditions)
-        ]
+        cases = [dataclasses.replace(first, **one.on(first.plant, self.duration)) for one in self.conditions]
+        return [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
         """Tracking and variation of a candidate's runs, each summed over them; J = tracking + weight variation."""
@@ -93,6 +103,14 @@ class Objective:
         start = float(np.abs(trace.x[0]).sum())
         tracking = min(metrics.itae(trace) / start, FAILED)
         return tracking, metrics.tv(trace) / (self.u_max * self.duration)
+
+
+def described(data: Mapping[str, Any]) -> Objective:
+    """The objective of `Objective.described`; one from before there were starts has the default ones."""
+    found = dict(data.get("starts", {}))
+    if found.get("x0") is not None:
+        found["x0"] = tuple(found["x0"])
+    return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**found)})
 
 
 @functools.cache

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco import mjcf
+from smc_mujoco import errors, mjcf
 from smc_mujoco.believed import Believed
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.motors import MOTOR, Motor, motor_of, put
@@ -166,7 +166,7 @@ def named(name: str | None, file: Path) -> str:
     """The plant's name; none of the library's, as laws, gains and conditions go by them."""
     if name is None:
         return file.stem if file.stem not in catalogue() else file.name
-    if not isinstance(name, str) or not name or name in catalogue():
+    if errors.name("name", name) in catalogue():
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     return name
 

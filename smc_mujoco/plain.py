@@ -26,6 +26,11 @@ from smc_mujoco.trace import Trace, from_log
 
 LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {WORLD:g}, or NaN)"
 
+INTERRUPTED = (
+    "MuJoCo's control callback was set by someone else during the run, which went on without its law: "
+    "call mujoco.set_mjcb_control before or after it, or put back what mujoco.get_mjcb_control() gave"
+)
+
 
 def run(scenario: Scenario) -> Trace:
     """One run in the plain loop."""
@@ -85,6 +90,9 @@ class Loop:
             mujoco.mj_step(self.model, self.data)
         else:
             mujoco.mj_forward(self.model, self.data)
+        due = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
+        if self.calls != due and self.failure is None:
+            self.failure, self.failed_step = INTERRUPTED, step
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""

@@ -44,6 +44,7 @@ def describe(scenario: Scenario) -> dict:
             "mismatch": dict(scenario.mismatch),
             "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
             "mechanism": scenario.mechanism,
+            "condition": scenario.condition,
             "left_out": scenario.left_out,
         }
         | {name: _parts(getattr(scenario, name)) for name in PARTS}
@@ -82,7 +83,8 @@ def _restore(data: dict) -> Scenario:
         jump=data["jump"] and Jump(**data["jump"]),
     )
     again = dataclasses.replace(scenario, **dict.fromkeys(data.get("left_out", ())))
-    return again if again == scenario else scenario  # the defaults of another version stay what they were
+    found = again if again == scenario else scenario  # the defaults of another version stay what they were
+    return found.named(data.get("condition"))
 
 
 def _plant(plant: Plant) -> dict:

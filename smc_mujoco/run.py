@@ -14,7 +14,7 @@ from typing import overload
 from smc_mujoco import assembly, callback, plain
 from smc_mujoco.chunk import Chunk, Report, contents
 from smc_mujoco.compiled import NotCompilable
-from smc_mujoco.errors import ScenarioError, shown, whole
+from smc_mujoco.errors import ScenarioError, shown, users_frame, whole
 from smc_mujoco.progress import bar
 from smc_mujoco.row import LOGS
 from smc_mujoco.scenario import Scenario
@@ -51,7 +51,8 @@ def run(
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
 
-    MuJoCo's control callback is global to the process: while a run lasts, another thread's own callback is not called.
+    MuJoCo's callbacks are global to the process: while a run lasts, no other one is called, and a run during which
+    somebody sets the control callback is a failure.
     """
     many = [scenarios] if isinstance(scenarios, Scenario) else _listed(scenarios)
     found: list[Trace | None] = [None] * len(many)
@@ -77,7 +78,7 @@ def stream(
             contents(scenario)  # compiles
             groups.setdefault(layout(scenario), []).append(index)
         except NotCompilable as error:
-            warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, stacklevel=3)
+            warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, users_frame())
             slow.append(index)
     for indices in [*groups.values(), *([index] for index in slow)]:
         assembly.check_starts([scenarios[i] for i in indices])

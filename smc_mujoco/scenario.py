@@ -5,6 +5,7 @@ may believe (the plant's nominal parameters) are kept apart. Two scenarios that 
 last bit.
 """
 
+import copy
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -62,6 +63,7 @@ class Scenario:
       mechanism: "equation", or another build of the mechanism that the plant offers.
       actuator: between command and joint: Lag, RateLimit or DCMotor, and Backlash; None: the command is the force.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
+      condition: what a grid calls the run's condition, see `named`; no argument, and gone where a field is replaced.
 
     Raises:
       ScenarioError: for anything out of its range, in one sentence.
@@ -91,6 +93,7 @@ class Scenario:
     mechanism: str = "equation"
     actuator: tuple[Actuator, ...] = ()
     sensor: Encoder | None = None
+    condition: str | None = dataclasses.field(default=None, init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:  # what the fields are made from; what they are stands above
 
@@ -160,6 +163,12 @@ class Scenario:
         put("integrator", given.integrator(self.integrator, self.realistic))
         put("seed", whole("seed", self.seed, 0, 2**53 - 1))
         consistency.check(self)
+
+    def named(self, condition: str | None) -> "Scenario":
+        """This scenario under a name for its condition, which tables show and which changes nothing of the run."""
+        found = copy.copy(self)
+        object.__setattr__(found, "condition", condition)
+        return found
 
     @property
     def realistic(self) -> bool:

@@ -7,6 +7,7 @@ A scene file has a docstring - the question, the figure of the paper it answers,
 
 import ast
 import dataclasses
+import hashlib
 import re
 import runpy
 import sys
@@ -14,11 +15,14 @@ import traceback
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from smc_mujoco import errors
 from smc_mujoco.errors import ScenarioError, shown, unknown
 from smc_mujoco.errors import find as lookup
 from smc_mujoco.files import shipped
 from smc_mujoco.metrics import metrics
 from smc_mujoco.scenario import Scenario
+
+LONGEST = 60  # bytes of a name in a file's name, which most file systems bound at 255
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -45,10 +49,13 @@ class Scene:
         if not isinstance(self.conditions, Mapping) or not self.conditions:
             raise ScenarioError(f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs")
         for condition, runs in self.conditions.items():
+            errors.name(f"a condition of scene {self.title!r}", condition)
             if not isinstance(runs, Mapping) or not runs or not all(isinstance(s, Scenario) for s in runs.values()):
                 raise ScenarioError(
                     f"condition {condition!r} of scene {self.title!r} is {shown(runs)}: give labels with Scenarios"
                 )
+            for label in runs:
+                errors.name(f"a label of condition {condition!r} of scene {self.title!r}", label)
             if len(plants := {s.plant.name for s in runs.values()}) > 1:
                 raise ScenarioError(
                     f"condition {condition!r} of scene {self.title!r} has the plants {', '.join(sorted(plants))}, "
@@ -133,7 +140,14 @@ def _execute(path: Path) -> dict:
         raise ScenarioError(f"{where}: {what}") from error
 
 
-def slug(name: str) -> str:
-    """A name as part of a file name: letters and numbers, and what ties them together."""
+def slug(name: str, longest: int = LONGEST) -> str:
+    """A name as part of a file name: letters and numbers, and what ties them together.
+
+    It holds no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
+    """
     words = re.sub(r"\s*=\s*", "-", name.lower())
-    return re.sub(r"[^\w.+-]+", "_", words).strip("_") or "run"
+    made = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
+    if len(made.encode()) > longest:
+        start = made.encode()[: longest - 9].decode(errors="ignore")
+        made = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    return made

@@ -16,12 +16,10 @@ from pathlib import Path
 
 from smc_mujoco import cluster, identity, keep, paper
 from smc_mujoco import executor as executors
-from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, find, shown, whole
+from smc_mujoco.errors import ScenarioError, find, shown
 from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
-from smc_mujoco.initial_states import seeded
-from smc_mujoco.law import Law
+from smc_mujoco.grids import listed
 from smc_mujoco.progress import Counter, counter
 from smc_mujoco.run import cores
 from smc_mujoco.scenario import Scenario
@@ -48,55 +46,6 @@ IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mi
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
 QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=6, duration=5.0)
-MOST = 1_000_000  # runs of a grid, some kB each; chosen
-
-
-def grid(
-    plants: Sequence[str],
-    laws: Sequence[str | Law | Template],
-    conditions: Sequence[str],
-    seeds: int | Iterable[int],
-    gains: str = "tuned",
-    duration: float = paper.DURATION,
-) -> list[Scenario]:
-    """Every plant in every condition under every law from every seed; plant varies slowest, seed fastest.
-
-    Args:
-      plants: names out of `paper.PLANTS`.
-      laws: names, with gains from the set `gains`, or laws with gains of their own.
-      conditions: names out of `paper.CONDITIONS`.
-      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. Seed 0 starts from the plant's own x0, seed s from
-        x0_i (1 + 0.2 z_i) with z_i uniform in [-1, 1], the same in every condition and under every law; with a contact
-        from x0_i (1 - 0.2 |z_i|), which is clear of stops, and with "bobs" in order from left to right.
-      gains: "study", "tuned", "tracking" or "default", see `gains`.
-      duration: of each run, s.
-
-    Raises:
-      ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
-    """
-    numbers = _listed("seeds", seeds) if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
-    plants, laws, conditions = _listed("plants", plants), _listed("laws", laws), _listed("conditions", conditions)
-    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
-        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
-    return [
-        seeded(_scenario(plant, law, condition, duration, gains), seed)
-        for plant in plants
-        for condition in conditions
-        for law in laws
-        for seed in numbers
-    ]
-
-
-def _listed(what: str, values: object) -> list:
-    if isinstance(values, str | bytes) or not isinstance(values, Iterable) or not (found := list(values)):
-        raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
-    return found
-
-
-def _scenario(plant: str, law: str | Law | Template, condition: str, duration: float, gains: str) -> Scenario:
-    if isinstance(law, Component | Template):
-        return paper.scenario(plant, "none", condition, duration=duration, changes={"law": law})
-    return paper.scenario(plant, law, condition, duration=duration, gains=gains)
 
 
 def study(
@@ -151,7 +100,7 @@ def study(
 def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     """Hash -> scenario, in order; of equal ones the first."""
     found: dict[str, Scenario] = {}
-    for scenario in _listed("scenarios", scenarios):
+    for scenario in listed("scenarios", scenarios):
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         found.setdefault(key(scenario), scenario)

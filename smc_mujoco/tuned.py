@@ -16,7 +16,7 @@ from smc_mujoco.bounds import Box, at_bound, box
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.files import replacing
-from smc_mujoco.objective import FAILED, Objective
+from smc_mujoco.objective import FAILED, Objective, described
 from smc_mujoco.plant import Plant
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class Tuned:
         path = checked(path)
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
         data = {name: getattr(self, name) for name in WRITTEN} | {
-            "definition": dataclasses.asdict(self.definition),
+            "definition": self.definition.described(),
             "at_bound": self.at_bound,
             "scenario": record.describe(scenario),
             "history": [dataclasses.astuple(e) for e in self.history],
@@ -157,7 +157,7 @@ def load(path: str | os.PathLike) -> Tuned:
             **evaluations,
             law=scenario.law,
             plant=scenario.plant,
-            definition=Objective(**data["definition"]),
+            definition=described(data["definition"]),
         )
     except FileNotFoundError:
         raise ScenarioError(f"no tuning at {path}: give the path of a .json file that Tuned.save wrote") from None

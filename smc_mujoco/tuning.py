@@ -32,6 +32,8 @@ import numpy as np
 from smc_mujoco import bounds, given
 from smc_mujoco.component import Component, Template
 from smc_mujoco.errors import whole
+from smc_mujoco.initial_states import Starts
+from smc_mujoco.named_conditions import Condition
 from smc_mujoco.objective import Objective
 from smc_mujoco.objective import objective as find_objective
 from smc_mujoco.plant import Plant
@@ -64,6 +66,8 @@ def tune(
     objective: Objective | str = "balanced",
     threads: int | None = None,
     progress: bool = False,
+    conditions: Sequence[Condition | str] | Condition | str | None = None,
+    starts: Starts | None = None,
 ) -> Tuned:
     """The law's best gains on the plant, by the rule that is the same for every law.
 
@@ -73,16 +77,23 @@ def tune(
       seed: of the search, and of the starts and the noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", which has no price on the variation of u.
       threads, progress: as of `run`.
+      conditions: names or conditions of your own, in place of those of the objective.
+      starts: where runs begin, see `starts`, in place of those of the objective.
 
     Raises:
       ScenarioError: a law with gains of unknown unit, a plant without scales, or something out of its range.
     """
     goal = find_objective(objective)
+    if conditions is not None:
+        goal = dataclasses.replace(goal, conditions=conditions)  # pyright: ignore[reportArgumentType]
+    if starts is not None:
+        goal = dataclasses.replace(goal, starts=starts)
     budget = whole("budget", budget, 1, LONGEST)
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, given.component(law, "law"), seed)
     plant, law = cases[0].plant, cases[0].law
-    scales = bounds.scales(plant, goal.u_max, cases[0].model == "nominal")
+    reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
+    scales = bounds.scales(plant, goal.u_max, cases[0].model == "nominal", reach)
     start = bounds.box(law, scales)
     before = goal.terms(run(cases, threads))
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:

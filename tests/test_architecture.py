@@ -295,12 +295,6 @@ def test_everything_public_is_explained(path):
     assert bare == []
 
 
-@pytest.mark.parametrize("path", [*FILES, *SCENES], ids=label)
-def test_no_file_is_long(path):
-    lines = len(path.read_text().splitlines())
-    assert lines <= 250
-
-
 @pytest.mark.parametrize("path", SCENES, ids=label)
 def test_a_scene_is_short_and_asks_its_question(path):
     assert len(path.read_text().splitlines()) <= 60

@@ -187,6 +187,15 @@ def test_a_grid_of_nothing_is_refused(points):
         maps.basin("duffing", "observer_free", points, gains="study")
 
 
+@pytest.mark.parametrize("early", [True, False])
+def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(early):
+    least = 0.067 if early else 0.01
+    short = base("duffing", smc.law("classical"), duration=0.8 * least)
+    with pytest.raises(smc.ScenarioError, match=r"duration \S* s is too short to tell .*: give at least \S* s$"):
+        maps.of(short, [0.1], [0.1], early=early)
+    assert maps.of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
+
+
 @pytest.mark.parametrize("x", [[], [math.nan], [[1.0]]])
 def test_positions_that_are_none_are_refused(x):
     with pytest.raises(smc.ScenarioError, match="give one or more finite numbers"):

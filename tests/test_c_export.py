@@ -304,10 +304,11 @@ def test_the_file_says_formula_source_gains_and_sizes(capsys):
     assert not end.value.code
     head, _, rest = text.partition("*/")
     assert head.startswith("/* super_twisting: a control law in C99, written out by smc_mujoco ")
-    for words in ("u = -k1 [s]^(1/2) + w", "A. Levant", "k1 = 5, k2 = 4.4, c = 1.5", "4 bytes a channel, memory[1]"):
+    gains, state = "k1 = 5, k2 = 4.4, c = 1.5, w_max = inf", "4 bytes a channel, memory[1]"
+    for words in ("u = -k1 [s]^(1/2) + w", "A. Levant", gains, state):
         assert words in head
     assert re.search(r"code     [1-9]\d\d bytes, and \d+ of constants", head)
-    assert 'const char smc_law_gains[] = "k1=5.0,k2=4.4,c=1.5";' in rest
+    assert 'const char smc_law_gains[] = "k1=5.0,k2=4.4,c=1.5,w_max=inf";' in rest
     assert "malloc" not in rest
     assert build.HEADER.read_text() in rest
     assert max(map(len, text.splitlines())) <= 123

@@ -457,7 +457,7 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
         (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
         (None, {"flags": "-O3"}, "flags is '-O3': give several"),
         (None, {"flags": None}, "flags is None: give several"),
-        (None, {"name": "a\nb"}, "name is 'a\\nb': give a word"),
+        (None, {"name": "a\nb"}, "name is 'a\\nb': give a name of printable"),
         (None, {"degree": 4}, "degree is 4: give a whole number from 1 to 3"),
     ],
 )

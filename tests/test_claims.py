@@ -19,11 +19,11 @@ from smc_mujoco.claims.variants import reversed_gain, squeezed, with_gains, zero
 from smc_mujoco.claims.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, combined, numbers
 from smc_mujoco.commands.claims import claims as command
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.grids import grid
 from smc_mujoco.identity import key
 from smc_mujoco.metrics import metrics
 from smc_mujoco.paper import PLANTS
 from smc_mujoco.plant import plant as find_plant
-from smc_mujoco.study import grid
 from smc_mujoco.theory import lam_range
 
 package = importlib.import_module("smc_mujoco.claims")  # smc.claims is the function

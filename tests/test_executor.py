@@ -14,7 +14,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import cluster, executor, paper
-from smc_mujoco.study import grid, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import study
 
 ROOT = Path(__file__).parents[1]
 
@@ -112,7 +113,8 @@ import sys
 from pathlib import Path
 import smc_mujoco as smc
 from smc_mujoco import cluster, executor
-from smc_mujoco.study import grid, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import study
 
 out, address, executor.STEPS, cluster.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
 scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)

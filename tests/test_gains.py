@@ -60,9 +60,17 @@ def test_the_first_set_is_the_studys(plant):
         assert paper.scenario(plant, law).law == gains.law(plant, law, "study")
 
 
-def test_the_conditioned_law_takes_the_gains_of_its_rival_in_the_first_set():
-    one, other = (gains.law("duffing", law, "study") for law in ("super_twisting", "conditioned_super_twisting"))
-    assert {name: one.gains[name] for name in ("k1", "k2", "c")} == {name: other.gains[name] for name in one.gains}
+@pytest.mark.parametrize("name", ["conditioned_super_twisting", "super_twisting_unclamped"])
+def test_forms_of_a_law_take_its_gains_in_the_first_set(name):
+    one, other = (gains.law("duffing", law, "study") for law in ("super_twisting", name))
+    assert dict(one.gains) == dict(other.gains) | {"w_max": paper.U_MAX}
+
+
+@pytest.mark.parametrize("gain_set", gains.OBJECTIVES)
+def test_the_law_without_a_clamp_takes_the_gains_of_its_rival(gain_set):
+    one, other = (gains.law("duffing", law, gain_set) for law in ("super_twisting", "super_twisting_unclamped"))
+    assert other.name == "super_twisting_unclamped"
+    assert dict(one.gains) == dict(other.gains) | {"w_max": one.gains["w_max"]}
 
 
 @pytest.mark.parametrize(

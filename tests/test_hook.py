@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import callback, given, hook, mechanism
+from smc_mujoco import callback, chunk, given, hook, mechanism
 from smc_mujoco.believed import prepared
 from smc_mujoco.gym import PlantEnv
 from smc_mujoco.tasks import tasks, toppling
@@ -239,3 +239,59 @@ def test_a_policy_and_another_thread_may_import_the_batches_at_once():
         [sys.executable, "-c", IMPORTS], env=environment, capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.stdout, done.stderr) == ("None\n", "")
+
+
+def foreign(*arguments):
+    """A user's callback."""
+    return 0.0
+
+
+@pytest.mark.parametrize("name", [name for name in hook.CALLBACKS if name != "control"])
+def test_another_callback_of_a_user_s_is_not_called_in_a_run_and_put_back(name):
+    alone = run_of("classical")
+    getattr(mujoco, f"set_mjcb_{name}")(foreign)
+    try:
+        beside = run_of("classical")
+        assert getattr(mujoco, f"get_mjcb_{name}")() is foreign
+    finally:
+        getattr(mujoco, f"set_mjcb_{name}")(None)
+    np.testing.assert_array_equal(beside.x, alone.x)
+
+
+@pytest.mark.parametrize("control", [None, foreign], ids=["none", "a Python function"])
+@pytest.mark.parametrize("at", [10, 15, 20])
+def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):
+    monkeypatch.setattr(chunk, "SLICE_STEPS", 10)  # 5 of each of two runs
+    two = [smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed) for seed in range(2)]
+    whole, done = smc.run(two), []
+
+    def report(steps):
+        done.append(steps)
+        if sum(done) == 2 * at:
+            mujoco.set_mjcb_control(control)
+
+    for i, trace in smc.stream(two, report=report):
+        assert "MuJoCo's control callback was set" in (trace.failure or "")
+        assert trace.diverged_at == pytest.approx(at * 1e-3)
+        np.testing.assert_array_equal(trace.u[:at], whole[i].u[:at])
+        for array in (trace.x, trace.u, trace.d, trace.reaction):
+            assert np.isnan(array[at:]).all()
+    assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler"])
+def test_a_law_that_clears_the_callback_fails_its_run(integrator):
+    def act(observation):
+        if act.asked == 3:
+            mujoco.set_mjcb_control(foreign)
+            mujoco.set_mjcb_control(None)
+        act.asked += 1
+        return [-0.5 * observation[0]]
+
+    act.asked = 0
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator))
+    assert "MuJoCo's control callback was set" in (trace.failure or "")
+    assert trace.diverged_at == pytest.approx({"RK4": 0.003, "Euler": 0.004}[integrator])
+    k = round(trace.diverged_at / 1e-3)
+    assert np.isfinite(trace.x[:k]).all()
+    assert np.isnan(trace.x[k:]).all()

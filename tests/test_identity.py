@@ -14,7 +14,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import fingerprint, paper, record, source
-from smc_mujoco.study import condition, grid, key
+from smc_mujoco.grids import grid
+from smc_mujoco.study import condition, key
 
 ROOT = Path(__file__).parents[1]
 
@@ -113,7 +114,11 @@ def test_a_comment_or_a_line_more_is_no_edit():
 def test_a_key_does_not_depend_on_the_process():
     made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
     done = subprocess.run(
-        [sys.executable, "-c", f"from smc_mujoco.study import grid, key; print(key({made}))"],
+        [
+            sys.executable,
+            "-c",
+            f"from smc_mujoco.grids import grid; from smc_mujoco.study import key; print(key({made}))",
+        ],
         env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,

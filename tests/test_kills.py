@@ -12,14 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from smc_mujoco.study import grid, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import study
 
 ROOT = Path(__file__).parents[1]
 LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path
 from smc_mujoco import executor, store
-from smc_mujoco.study import grid, key, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import key, study
 from smc_mujoco.callback import harness as compiled_callback, silence
 from smc_mujoco.chunk import contents
 import pyarrow.parquet

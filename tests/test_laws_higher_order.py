@@ -91,6 +91,59 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
     assert run.memory[:, 0].max() <= 3.0 + 2e-3
 
 
+def test_super_twisting_without_a_clamp_is_the_law_as_published():
+    gains = {"k1": 1.5, "k2": 1.1}
+    plain, published = (plant_a(law(n, **gains), wave) for n in ("super_twisting", "super_twisting_unclamped"))
+    np.testing.assert_array_equal(plain.x, published.x)
+    np.testing.assert_array_equal(plain.u, published.u)
+    for sign in (1.0, -1.0):  # w grows at k2 without end
+        assert plant_a(law("super_twisting", **gains), s=sign * 1e9, limit=1.0).memory[-1, 0] == pytest.approx(
+            -sign * 1.1 * 9.999
+        )
+
+
+def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy_below_it():
+    gains = {"k1": 1.5, "k2": 1.1, "w_max": 0.5}
+    for sign in (1.0, -1.0):
+        beyond = plant_a(law("super_twisting", **gains), constant(sign * 0.8), duration=40.0)
+        assert np.abs(beyond.memory).max() == 0.5
+        assert beyond.s[-1] == pytest.approx(sign * (0.3 / 1.5) ** 2, rel=1e-6)
+    below = constant(0.2) + sine(0.2, 3.0)  # |d| <= 0.4
+    clamped, plain = (plant_a(law("super_twisting", **gains | {"w_max": w}), below) for w in (0.5, math.inf))
+    assert clamped.residual() == pytest.approx(plain.residual(), rel=0.2)
+    assert clamped.residual() < 10 * 1e-3**2
+
+
+def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integration():
+    """The study's first gains, held input, Runge and Kutta's rule in steps of 0.25 ms: to 1e-3 m over 10 s."""
+    k1, k2, c, bound, h = 4.567, 45.47, 2.16, 6.0, 1e-3
+    u, w, states = 0.0, 0.0, np.empty((10_001, 2))
+
+    def rate(state):
+        x, v = state
+        return np.array([v, (1.0 - x * x) * v - x + u])
+
+    state = np.array([2.0, 0.0])
+    for sample in range(len(states)):
+        states[sample] = state
+        s = state[1] + c * state[0]
+        u = min(max(-k1 * math.sqrt(abs(s)) * np.sign(s) + w, -bound), bound)
+        w = min(max(w - h * k2 * np.sign(s), -bound), bound)
+        for _ in range(4):
+            a = rate(state)
+            b = rate(state + h / 8 * a)
+            d = rate(state + h / 8 * b)
+            state = state + h / 24 * (a + 2 * b + 2 * d + rate(state + h / 4 * d))
+    trace = smc.run(smc.paper.scenario("van_der_pol", "super_twisting"))
+    assert trace.scenario.law == law("super_twisting", k1=k1, k2=k2, c=c, w_max=bound)
+    np.testing.assert_allclose(trace.x[:, 0], states[: len(trace.x), 0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(trace.v[:, 0], states[: len(trace.x), 1], rtol=0, atol=1e-2)
+    assert smc.score(trace)["overshoot"] == pytest.approx(2.3, abs=0.05)
+    plain = smc.score(smc.run(smc.paper.scenario("van_der_pol", "super_twisting_unclamped")))
+    assert plain["overshoot"] > 100.0
+    assert math.isinf(plain["settling_time"])
+
+
 def test_adaptive_super_twisting_finds_gains_for_disturbances_of_any_size_and_lets_them_go():
     rule = law("adaptive_super_twisting")
     k0, least, mu = rule.gains["k0"], rule.gains["least"], rule.gains["mu"]

@@ -216,3 +216,17 @@ def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
     coarse, fine = energy_drift(p, 0.02), energy_drift(p, 0.01)
     assert coarse < 1e-2
     assert coarse / fine >= 16
+
+
+def test_pymjcf_reads_every_file():
+    mjcf = pytest.importorskip("dm_control.mjcf")
+    files = sorted(model_path("").rglob("*.xml"))
+    assert len(files) >= 7
+    for file in files:
+        made = mujoco.MjModel.from_xml_path(str(file))
+        written = mjcf.from_path(str(file))
+        again = mjcf.Physics.from_mjcf_model(written).model
+        for count in ("nq", "nbody", "ngeom", "nsite", "nmat", "ntendon", "nsensor", "nkey"):
+            assert getattr(again, count) == getattr(made, count), f"{count} of {file.name}"
+        np.testing.assert_array_equal(again.body_mass, made.body_mass)
+        np.testing.assert_array_equal(again.geom_pos, made.geom_pos)

@@ -18,6 +18,7 @@ from smc_mujoco import suite as suite_of_ours
 from smc_mujoco.believed import Believed, prepared
 from smc_mujoco.frozen import frozen
 from smc_mujoco.own_model import OwnModel
+from smc_mujoco.scene import slug
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
 ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")
@@ -858,6 +859,52 @@ def test_a_force_on_a_body_is_refused(arm):
         smc.ScenarioError, match=r"pushes a body, and those of arm, a model of yours, act on its joints"
     ):
         smc.Scenario(plant=arm(), law="none", disturbance=smc.Gust(amplitude=1.0, time=0.1, width=0.1))
+
+
+# names
+
+
+@pytest.mark.parametrize("name", ["../../../x", "/x", "..", ".x", "Ä/" * 50])
+def test_a_study_writes_nothing_beside_its_folder_whatever_names_are(arm, tmp_path, name):
+    def law(y, gains, memory):
+        return 0.0, 0.0
+
+    law.__name__ = name
+    scenario = smc.Scenario(plant=arm(name=name), law=smc.law_function(law)(), duration=0.01)
+    outer = tmp_path / "a" / "b" / "c" / "d"
+    smc.study([scenario], outer / "out", traces="all")
+    (file,) = (outer / "out" / "traces").iterdir()
+    assert smc.load(file).scenario.plant.name == name
+    assert not file.name.startswith(".")
+    assert {path.name for path in tmp_path.iterdir()} == {"a", "arm.xml"}
+    assert [path.name for path in outer.iterdir()] == ["out"]
+
+
+def test_names_that_no_table_can_show_are_refused_where_they_are_given(arm):
+    def law(y, gains, memory):
+        return 0.0, 0.0
+
+    run = smc.Scenario(plant="duffing", law="none", duration=0.01)
+    for name, words in {"a" * 400: "400 characters: give at most 100", "a\nb": "printable", "": "printable"}.items():
+        law.__name__ = name
+        given = {
+            "name": lambda name=name: arm(name=name),
+            "name of the law": lambda: smc.law_function(law),
+            "a condition of scene 'x'": lambda name=name: smc.Scene(title="x", conditions={name: {"a": run}}),
+            "a label of condition 'a'": lambda name=name: smc.Scene(title="x", conditions={"a": {name: run}}),
+        }
+        for what, give in given.items():
+            with pytest.raises(smc.ScenarioError, match=rf"^{what}.* is .*{words}"):
+                give()
+
+
+@pytest.mark.parametrize("name", ["a" * 400, "ä" * 61, "\ud800", "..", "a/b\\c:d"])
+def test_part_of_a_file_name_is_short_and_no_path(name):
+    part = slug(name)
+    assert 0 < len(part.encode()) <= 60
+    assert Path(part).name == part
+    assert not part.startswith(".")
+    assert len({slug(name), slug(name + "a"), slug(name + "b")}) == 3
 
 
 # kept

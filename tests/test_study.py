@@ -13,7 +13,8 @@ import smc_mujoco as smc
 from smc_mujoco import executor, identity, keep, paper, record, store
 from smc_mujoco.assembly import check_starts
 from smc_mujoco.commands.bench import bench
-from smc_mujoco.study import condition, grid, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import condition, study
 from smc_mujoco.table import Table
 
 ROOT = Path(__file__).parents[1]

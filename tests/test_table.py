@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.study import condition, grid, key, study
+from smc_mujoco.grids import grid
+from smc_mujoco.study import condition, key, study
 from smc_mujoco.table import Table
 
 

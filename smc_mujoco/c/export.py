@@ -61,7 +61,7 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
 def _in_q15(law: Component) -> Component:
     """The fixed-point law of the gains; of the paper's law too."""
     if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
-        law = catalogue()[Q15].bind(law.gains, level=4)
+        law = catalogue()[Q15].bind(law.gains, warn=True)
     if law.function is not catalogue()[Q15].function:
         raise ScenarioError(
             f"law {law.name!r} has no Q15 form: give observer_free or {Q15}, or write double or float numbers"

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numba import carray
 
+from smc_mujoco import errors
 from smc_mujoco.c import build, child, said, trial
 from smc_mujoco.compiled import AtAddress, Function, call_int, pointer
 from smc_mujoco.component import Template, template
@@ -139,8 +140,8 @@ def law_from_c(
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):
         raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
-    if name is not None and not (isinstance(name, str) and name.isprintable() and name.strip()):
-        raise ScenarioError(f"name is {shown(name)}: give a word, such as 'my_law'")
+    if name is not None:
+        errors.name("name", name)
     law = _loaded(str(path), symbol, tuple(flags), timeout)
     defaults, size = said.gains(law.library, path.name, gains), said.memory(law.library, memory)
     degree = whole("degree", (said.number(law.library, "smc_law_degree") or 1) if degree is None else degree, 1, 3)

@@ -34,7 +34,7 @@ def parsed(text: str, what: str) -> dict[str, float]:
             found[key] = float(value)
         except ValueError:
             found[key] = math.nan
-        if not (equals and key.isidentifier() and math.isfinite(found[key])):
+        if not (equals and key.isidentifier()) or math.isnan(found[key]):
             raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
     return found
 

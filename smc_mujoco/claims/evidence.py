@@ -70,7 +70,7 @@ class Runs:
 
     def law(self, plant: str, name: str) -> Component:
         """The law with the set's gains for a plant, or its mutant; one that the set does not tune, with its own."""
-        found = sets.law(plant, name, self.gains if name in sets.LAWS else "default")
+        found = sets.law(plant, name, self.gains if name in (*sets.LAWS, *sets.SAME) else "default")
         return self.mutated(found)
 
     def mutated(self, law: Component) -> Component:

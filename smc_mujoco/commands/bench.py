@@ -39,8 +39,9 @@ def bench(
         with loading():
             from rich.console import Console
 
+            from smc_mujoco.grids import grid
             from smc_mujoco.leaderboard import leaderboard, leaderboard_table
-            from smc_mujoco.study import FULL, QUICK, grid, study
+            from smc_mujoco.study import FULL, QUICK, study
 
         clock, console = Clock(), Console()
         chosen = QUICK if quick else FULL

@@ -34,6 +34,7 @@ NAMES = {  # a law of your own is called as you call it
     "classical": "Classical",
     "adaptive": "Adaptive",
     "super_twisting": "Super-twisting",
+    "super_twisting_unclamped": "Super-twisting, unclamped",
     "conditioned_super_twisting": "Conditioned super-twisting",
     "boundary_layer": "Boundary layer",
     "adaptive_leak": "Adaptive + leak",

@@ -60,7 +60,7 @@ def estimator(name: str, **gains: float) -> Estimator:
     Raises:
       ScenarioError: unknown estimator or gain, or a gain out of its range.
     """
-    return find("velocity estimator", name, catalogue()).bind(gains, level=3)
+    return find("velocity estimator", name, catalogue()).bind(gains, warn=True)
 
 
 def estimators() -> list[str]:

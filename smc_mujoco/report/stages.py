@@ -15,6 +15,7 @@ from smc_mujoco import gains as sets
 from smc_mujoco import gl, tuned
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
+from smc_mujoco.grids import grid as make_grid
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.report import about, scores
 from smc_mujoco.report.bars import Bars
@@ -23,7 +24,6 @@ from smc_mujoco.report.kept import kept
 from smc_mujoco.report.plan import GAINS, Plan
 from smc_mujoco.report.scenes import all_scenes
 from smc_mujoco.report.work import Work, part
-from smc_mujoco.study import grid as make_grid
 from smc_mujoco.study import study
 from smc_mujoco.table import Table
 

@@ -55,7 +55,7 @@ def surface(name: str, **gains: float) -> Surface:
     Raises:
       ScenarioError: unknown surface or gain, or a gain out of its range.
     """
-    return find("surface", name, catalogue()).bind(gains, level=3)
+    return find("surface", name, catalogue()).bind(gains, warn=True)
 
 
 def surfaces() -> list[str]:

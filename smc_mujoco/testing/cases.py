@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from smc_mujoco import paper
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.named_conditions import find_condition
 from smc_mujoco.plant import catalogue as plants
 
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
@@ -27,7 +28,7 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
             raise unknown("argument of marker smc", name, ("plants", "conditions"))
     wanted = {
         "plant": _names("plant", named.get("plants", list(paper.GAINS)), plants()),
-        "condition": _names("condition", named.get("conditions", ["nominal"]), paper.CONDITIONS),
+        "condition": _conditions(named.get("conditions", ["nominal"])),
     }
     for argument, plural in (("plant", "plants"), ("condition", "conditions")):
         if argument not in arguments and plural in named:
@@ -36,6 +37,12 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
     if not taken:
         raise ScenarioError("marker smc is on a test that takes neither plant nor condition: add the arguments")
     return taken
+
+
+def _conditions(value: object) -> list[str]:
+    """Conditions as texts, from one or several of them."""
+    several = value if isinstance(value, list | tuple) else [value]
+    return [str(find_condition(one)) for one in several]
 
 
 def _names(kind: str, value: object, known: Mapping[str, object]) -> list[str]:

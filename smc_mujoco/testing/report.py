@@ -8,7 +8,7 @@ from smc_mujoco.scene import slug
 from smc_mujoco.testing.response import StepResponse
 from smc_mujoco.trace import Trace
 
-LONGEST = 150  # characters of a file's name, which most file systems bound at 255
+LONGEST = 150  # bytes of a test's id in a file's name, which most file systems bound at 255
 
 
 def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
@@ -24,7 +24,7 @@ def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bo
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)
     files = []
     for plant, traces in plants.items():
-        name = slug(test)[-LONGEST:].lstrip("_") + (f"-{plant}" if len(plants) > 1 else "")
+        name = slug(test[-LONGEST:], LONGEST) + (f"-{slug(plant)}" if len(plants) > 1 else "")
         title = test.rpartition("::")[2]
         files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
         if video:

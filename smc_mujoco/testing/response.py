@@ -10,7 +10,9 @@ from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.groups import groups
 from smc_mujoco.measure import CATALOGUE
 from smc_mujoco.metrics import score, scores
+from smc_mujoco.named_conditions import Condition, find_condition
 from smc_mujoco.plant import Plant
+from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.run import run
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.signals import Step
@@ -173,14 +175,14 @@ def respond(
     plant: Plant | str,
     law: Component | Template | str,
     step: float,
-    condition: str = "nominal",
+    condition: str | Condition = "nominal",
     fields: Mapping[str, object] | None = None,
 ) -> StepResponse:
     """Run a law from rest at 0 to a step of the reference at t = 0.
 
     Args:
       step: its height, rad or m.
-      condition: one of the study's, in `smc.paper.CONDITIONS`.
+      condition: a name, such as "noise", or one of your own, see `smc.condition`.
       fields: Scenario field -> value, over those of the condition; x0 may be among them.
 
     Raises:
@@ -197,8 +199,9 @@ def respond(
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
-    name = plant.name if isinstance(plant, Plant) else plant
-    of_study = paper.fields(condition, str(name), number("duration", given.get("duration", paper.DURATION)))
+    asked = find_condition(condition)
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    of_study = asked.on(machine, number("duration", given.get("duration", paper.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
-    told = [condition] * (condition != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
+    told = [asked.name] * (asked.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
     return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(told))
