@@ -17,7 +17,7 @@ BUDGET = 96
 
 
 def tunings() -> Iterator[tuple[str, str, int]]:
-    """Objective, law and seed of all tunings: every law once, then the laws of the first page from their other seeds."""
+    """Objective, law and seed of all tunings: every law, then those of the first page from their other seeds."""
     yield from (("balanced", law, 0) for law in gains.general())
     for name, objective in gains.OBJECTIVES.items():
         first = 1 if name == "tuned" else 0

@@ -5,17 +5,20 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.commands import asked
 from smc_mujoco.terminal import Clock, loading, mendable
 
 
 def basin(
-    plant: Annotated[str, typer.Argument(metavar="PLANT", help="A plant of the study.")],
-    law: Annotated[str, typer.Option(help="A law of the study.")] = "observer_free",
+    plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint.")],
+    law: Annotated[str, typer.Option(help="One that `laws` shows.")] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Positions, and as many velocities.")] = 50,
     gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
     duration: Annotated[float, typer.Option(help="Of the longest runs, s.")] = 10.0,
     out: Annotated[Path | None, typer.Option(help="Also draw the map, to a .png or .svg file.")] = None,
     json: Annotated[Path | None, typer.Option(help="Also write the map to a .json file.")] = None,
+    during: Annotated[str, typer.Option(help="What holds besides, by name, as noise or coulomb+encoder.")] = "nominal",
+    condition: asked.Conditions = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
     """Map a region of attraction: run a grid of initial positions and velocities, and tell which come to rest at 0.
@@ -42,8 +45,16 @@ def basin(
         if json:
             writable(ended(json, ".json"))
         with clock("in all"), bar(f"{law} on {plant}") as drawn:
+            holds = asked.condition(during, condition)
             found = search(
-                plant, law, (points, points), gains=gains, duration=duration, threads=threads, report=drawn.reached
+                asked.plant(plant),
+                law,
+                (points, points),
+                gains=gains,
+                duration=duration,
+                threads=threads,
+                report=drawn.reached,
+                condition=holds,
             )
         counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
         console.print(f"{law} on {plant}: {100 * found.share:.3g} % of the states converge", highlight=False)

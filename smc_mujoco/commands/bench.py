@@ -1,11 +1,11 @@
 """smc-mujoco bench: the study's grid, computed so that nothing is lost, to a table and a leaderboard."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from smc_mujoco.commands import asked
 from smc_mujoco.terminal import Clock, loading, mendable
 
 
@@ -13,9 +13,14 @@ def bench(
     quick: Annotated[
         bool, typer.Option("--quick", help="A fraction: 4 conditions, 6 seeds, 5 s a run; half a minute on 2 cores.")
     ] = False,
-    plants: Annotated[str | None, typer.Option(help="Plants, as a,b; default the paper's five.")] = None,
+    plants: Annotated[
+        str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
+    ] = None,
     laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
     conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
+    condition: asked.Conditions = None,
+    x0: asked.Middle = None,
+    spread: asked.Spread = None,
     seeds: Annotated[int | None, typer.Option(min=1, help="How many starts and noises; default 20.")] = None,
     gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
     duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10.")] = None,
@@ -47,12 +52,13 @@ def bench(
         chosen = QUICK if quick else FULL
         with clock("in all"):
             scenarios = grid(
-                _names(plants, chosen.plants),
-                _names(laws, chosen.laws),
-                _names(conditions, chosen.conditions),
+                asked.plants(asked.names(plants) or chosen.plants),
+                asked.names(laws) or chosen.laws,
+                asked.conditions(asked.names(conditions) or (() if condition else chosen.conditions), condition),
                 seeds or chosen.seeds,
                 gains,
                 chosen.duration if duration is None else duration,
+                asked.starts(x0, spread),
             )
             table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
         console.print(leaderboard_table(leaderboard(table)))
@@ -60,8 +66,3 @@ def bench(
         said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
         console.print(said, soft_wrap=True, highlight=False)
         console.print(f"wrote {out / 'results.parquet'}", soft_wrap=True, highlight=False)
-
-
-def _names(text: str | None, default: Sequence[str]) -> Sequence[str]:
-    """The names in a,b; the default if none is given."""
-    return default if text is None else [name.strip() for name in text.split(",") if name.strip()]

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smc_mujoco.commands import asked
 from smc_mujoco.terminal import Clock, loading, mendable
 
 if TYPE_CHECKING:
@@ -18,7 +19,11 @@ QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturb
 def margins(
     plants: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PLANT]...", help="Plants of the study; all without one.", show_default=False),
+        typer.Argument(
+            metavar="[PLANT]...",
+            help="Plants, also as FILE.xml:joint+joint; the study's without one.",
+            show_default=False,
+        ),
     ] = None,
     laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
     kinds: Annotated[
@@ -28,6 +33,9 @@ def margins(
     quick: Annotated[
         bool, typer.Option("--quick", help="Shorter runs, coarser; by default 2 plants, 4 laws, delay and disturbance.")
     ] = False,
+    during: Annotated[str, typer.Option(help="What holds besides, by name, as coulomb or noise+encoder.")] = "nominal",
+    condition: asked.Conditions = None,
+    x0: asked.Middle = None,
     json: Annotated[Path | None, typer.Option(help="Also write the margins to a .json file.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
@@ -55,10 +63,12 @@ def margins(
         if json:
             writable(ended(json, ".json"))
         chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
-        names = _names(laws) or (paper.LAWS if quick else sets.LAWS)
-        kind = _names(kinds) or (QUICK["kinds"] if quick else KINDS)
+        names = asked.names(laws) or (paper.LAWS if quick else sets.LAWS)
+        kind = asked.names(kinds) or (QUICK["kinds"] if quick else KINDS)
         with clock("in all"), bar("margins") as drawn:
-            found = search(chosen, names, kind, gains, quick, threads, drawn.reached)
+            holds = asked.condition(during, condition)
+            machines, around = asked.plants(chosen), asked.starts(x0, None)
+            found = search(machines, names, kind, gains, quick, threads, drawn.reached, holds, around)
         for name in kind:
             console.print(table(name, [margin for margin in found if margin.kind == name]))
         said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"
@@ -92,8 +102,3 @@ def table(kind: str, found: "list[Margin]") -> "Table":
         made.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
     return made
-
-
-def _names(text: str | None) -> list[str]:
-    """The names in a,b."""
-    return [name.strip() for name in (text or "").split(",") if name.strip()]

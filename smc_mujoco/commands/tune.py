@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.commands import asked
 from smc_mujoco.terminal import Clock, loading, mendable
 
 
 def tune(
-    plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows.")],
+    plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint+joint.")],
     law: Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")],
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
@@ -20,13 +21,19 @@ def tune(
     front: Annotated[
         Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
     ] = None,
+    conditions: Annotated[
+        str | None, typer.Option(help="Names, as a,b, in place of the objective's seven, which are given at the end.")
+    ] = None,
+    condition: asked.Conditions = None,
+    x0: asked.Middle = None,
+    spread: asked.Spread = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
     """Find a law's gains on a plant by the rule that is the same for every law.
 
-    Same bound on u, same objective (error times time, and variation of u, in a nominal, a noisy and a delayed run of
-    5 s), same number of gains tried, same width of search about the scale that each gain has by dimension. The same
-    seed gives the same gains; a larger budget never worse ones.
+    Same bound on u, same objective (error times time, and variation of u, in runs of 5 s: nominal, noisy, delayed,
+    disturbed by a sine and by a constant, and with 30 % more and less mass), same number of gains tried, same width of
+    search about the scale that each gain has by dimension. The same seed gives the same gains.
 
     Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
@@ -42,7 +49,17 @@ def tune(
                 writable(file)
         path, clock, console = out and tuned.checked(out), Clock(), Console()
         with clock("tuning"):
-            found = tuning.tune(plant, law, budget, seed, objective, threads, progress=True)
+            found = tuning.tune(
+                asked.plant(plant),
+                law,
+                budget,
+                seed,
+                objective,
+                threads,
+                progress=True,
+                conditions=asked.conditions(asked.names(conditions), condition) or None,
+                starts=asked.starts(x0, spread),
+            )
         console.print(tuned.table(found))
         console.print(f"{found.definition}", soft_wrap=True, highlight=False)
         console.print(

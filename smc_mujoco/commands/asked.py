@@ -1,0 +1,92 @@
+"""What several commands are asked for in the same words: plants, conditions, starts."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from smc_mujoco.initial_states import Starts
+    from smc_mujoco.named_conditions import Condition
+    from smc_mujoco.plant import Plant
+
+Conditions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--condition",
+        metavar="TEXT|FILE",
+        help='One of your own, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file of such'
+        " lines; may be repeated.",
+    ),
+]
+Middle = Annotated[
+    float | None, typer.Option("--x0", help="Where runs begin, rad or m; default the plant's own start.")
+]
+Spread = Annotated[
+    float | None, typer.Option("--spread", help="By how much of x0 seeds move the start to either side; default 0.2.")
+]
+
+
+def names(text: str | None) -> list[str]:
+    """The names in a,b."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]
+
+
+def plants(texts: Sequence[str]) -> "list[str | Plant]":
+    """Plants by name, or as FILE.xml:joint+joint, an MJCF model of which these joints are controlled.
+
+    Raises:
+      ScenarioError: a model without joints, or one that cannot be a plant.
+    """
+    return [plant(text) for text in texts]
+
+
+def plant(text: str) -> "str | Plant":
+    """One plant; see `plants`."""
+    from smc_mujoco.errors import ScenarioError
+    from smc_mujoco.own_model import plant_from
+
+    path, _, joints = text.rpartition(":") if ".xml:" in text else (text, "", "")
+    if not path.endswith(".xml"):
+        return text
+    if not (chosen := [joint for joint in joints.split("+") if joint]):
+        raise ScenarioError(f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow")
+    return plant_from(path, chosen)
+
+
+def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Condition]":
+    """Conditions by name, then those of the option --condition.
+
+    Raises:
+      ScenarioError: an unknown name, or a text or file that cannot be read.
+    """
+    from smc_mujoco.named_conditions import find_condition, from_file
+
+    found = [find_condition(name) for name in named]
+    for text in own or ():
+        found += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
+    return found
+
+
+def condition(name: str, own: Sequence[str] | None) -> "Condition":
+    """The one condition that holds: by name, or of the option --condition.
+
+    Raises:
+      ScenarioError: as of `conditions`, or several of them.
+    """
+    from smc_mujoco.errors import ScenarioError
+
+    found = conditions([name] if not own else [], own)
+    if len(found) != 1:
+        raise ScenarioError(f"{len(found)} conditions are given: give one, such as noise+coulomb for both at once")
+    return found[0]
+
+
+def starts(x0: float | None, spread: float | None) -> "Starts | None":
+    """Where runs begin; None: where they do by default."""
+    from smc_mujoco.initial_states import SPREAD
+    from smc_mujoco.initial_states import starts as made
+
+    return None if x0 is None and spread is None else made(x0, SPREAD if spread is None else spread)
