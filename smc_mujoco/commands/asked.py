@@ -21,6 +21,14 @@ Conditions = Annotated[
         " lines; may be repeated.",
     ),
 ]
+During = Annotated[
+    str,
+    typer.Option(
+        "--condition",
+        metavar="NAME|TEXT",
+        help='What holds besides, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
+    ),
+]
 Middle = Annotated[
     float | None, typer.Option("--x0", help="Where runs begin, rad or m; default the plant's own start.")
 ]
@@ -68,20 +76,6 @@ def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Conditi
     for text in own or ():
         found += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
     return found
-
-
-def condition(name: str, own: Sequence[str] | None) -> "Condition":
-    """The one condition that holds: by name, or of the option --condition.
-
-    Raises:
-      ScenarioError: as of `conditions`, or several of them.
-    """
-    from smc_mujoco.errors import ScenarioError
-
-    found = conditions([name] if not own else [], own)
-    if len(found) != 1:
-        raise ScenarioError(f"{len(found)} conditions are given: give one, such as noise+coulomb for both at once")
-    return found[0]
 
 
 def starts(x0: float | None, spread: float | None) -> "Starts | None":

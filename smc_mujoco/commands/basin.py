@@ -17,8 +17,7 @@ def basin(
     duration: Annotated[float, typer.Option(help="Of the longest runs, s.")] = 10.0,
     out: Annotated[Path | None, typer.Option(help="Also draw the map, to a .png or .svg file.")] = None,
     json: Annotated[Path | None, typer.Option(help="Also write the map to a .json file.")] = None,
-    during: Annotated[str, typer.Option(help="What holds besides, by name, as noise or coulomb+encoder.")] = "nominal",
-    condition: asked.Conditions = None,
+    condition: asked.During = "nominal",
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
     """Map a region of attraction: run a grid of initial positions and velocities, and tell which come to rest at 0.
@@ -45,7 +44,6 @@ def basin(
         if json:
             writable(ended(json, ".json"))
         with clock("in all"), bar(f"{law} on {plant}") as drawn:
-            holds = asked.condition(during, condition)
             found = search(
                 asked.plant(plant),
                 law,
@@ -54,7 +52,7 @@ def basin(
                 duration=duration,
                 threads=threads,
                 report=drawn.reached,
-                condition=holds,
+                condition=condition,
             )
         counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
         console.print(f"{law} on {plant}: {100 * found.share:.3g} % of the states converge", highlight=False)

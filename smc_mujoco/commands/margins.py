@@ -21,11 +21,11 @@ def margins(
         list[str] | None,
         typer.Argument(
             metavar="[PLANT]...",
-            help="Plants, also as FILE.xml:joint+joint; the study's without one.",
+            help="Names, or FILE.xml:joint+joint; the paper's without one.",
             show_default=False,
         ),
     ] = None,
-    laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default the paper's four and two more.")] = None,
+    laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default those of the report's first page.")] = None,
     kinds: Annotated[
         str | None, typer.Option(help="Of delay,disturbance,friction,mass,noise, as a,b; default all.")
     ] = None,
@@ -33,8 +33,7 @@ def margins(
     quick: Annotated[
         bool, typer.Option("--quick", help="Shorter runs, coarser; by default 2 plants, 4 laws, delay and disturbance.")
     ] = False,
-    during: Annotated[str, typer.Option(help="What holds besides, by name, as coulomb or noise+encoder.")] = "nominal",
-    condition: asked.Conditions = None,
+    condition: asked.During = "nominal",
     x0: asked.Middle = None,
     json: Annotated[Path | None, typer.Option(help="Also write the margins to a .json file.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
@@ -66,9 +65,8 @@ def margins(
         names = asked.names(laws) or (paper.LAWS if quick else sets.LAWS)
         kind = asked.names(kinds) or (QUICK["kinds"] if quick else KINDS)
         with clock("in all"), bar("margins") as drawn:
-            holds = asked.condition(during, condition)
             machines, around = asked.plants(chosen), asked.starts(x0, None)
-            found = search(machines, names, kind, gains, quick, threads, drawn.reached, holds, around)
+            found = search(machines, names, kind, gains, quick, threads, drawn.reached, condition, around)
         for name in kind:
             console.print(table(name, [margin for margin in found if margin.kind == name]))
         said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"
