@@ -18,8 +18,8 @@ import functools
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from smc_mujoco.claims.verdict import NAMED, Claim, Found, combined, numbers, verdict
 from smc_mujoco.claims.verdict import VERDICTS as VERDICTS
-from smc_mujoco.claims.verdict import Claim, Found, combined, numbers, verdict
 from smc_mujoco.component import modules
 from smc_mujoco.errors import ScenarioError, find, unknown
 
@@ -42,6 +42,7 @@ class Entry:
     holds_if: str
     note: str
     late: bool
+    quantifier: str
     evidence: Evidence
 
     def __call__(self, runs: Runs) -> Found:
@@ -50,7 +51,15 @@ class Entry:
 
 
 def claim(
-    id: str, text: str, *, where: str, measured: str, holds_if: str, note: str = "", late: bool = False
+    id: str,
+    text: str,
+    *,
+    where: str,
+    measured: str,
+    holds_if: str,
+    note: str = "",
+    late: bool = False,
+    quantifier: str = NAMED,
 ) -> Callable[[Evidence], Entry]:
     """Decorator: enter a function Runs -> checks in the catalogue.
 
@@ -61,6 +70,7 @@ def claim(
       measured: what is run, and what is measured on it.
       holds_if: the threshold, in words.
       note: what a reader must know to judge the numbers: why a part is not testable, what stands for what.
+      quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
       late: whether it is to look at the runs of all other claims, and so comes after them.
     """
 
@@ -73,6 +83,7 @@ def claim(
             holds_if=holds_if,
             note=note,
             late=late,
+            quantifier=quantifier,
             evidence=evidence,
         )
 
@@ -173,8 +184,8 @@ def evaluations(
 
 def judged(entry: Entry, found: dict[str, Found]) -> Claim:
     """A claim's verdict from what was found, set by set."""
-    verdicts = {name: verdict(some) for name, some in found.items()}
-    overall, flips, sentence = combined(verdicts)
+    verdicts = {name: verdict(some, entry.quantifier) for name, some in found.items()}
+    overall, flips, sentence = combined(verdicts, entry.quantifier)
     told = {name: numbers(some) for name, some in found.items()}
     return Claim(
         id=entry.id,
@@ -187,5 +198,6 @@ def judged(entry: Entry, found: dict[str, Found]) -> Claim:
         beside={name: others for name, (_, others) in told.items()},
         verdicts=verdicts,
         flips=flips,
+        quantifier=entry.quantifier,
         note=" ".join(filter(None, (entry.note, sentence))),
     )

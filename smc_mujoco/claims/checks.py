@@ -16,13 +16,14 @@ RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 
 class Check(NamedTuple):
-    """One measured comparison: `value relation limit`."""
+    """One measured comparison: `value relation limit`; and which of the claim's sentences it is about."""
 
     what: str
     value: float
     relation: str
     limit: float
     holds: bool
+    sentence: str = ""
 
     @property
     def slack(self) -> float:
@@ -40,7 +41,7 @@ class Beside(NamedTuple):
     value: float
 
 
-def check(what: str, value: float, relation: str, limit: float) -> Check:
+def check(what: str, value: float, relation: str, limit: float, sentence: str = "") -> Check:
     """A Check of a value against its limit.
 
     NaN never holds, and nor does infinity against the same infinity: of two times neither of which comes, none is the
@@ -52,7 +53,12 @@ def check(what: str, value: float, relation: str, limit: float) -> Check:
     compare = find("relation", relation, RELATIONS)
     value, limit = float(value), float(limit)
     undecided = math.isinf(value) and value == limit
-    return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided)
+    return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence)
+
+
+def about(sentence: str, *checks: Check) -> list[Check]:
+    """Checks of one of the sentences that a claim consists of."""
+    return [one._replace(sentence=sentence) for one in checks]
 
 
 def ratio(value: float, reference: float) -> float:

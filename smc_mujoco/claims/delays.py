@@ -24,15 +24,19 @@ COARSE = 8  # control periods between which a quick search ends, chosen; it trie
 Pair = tuple[str, str]
 
 
-def largest(runs: Runs, plants: Sequence[str], laws: Sequence[str]) -> dict[Pair, float]:
-    """(plant, law) -> the largest delay borne, s: 0 where none is, the last of DELAYS where all that were tried are."""
+def largest(runs: Runs, plants: Sequence[str], laws: Sequence[str], within: float = BEARS) -> dict[Pair, float]:
+    """(plant, law) -> the largest delay borne, s: 0 where none is, the last of DELAYS where all that were tried are.
+
+    Args:
+      within: of |x0|, below which the ultimate bound is to be.
+    """
     pairs = [(plant, law) for plant in plants for law in laws]
     low = dict.fromkeys(pairs, 0)
     high: dict[Pair, int] = {}
     tried = dict.fromkeys(pairs, 0)
     apart = COARSE if runs.quick else 1
     while tried:
-        for pair, held in zip(tried, _borne(runs, tried.items()), strict=True):
+        for pair, held in zip(tried, _borne(runs, tried.items(), within), strict=True):
             if held:
                 low[pair] = tried[pair]
             else:
@@ -48,12 +52,12 @@ def _next(low: int, high: int | None, apart: int) -> int:
     return round((low + high) / 2) if high - low > apart else 0
 
 
-def _borne(runs: Runs, tried: Iterable[tuple[Pair, int]]) -> list[bool]:
+def _borne(runs: Runs, tried: Iterable[tuple[Pair, int]], within: float) -> list[bool]:
     """Whether each delay, in control periods, is borne."""
     integrator = "implicitfast" if runs.quick else "RK4"
     scenarios = [runs.scenario(*pair, input_delay=at * CONTROL_PERIOD, integrator=integrator) for pair, at in tried]
     found = runs.scores(scenarios)
-    return [s["ultimate_bound"] <= BEARS * scale(c) for s, c in zip(found, scenarios, strict=True)]
+    return [s["ultimate_bound"] <= within * scale(c) for s, c in zip(found, scenarios, strict=True)]
 
 
 def critical(runs: Runs, plant: str) -> float:

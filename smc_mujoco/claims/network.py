@@ -5,6 +5,7 @@ claim is supported where it holds on both.
 """
 
 from smc_mujoco.claims import claim
+from smc_mujoco.claims.checks import about
 from smc_mujoco.claims.compare import HOSMC, NETWORKS, OURS, alike, scores, slower
 from smc_mujoco.claims.evidence import Check, Runs, check
 from smc_mujoco.plant import plant as find_plant
@@ -23,9 +24,9 @@ def rapid(runs: Runs) -> list[Check]:
     """Times from which mean and spread stay within 2 % of |x0|."""
     got = scores(runs, NETWORKS, [OURS])
     return [
-        check(f"{plant}: settling time of the {of}, s", got[plant, OURS][f"{of}_settling_time"], "<", 1.0)
+        check(f"{plant}: settling time of the {of}, s", got[plant, OURS][f"{of}_settling_time"], "<", 1.0, sentence)
         for plant in NETWORKS
-        for of in ("mean", "spread")
+        for of, sentence in (("mean", "damping"), ("spread", "synchronisation"))
     ]
 
 
@@ -53,10 +54,13 @@ def _distorted(runs: Runs, plant: str) -> list[Check]:
     over = [s["overshoot"] for s in found]
     rival, ours = over[:3], over[3:]
     return [
-        slower(plant, "classical", nominal),
-        check(f"{plant}: overshoot of classical at 0.5 N m/rad against that at 0, %", rival[1], ">", rival[0]),
-        check(f"{plant}: overshoot of classical at 5 N m/rad against that at 0.5, %", rival[2], ">", rival[1]),
-        check(f"{plant}: overshoot of {OURS}, coupled, against that at 0 N m/rad, %", max(ours[1:]), "<=", ours[0]),
+        *about("slower", slower(plant, "classical", nominal)),
+        *about(
+            "coupling distortion",
+            check(f"{plant}: overshoot of classical at 0.5 N m/rad against that at 0, %", rival[1], ">", rival[0]),
+            check(f"{plant}: overshoot of classical at 5 N m/rad against that at 0.5, %", rival[2], ">", rival[1]),
+            check(f"{plant}: overshoot of {OURS}, coupled, against that at 0 N m/rad, %", max(ours[1:]), "<=", ours[0]),
+        ),
     ]
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from smc_mujoco.claims import claim, lyapunov
 from smc_mujoco.claims.evidence import Beside, Check, Runs, check, scale
 from smc_mujoco.claims.variants import reversed_gain, with_gains
+from smc_mujoco.claims.verdict import UNIVERSAL
 from smc_mujoco.paper import PLANTS
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
@@ -26,6 +27,7 @@ CONVERGED = 0.05  # of |x0|
     measured="sign of Vdot on a grid of the state plane, 201 x 201, |x| up to 2 |x0| and |v| up to 2 k1 |x0|, with the "
     "exact f and g of each plant and the law not saturated; a network synchronised, in which a channel is one pendulum",
     holds_if="no point with Vdot > 0 and |s| > 1e-6",
+    quantifier=UNIVERSAL,
     note="Vdot has the sign of alpha alphadot. On alpha = 0 alphadot is f(x, -k1 x) - k1^2 x whatever lambda is, so "
     "that Vdot > 0 on one side of that line wherever this is not 0.",
 )
@@ -54,6 +56,7 @@ def decreases(runs: Runs) -> list[Check | Beside]:
     measured="fraction of the control periods of the nominal run in which V, of the true state, rises by more than "
     "rounding; of all channels of a network",
     holds_if="0",
+    quantifier=UNIVERSAL,
 )
 def monotonic(runs: Runs) -> list[Check]:
     """V = s^2 / 2, s = alpha - u / g with the u that was given; a rise is one above 1e-12 of the run's largest V."""
@@ -73,6 +76,7 @@ def monotonic(runs: Runs) -> list[Check]:
     measured="share of runs of 40 s that end within 5 % of |x0|, from 9 states (0.25, 1 and 2 times x0 at -1, 0 and 1 "
     "times |x0| per s; the plants are odd), with lambda 0.5, 0.8, 1 and 1.2 times the smallest of linear theory",
     holds_if="all converge",
+    quantifier=UNIVERSAL,
     note="Hanging pendulums need no lambda, so that there are no multiples of one; claim 24 tells of them.",
 )
 def global_(runs: Runs) -> list[Check | Beside]:

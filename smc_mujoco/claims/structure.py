@@ -5,6 +5,7 @@ from smc_mujoco.claims import claim
 from smc_mujoco.claims.evidence import Beside, Check, Runs, check, scale
 from smc_mujoco.claims.lyapunov import input_gain
 from smc_mujoco.claims.search import LEAST, smallest_stable
+from smc_mujoco.claims.verdict import UNIVERSAL
 from smc_mujoco.conditions import Noise
 from smc_mujoco.estimators import estimator
 from smc_mujoco.law import law as find_law
@@ -58,6 +59,7 @@ def jerk(name: str) -> float:
     measured="smallest lambda with which a start near the origin, 0.001 x0, dies out, by search from 0.001 to 6 at the "
     "k1 of the set; linear theory beside it",
     holds_if="any lambda > 0",
+    quantifier=UNIVERSAL,
     note="0.001 stands for any lambda > 0. A plant that needs one has a smallest lambda far above it.",
 )
 def no_tuning(runs: Runs) -> list[Check | Beside]:

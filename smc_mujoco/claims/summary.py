@@ -3,6 +3,7 @@
 from smc_mujoco.claims import claim
 from smc_mujoco.claims.compare import HOSMC, OURS, overshoot, scores
 from smc_mujoco.claims.evidence import Check, Runs, check, ratio
+from smc_mujoco.claims.verdict import UNIVERSAL
 from smc_mujoco.paper import PLANTS
 
 
@@ -12,6 +13,7 @@ from smc_mujoco.paper import PLANTS
     where="summary of benchmarking results",
     measured="overshoot on every plant, nominal",
     holds_if="< 1 %",
+    quantifier=UNIVERSAL,
 )
 def monotonic(runs: Runs) -> list[Check]:
     """Overshoot of the paper's law, plant by plant; without settling there is no convergence to be monotonic."""

@@ -1,8 +1,12 @@
 """From checks to verdicts: under one set of gains, and over several.
 
-Under one set a claim is supported where all its checks hold, refuted where none does, partly supported between; without
-checks it is not testable. Over several sets the verdict is the one that they have in common; where they differ it is
-partly supported, and flips.
+A claim consists of one sentence or of several. A sentence holds where all its checks hold; an existential one ("may",
+"there is") where one does. Under one set of gains a claim is supported where all its sentences hold, refuted where none
+does, partly supported between; without checks it is not testable.
+
+Over several sets the verdict is the one that they have in common; where they differ it is partly supported, and flips.
+A universal claim ("every", "any", "by construction") speaks of all gains: a counter-example under one set refutes it.
+An existential one is supported by an example under one set.
 """
 
 import dataclasses
@@ -14,6 +18,8 @@ from smc_mujoco.claims.checks import Beside, Check
 from smc_mujoco.errors import ScenarioError
 
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
+
+UNIVERSAL, NAMED, EXISTENTIAL = QUANTIFIERS = ("universal", "of what it names", "existential")
 
 Numbers = dict[str, dict[str, dict[str, Any]]]  # set of gains -> what -> value, relation, limit, holds
 Found = Sequence[Check | Beside]
@@ -31,6 +37,7 @@ class Claim:
       verdicts: set of gains -> verdict.
       flips: whether the verdict depends on the set.
       note: what a reader must know, and on which set the verdict depends.
+      quantifier: one of QUANTIFIERS.
     """
 
     id: str
@@ -44,6 +51,7 @@ class Claim:
     verdicts: dict[str, str]
     flips: bool
     note: str
+    quantifier: str = NAMED
 
     def checks(self, gains: str) -> list[Check]:
         """The checks under a set of gains."""
@@ -67,21 +75,28 @@ def _strict(value: Any) -> Any:
     return value
 
 
-def verdict(found: Found) -> str:
+def verdict(found: Found, quantifier: str = NAMED) -> str:
     """The verdict under one set of gains."""
-    checks = [one for one in found if isinstance(one, Check)]
-    held = sum(one.holds for one in checks)
-    if not checks:
+    sentences: dict[str, list[bool]] = {}
+    for one in found:
+        if isinstance(one, Check):
+            sentences.setdefault(one.sentence, []).append(one.holds)
+    if not sentences:
         return NOT_TESTABLE
-    return SUPPORTED if held == len(checks) else PARTLY if held else REFUTED
+    enough = any if quantifier == EXISTENTIAL else all
+    held = [enough(checks) for checks in sentences.values()]
+    return SUPPORTED if all(held) else PARTLY if any(held) else REFUTED
 
 
-def combined(verdicts: Mapping[str, str]) -> tuple[str, bool, str]:
+def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str, bool, str]:
     """The verdict over all sets of gains, whether it flips between them, and the sentence that says so."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
     told = ", ".join(f"{kind} with {name} gains" for name, kind in verdicts.items())
+    decisive = {UNIVERSAL: REFUTED, EXISTENTIAL: SUPPORTED}.get(quantifier)
+    if decisive in kinds:
+        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {told}."
     return PARTLY, True, f"The verdict depends on the gains: {told}."
 
 
@@ -94,6 +109,6 @@ def numbers(found: Found) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
     for i, one in enumerate(found):
         if any(one.what == other.what for other in found[:i]):
             raise ScenarioError(f"a claim measures {one.what!r} twice: name the two apart")
-    told = ("value", "relation", "limit", "holds")
+    told = ("value", "relation", "limit", "holds", "sentence")
     checks = {one.what: {name: getattr(one, name) for name in told} for one in found if isinstance(one, Check)}
     return checks, {one.what: float(one.value) for one in found if isinstance(one, Beside)}
