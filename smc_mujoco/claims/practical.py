@@ -161,10 +161,8 @@ def jumps(runs: Runs) -> list[Check | Beside]:
             what = f"{plant}: largest |x| after a {kind} jump, over |x0|"
             found.append(check(what, _peak_after_jump(trace) / scale(trace.scenario), "<=", 1.0))
             ends.append(np.abs(trace.x[measure.last(trace)]).max() / scale(trace.scenario))
-    return [
-        *found,
-        Beside("largest ultimate bound after a jump, over |x0|", float(np.nan_to_num(max(ends), nan=np.inf))),
-    ]
+    worst = float(np.nan_to_num(max(ends), nan=math.inf))
+    return [*found, Beside("largest ultimate bound after a jump, over |x0|", worst)]
 
 
 def _peak_after_jump(trace: Trace) -> float:
@@ -184,8 +182,9 @@ def _peak_after_jump(trace: Trace) -> float:
     "theory's critical delay for the paper's law",
     holds_if="the paper's law bears more than each rival",
     note="The criterion is read so: the ultimate bound decides. That |x| ends below its start is told beside: a law "
-    "that chatters at a constant amplitude is not thereby unstable. 0 s: the law does not bear even one control period, as super-twisting that winds up and never comes to rest. "
-    "A bounded law may bear more than linear theory's delay: beyond that it swings, but within the 5 %.",
+    "that chatters at a constant amplitude is not thereby unstable. 0 s: the law does not bear even one control "
+    "period, as super-twisting that winds up and never comes to rest. A bounded law may bear more than linear "
+    "theory's delay: beyond that it swings, but within the 5 %.",
 )
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
     """Largest delay of the paper's law against each rival's; beside it linear theory's, sampled and held."""

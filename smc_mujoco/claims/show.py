@@ -59,7 +59,12 @@ def page(claim: Claim, console: Console) -> None:
     about.add_column()
     flips = ", flips with the gains" if claim.flips else ""
     verdict = Text(f"{claim.verdict}{flips}", style=f"bold {COLOURS[claim.verdict]}")
-    for label, value in (("measured", claim.measured), ("holds if", claim.holds_if), ("note", claim.note)):
+    for label, value in (
+        ("kind", claim.quantifier),
+        ("measured", claim.measured),
+        ("holds if", claim.holds_if),
+        ("note", claim.note),
+    ):
         if value:
             about.add_row(label, Text(value))
     about.add_row("verdict", verdict)
