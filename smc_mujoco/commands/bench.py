@@ -39,7 +39,8 @@ def bench(
         with loading():
             from rich.console import Console
 
-            from smc_mujoco.leaderboard import leaderboard, leaderboard_table
+            from smc_mujoco.leaderboard import leaderboard
+            from smc_mujoco.leaderboard_table import leaderboard_table
             from smc_mujoco.study import FULL, QUICK, grid, study
 
         clock, console = Clock(), Console()

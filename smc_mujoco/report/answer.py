@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from smc_mujoco.ranking import ROUNDING
+from smc_mujoco.differences import ROUNDING
 from smc_mujoco.report import words
 from smc_mujoco.report.findings import Findings, Place, Score
 
