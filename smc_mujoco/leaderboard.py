@@ -2,35 +2,29 @@
 
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None inside the noise
-    rich.print(leaderboard_table(boards))
+    rich.print(leaderboard_table(boards))              # of `leaderboard_table`
 
-What intervals, ranks and winners mean: `statistics`, `ranking`. The conclusions hold for the plants and conditions of
-the table, over starts and noise; `Board.friedman` says how they would carry over to other conditions.
+What intervals, ranks and winners mean: `statistics`, `ranking`. A board is one metric in one group of runs; laws are
+compared in each of its blocks, a plant in a condition, and the correction for many comparisons is over all pairs of
+laws in all blocks of the board. Over several blocks a board tells what holds in each of them: its winner wins in every
+one. The conclusions hold for the plants and conditions of the table, over starts and noise; `Board.friedman` says how
+they would carry over to other conditions.
 """
 
 import dataclasses
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from smc_mujoco import cells
 from smc_mujoco.cells import SETTLES, Columns
 from smc_mujoco.errors import ScenarioError, shown, unknown
-from smc_mujoco.ranking import Friedman, Rank, friedman, ranks
-from smc_mujoco.statistics import RESAMPLES, Interval, checked, median_of, share_interval
-
-if TYPE_CHECKING:
-    from rich.table import Table
-    from rich.text import Text
+from smc_mujoco.friedman import Friedman, friedman
+from smc_mujoco.ranking import SEEDS, Comparison, Rank, compare, ranks
+from smc_mujoco.statistics import RESAMPLES, Interval, median_of, share_interval
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
-KEY = (
-    "median, #place by mean rank over the shared runs, {level:.3g} % interval over seeds; * may be the best: "
-    "no winner where several may, inside the noise; x, u of driven joints, in rad or m, N m or N"
-)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -43,6 +37,38 @@ class Entry:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Block:
+    """Laws compared on one plant in one condition.
+
+    Attributes:
+      plant: its name.
+      condition: its name.
+      medians: law -> median over the seeds; of "settles" the share of runs that do not.
+      best: the laws that none is better than.
+      seeds: how many every law ran from.
+      runs: how many of these are distinct: in the others every law does what it does in an earlier one.
+    """
+
+    plant: str
+    condition: str
+    medians: Mapping[str, float]
+    best: tuple[str, ...]
+    seeds: int
+    runs: int
+
+    @property
+    def winner(self) -> str | None:
+        """The law that is better than every other, among several."""
+        return self.best[0] if len(self.best) == 1 < len(self.medians) else None
+
+    @property
+    def sample(self) -> str:
+        """The size of the sample in words, such as "20 seeds, 1 distinct run"."""
+        seeds = f"{self.seeds} seed{'s' * (self.seeds > 1)}"
+        return seeds if self.runs == self.seeds else f"{seeds}, {self.runs} distinct run{'s' * (self.runs > 1)}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Board:
     """Laws compared in one metric within one group of runs.
 
@@ -51,8 +77,10 @@ class Board:
       metric: a metric's name, or "settles".
       unit: of the medians, with {x} and {u} as in `measure.Metric.unit`; "" for "settles", which is 0 to 1.
       entries: lowest mean rank first. A median over several plants is NaN where its unit depends on the plant.
-      cells: how many runs each law has here: those that all laws have.
-      seeds: in how many seeds.
+      blocks: the same laws on each plant in each condition by itself.
+      cells: how many runs each law has here: those that all laws have, and equal ones once.
+      seeds: in how many seeds, equal ones included.
+      pairs: how many comparisons the tests are corrected for: of every two laws, in every block.
       level: of intervals and tests.
       friedman: None of one law, or one plant in one condition.
     """
@@ -61,36 +89,74 @@ class Board:
     metric: str
     unit: str
     entries: tuple[Entry, ...]
+    blocks: tuple[Block, ...]
     cells: int
     seeds: int
+    pairs: int
     level: float
     friedman: Friedman | None
 
     @property
     def best(self) -> tuple[str, ...]:
-        """The laws that may be the best; none where each is beaten by another, in a circle."""
+        """The laws that none is better than, in any block; there may be none over several blocks."""
         return tuple(entry.law for entry in self.entries if entry.rank.best)
 
     @property
     def winner(self) -> str | None:
-        """The law that alone may be the best, among several."""
-        return self.best[0] if len(self.best) == 1 < len(self.entries) else None
+        """The law that wins in every block, if there is one."""
+        winners = {block.winner for block in self.blocks}
+        return winners.pop() if len(winners) == 1 else None
+
+    def wins(self, law: str) -> list[str]:
+        """The names of the blocks in which a law wins, see `name`."""
+        return [self.name(block) for block in self.blocks if block.winner == law]
+
+    def losses(self, law: str) -> list[str]:
+        """The names of the blocks in which another law is better."""
+        return [self.name(block) for block in self.blocks if law not in block.best]
+
+    def name(self, block: Block) -> str:
+        """What tells a block from the others of the board: its condition, its plant, or both."""
+        own = {"plant": block.plant, "condition": block.condition}
+        return ", ".join(value for what, value in own.items() if what not in self.group)
+
+    @property
+    def kind(self) -> str:
+        """What the blocks are: "conditions", "plants", or "cells" where they differ in both."""
+        return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
 
     @property
     def verdict(self) -> str:
-        """In words: "winner: classical", or "no winner: ..." with the laws that may be."""
+        """In words: "winner: classical", "classical wins under noise, loses under sine", or "no winner: ..."."""
         if self.winner:
-            return f"winner: {self.winner}"
-        return f"no winner: {self.why or ', '.join(self.best)}"
+            return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+        told = []
+        for entry in self.entries:
+            if wins := self.wins(entry.law):
+                losses = self.losses(entry.law)
+                told.append(
+                    f"{entry.law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
+                )
+        if told:
+            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(told)}"
+        return f"no winner: {self.why or _listed(self.best)}"
 
     @property
     def why(self) -> str:
         """Why there can be no winner, "" if there can be."""
         if len(self.entries) == 1:
             return "one law"
-        if 0.5**self.seeds > (1 - self.level) / 2:  # the least p-value of the test, see `ranking`
-            return f"{self.seeds} seed{'s' * (self.seeds > 1)}, too few"
+        most = max(self.blocks, key=lambda block: block.runs)
+        if most.runs < SEEDS:
+            return most.sample + ", too few" * (most.runs == most.seeds)
+        if 2.0 ** (1 - most.runs) * self.pairs > 1 - self.level:  # the least p-value of the sign test
+            return f"{most.sample}, too few for {self.pairs} comparisons"
         return "" if self.best else "each loses to another"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a row; those of blocks, if these are cells, have a comma in them already."""
+    return ("; " if any("," in name for name in names) else ", ").join(names)
 
 
 def leaderboard(
@@ -104,7 +170,8 @@ def leaderboard(
     """The laws of a table, compared in each metric within each group.
 
     Only cells - plant, condition, seed - that every law of the group has are compared; a run that failed is inf in all
-    metrics. A metric that does not apply to a group has no board there.
+    metrics. Seeds in which every law does the same are one sample. A metric that does not apply to a group has no board
+    there.
 
     Args:
       metrics: names of metrics, lower being better, or "settles".
@@ -113,24 +180,45 @@ def leaderboard(
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
     """
-    units, found = _units(metrics), []
+    units, boards = _units(metrics), []
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
+        ran = cells.scenarios(table, group)
         for metric, unit in units.items():
-            if scores := group.scores(by_row[metric]):
-                there = ~np.isnan(scores[group.laws[0]])
-                board = Board(
-                    group=group.name,
-                    metric=metric,
-                    unit=unit,
-                    entries=_entries(scores, metric, group.plants > 1 and "{" in unit, level, resamples, seed),
-                    cells=int(there.sum()),
-                    seeds=there.shape[1],
-                    level=checked(level),
-                    friedman=friedman(scores, level),
-                )
-                found.append(board)
-    return found
+            there, scores = group.scores(by_row[metric])
+            if not scores:
+                continue
+            floors = [cells.floor(ran[k], unit) for k in there]
+            found = compare(scores, floors, metric == SETTLES, level)
+            blocks = tuple(_block(group, found, at, k) for at, k in enumerate(there))
+            mixed = "{" in unit and len({block.plant for block in blocks}) > 1
+            board = Board(
+                group=group.name,
+                metric=metric,
+                unit=unit,
+                entries=_entries(found, mixed, resamples, seed),
+                blocks=blocks,
+                cells=sum(block.runs for block in blocks),
+                seeds=max(block.seeds for block in blocks),
+                pairs=found.pairs,
+                level=found.level,
+                friedman=friedman(found),
+            )
+            boards.append(board)
+    return boards
+
+
+def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
+    """Block k of a group, which is number `at` of those compared."""
+    plant, condition = group.blocks[k]
+    return Block(
+        plant=plant,
+        condition=condition,
+        medians=dict(zip(found.laws, found.centres[:, at].tolist(), strict=True)),
+        best=found.best[at],
+        seeds=group.seeds[k],
+        runs=int(found.seeds[at]),
+    )
 
 
 def _units(metrics: Sequence[str]) -> dict[str, str]:
@@ -146,91 +234,17 @@ def _units(metrics: Sequence[str]) -> dict[str, str]:
     return {name: known[name] for name in metrics}
 
 
-def _entries(
-    scores: dict[str, np.ndarray], metric: str, mixed: bool, level: float, resamples: int, seed: int
-) -> tuple[Entry, ...]:
+def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
     """The laws' lines; `mixed` if there is no median, of values in several units."""
-    found = []
-    for rank in ranks(scores, level, resamples, seed):
+    lines, scores = [], dict(zip(found.laws, found.cells, strict=True))
+    for rank in ranks(found, resamples, seed):
         by_cell = scores[rank.law]
         n = by_cell.shape[1]
-        if metric == SETTLES:
-            interval = share_interval(float(1 - np.nanmean(by_cell)), n, level)
+        if found.shares:
+            interval = share_interval(float(1 - np.nanmean(by_cell, axis=1).mean()), n, found.level)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(by_cell, level, resamples, seed)
-        found.append(Entry(law=rank.law, interval=interval, rank=rank))
-    return tuple(found)
-
-
-def leaderboard_table(boards: Sequence[Board]) -> "Table":
-    """Boards for the terminal: a part a group, a line a law, a column a metric, and below them who wins."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from smc_mujoco.draw import style
-
-    metrics = {board.metric: board.unit for board in boards}
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
-    lines = max((metric.count("_") for metric in metrics), default=0)
-    table.add_column("law", no_wrap=True, min_width=0 if boards else 30)
-    for metric, unit in metrics.items():
-        head = Text("\n" * (lines - metric.count("_")) + metric.replace("_", "\n"))
-        head.append(f"\n{unit.format(x='x', u='u') or '%'}", "dim not bold")
-        table.add_column(head, justify="right", overflow="fold")  # no digit is cut off
-    for group in dict.fromkeys(tuple(board.group.items()) for board in boards):
-        own = {board.metric: board for board in boards if tuple(board.group.items()) == group}
-        seeds = max(board.seeds for board in own.values())
-        size = f"{max(board.cells for board in own.values())} runs,\n{seeds} seed{'s' * (seeds > 1)}"
-        name = "\n".join(_folded(name) for _, name in group) or "all"
-        table.add_row(Text(f"{name}\n", "bold").append(size, "dim not bold"))
-        for law in sorted({entry.law for board in own.values() for entry in board.entries}):
-            table.add_row(
-                Text(_folded(law), style.law_colour(law)), *(_cell(own.get(metric), law) for metric in metrics)
-            )
-        table.add_row("", *(_winner(own.get(metric)) for metric in metrics), end_section=True)
-    table.caption = KEY.format(level=100 * boards[0].level) if boards else "no boards: no metric applies"
-    table.caption_justify = "left"
-    return table
-
-
-def _folded(name: str, width: int = 13) -> str:
-    """A name on several lines, broken after underscores."""
-    return "\n".join(textwrap.wrap(name.replace("_", "_ "), width)).replace("_ ", "_")
-
-
-def _cell(board: Board | None, law: str) -> "Text":
-    """A law's median, place and interval."""
-    from rich.text import Text
-
-    entry = next((e for e in board.entries if e.law == law), None) if board else None
-    if board is None or entry is None:
-        return Text("")
-    middle = _number(entry.interval.median, board.metric)
-    low, high = (_number(value, board.metric, digits=2) for value in entry.interval[1:3])
-    text = Text(f"{middle} " if middle else "", "bold" if entry.rank.best else "")
-    text.append(f"#{entry.rank.median:g}").append("*" if entry.rank.best else " ")
-    return text.append(f"\n{low}–{high}" if low else "", "dim not bold")
-
-
-def _number(value: float, metric: str, digits: int = 3) -> str:
-    from smc_mujoco.tables import number
-
-    if math.isnan(value):
-        return ""
-    return f"{100 * value:.0f}" if metric == SETTLES else number(value, digits)
-
-
-def _winner(board: Board | None) -> "Text":
-    """Who wins a board."""
-    from rich.text import Text
-
-    from smc_mujoco.draw import style
-
-    if board is None:
-        return Text("")
-    if board.winner:
-        return Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
-    return Text(f"no winner\n{board.why or f'{len(board.best)} of {len(board.entries)}*'}", "dim")
+            interval = median_of(by_cell, found.level, resamples, seed)
+        lines.append(Entry(law=rank.law, interval=interval, rank=rank))
+    return tuple(lines)

@@ -1,11 +1,24 @@
-"""Laws ranked on the runs that they share, and which of them may be the best.
+"""Laws compared on the runs that they share: which is better in which block, and their places over all blocks.
 
-    ranks({"classical": a, "adaptive": b})             # a, b: (blocks, seeds), lower is better
+    found = compare({"classical": a, "adaptive": b})   # a, b: (blocks, seeds), lower is better
+    found.best                                         # of each block the laws that none is better than
+    ranks(found)                                       # the laws' places over all blocks
 
-As in `statistics`, seeds are the sample and inf is worst, two of them tied. Ranks compare runs of one cell, the same
-block and seed, and are free of units. That a law is better than another means here: in more cells, as the sign test
-has it. Mean ranks order the laws, but do not decide between them, for a third law can turn the order of two
-(A. Benavoli, G. Corani, F. Mangili, JMLR 17(5), 2016); the test of `ranks` does.
+As in `statistics`, seeds are the sample, blocks are fixed, and inf is worst, two of them tied. One law is better than
+another in a block if three things hold.
+
+- Its median is lower by more than the least relevant difference, see `differences`. Smaller ones are ties.
+- It is ahead in more seeds, and the sign test over them rejects that both are ahead equally often (W. J. Conover,
+  Practical Nonparametric Statistics, 1999, 3.4). The test is exact for any number of seeds and free of units. Its
+  p-values are two-sided and corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979) for all pairs
+  of laws in all blocks: the probability that any law is wrongly called better, in any block, is at most 1 - level.
+- There are at least 16 seeds. With fewer, hardly anything survives the correction.
+
+A law that no other is better than is among the best of its block; where it alone is, it is the winner there. "Better"
+follows the medians, so every block has a best law, and a winner has the lowest median.
+
+A law's rank in a block is that of its median; medians that differ by less than the least relevant difference are tied.
+Its place is by its mean rank over the blocks. Hence a law that wins in every block has the first place.
 """
 
 import dataclasses
@@ -15,13 +28,13 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from smc_mujoco.differences import exceeds, least_difference, worse
 from smc_mujoco.errors import ScenarioError, shown
-from smc_mujoco.statistics import RESAMPLES, checked, draws, median, outermost
+from smc_mujoco.statistics import RESAMPLES, checked, drawn_medians, draws, middle, outermost
 
-# In SI units, and relative: runs that differ by less are tied, for how they are integrated decides about it.
-ROUNDING, ALIKE = 1e-9, 1e-6
-EXACT = 10  # seeds up to which all flips of signs are tried
+SEEDS = 16  # the fewest, of distinct runs, with which one law is called better than another
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -30,16 +43,18 @@ class Rank:
 
     Attributes:
       law: its name.
-      mean: its mean rank over blocks and seeds.
-      median: of its place by mean rank, over draws of the seeds.
-      low: of the interval of that place; NaN for a single seed.
+      mean: its mean rank over the blocks.
+      place: by mean rank.
+      median: of that place over draws of the seeds.
+      low: of its interval; NaN for a single seed.
       high: likewise.
-      p: of the test that no law is better than this one.
-      best: whether it may be the best: the test does not reject that.
+      p: the least corrected p-value with which another law is ahead of it in a block; 1 if none is.
+      best: whether it is among the best of every block.
     """
 
     law: str
     mean: float
+    place: float
     median: float
     low: float
     high: float
@@ -47,154 +62,156 @@ class Rank:
     best: bool
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Friedman:
-    """M. Friedman's test that laws rank alike, with P. Nemenyi's critical difference (J. Demsar, JMLR 7(1), 2006).
-
-    Here the blocks are the sample, not the seeds: would the order hold in other conditions? Demsar trusts the chi^2
-    distribution from about ten blocks on.
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """Laws compared in blocks.
 
     Attributes:
-      blocks: how many.
-      mean_ranks: law -> mean rank over the blocks, in each by its median over the seeds.
-      p: that laws which rank alike differ by so much.
-      critical_difference: of mean ranks; laws that differ by less are not told apart.
+      laws: by name.
+      cells: (laws, blocks, seeds), their scores; NaN where no run is.
+      shares: whether scores are 0.0 or 1.0, and means are compared in place of medians.
+      floors: (blocks,), the least difference of medians that is relevant whatever they are.
+      level: of confidence.
+      p: (blocks, laws, laws), of the sign test, corrected, that a law is ahead of another; 1 where it is not.
     """
 
-    blocks: int
-    mean_ranks: dict[str, float]
-    p: float
-    critical_difference: float
+    laws: tuple[str, ...]
+    cells: np.ndarray
+    shares: bool
+    floors: np.ndarray
+    level: float
+    p: np.ndarray
+
+    @functools.cached_property
+    def centres(self) -> np.ndarray:
+        """(laws, blocks), the medians, or means, over the seeds."""
+        return np.nanmean(self.cells, axis=2) if self.shares else middle(self.cells)
+
+    @property
+    def seeds(self) -> np.ndarray:
+        """(blocks,), how many each block has."""
+        return (~np.isnan(self.cells[0])).sum(axis=1)
+
+    @functools.cached_property
+    def better(self) -> np.ndarray:
+        """(blocks, laws, laws), whether a law is better than another."""
+        own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
+        lower = exceeds(rival, own, resolution=self.floors[:, None, None])
+        return lower & (self.p <= 1 - self.level) & (self.seeds >= SEEDS)[:, None, None]
+
+    @property
+    def best(self) -> list[tuple[str, ...]]:
+        """Of each block the laws that none is better than."""
+        return [tuple(np.array(self.laws)[~row].tolist()) for row in np.any(self.better, axis=1)]
+
+    @property
+    def pairs(self) -> int:
+        """How many comparisons the p-values are corrected for."""
+        return len(self.p) * math.comb(len(self.laws), 2)
 
 
-def ranks(
-    scores: Mapping[str, np.ndarray], level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
-) -> list[Rank]:
-    """The laws' places, lowest mean rank first.
-
-    A law is not among the best if a test rejects that no law is better. The test flips the signs of whole seeds
-    (R. A. Fisher, The Design of Experiments, 1935, 21). Its statistic is, of the law that it loses to most (P. H.
-    Westfall, S. S. Young, Resampling-Based Multiple Testing, 1993), in how much more of a seed's cells it loses than
-    wins, summed over the seeds, over the root of the sum of squares. Each law is tested at (1 - level) / 2. Of m >= 2
-    laws that are equally good, then, one is left as the winner with a probability of m / (2 (m - 1)) (1 - level) at
-    most, by Markov's inequality for how many are rejected; "equally good" is that in a seed they could change places.
-    At 95 % it takes six seeds to reject a law, and seven to reject one that in turn beats another in all of them.
+def compare(
+    scores: Mapping[str, ArrayLike], floors: ArrayLike = 0.0, shares: bool = False, level: float = 0.95
+) -> Comparison:
+    """Compare every law with every other in every block.
 
     Args:
       scores: law -> (blocks, n) or (n,), lower is better, inf for never; NaN, in all laws, where no run is.
+      floors: one for all blocks, or one for each, see `Comparison`.
 
     Raises:
       ScenarioError: no laws, or not of the same cells.
     """
     laws, cells = _cells(scores)
-    lost = duels(cells)
-    n, k = lost.shape[:2]
-    mean = _mean_ranks(lost.mean(axis=0))
-    middle, low, high = _places(mean[None])[0], np.full(k, np.nan), np.full(k, np.nan)
-    if n > 1:
-        drawn = _product(draws(n, resamples, seed), lost.reshape(n, k * k) / n).reshape(-1, k, k)
-        places = np.sort(_places(_mean_ranks(drawn)), axis=0)
-        at = outermost(n, level, resamples)
-        middle, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
-    columns = (mean, middle, low, high, beaten(lost, seed))
-    found = [
-        Rank(law=law, mean=m, median=middle, low=low, high=high, p=p, best=p > (1 - checked(level)) / 2)
-        for law, m, middle, low, high, p in zip(laws, *(c.tolist() for c in columns), strict=True)
-    ]
-    return sorted(found, key=lambda rank: rank.mean)
+    k, blocks, _ = cells.shape
+    pairs = np.array([*itertools.combinations(range(k), 2)], int).reshape(-1, 2)
+    p, p_of = np.ones((blocks, k, k)), np.ones((blocks, len(pairs)))
+    tested = [_sign_test(worse(cells[a], cells[b])) for a, b in pairs]
+    for j, (value, _) in enumerate(tested):
+        p_of[:, j] = value
+    for (a, b), (_, ahead), value in zip(pairs, tested, holm(p_of).T, strict=True):
+        p[:, a, b], p[:, b, a] = np.where(ahead < 0, value, 1.0), np.where(ahead > 0, value, 1.0)
+    widths = np.broadcast_to(np.asarray(floors, float), blocks)
+    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=checked(level), p=p)
 
 
-def _cells(scores: Mapping[str, np.ndarray]) -> tuple[list[str], np.ndarray]:
+def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
     """The laws by name, and their scores (laws, blocks, seeds), if all have the same cells."""
-    laws = sorted(scores)
+    laws = tuple(sorted(scores))
     given = [np.atleast_2d(np.asarray(scores[law], float)) for law in laws]
     if not given or not given[0].size or len({g.shape for g in given}) > 1:
         raise ScenarioError(f"scores of {shown(laws)} are not of the same cells: give each law (blocks, seeds)")
     cells = np.stack(given)
     missing = np.isnan(cells)
-    if (missing != missing[0]).any() or missing[0].all(axis=0).any():
+    if (missing != missing[0]).any() or missing[0].all(axis=0).any() or missing[0].all(axis=1).any():
         raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws alike")
     return laws, cells
 
 
-def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """1.0 where a is more than b, -1.0 where less, 0.0 where they are tied; NaN where both are."""
-    tie = np.maximum(ROUNDING, ALIKE * np.minimum(np.abs(a), np.abs(b)))
-    return np.where(np.isnan(a), np.nan, (a > b + tie).astype(float) - (b > a + tie))
+def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each block of signs (blocks, n): the two-sided p-value, and the sign that prevails."""
+    from scipy.special import bdtr
+
+    up, down = (signs > 0).sum(axis=1), (signs < 0).sum(axis=1)
+    p = 2 * bdtr(np.minimum(up, down).astype(float), up + down, 0.5)
+    return np.minimum(p, 1.0), np.sign(up - down)
 
 
-def duels(cells: np.ndarray) -> np.ndarray:
-    """In how much more of a seed's cells one law is worse than another than better, (seeds, laws, laws), -1 to 1.
-
-    Args:
-      cells: (laws, blocks, seeds); NaN in all laws where no run is.
-    """
-    k, _, n = cells.shape
-    found = np.zeros((n, k, k))
-    for a, b in itertools.combinations(range(k), 2):
-        found[:, a, b] = np.nanmean(worse(cells[a], cells[b]), axis=0)
-        found[:, b, a] = -found[:, a, b]
-    return found
+def holm(p: np.ndarray) -> np.ndarray:
+    """p-values, in any shape, corrected for their number."""
+    order = np.argsort(p, axis=None)
+    found = np.empty(p.size)
+    found[order] = np.minimum(np.maximum.accumulate(p.flat[order] * np.arange(p.size, 0, -1)), 1.0)
+    return found.reshape(p.shape)
 
 
-@functools.lru_cache(maxsize=8)
-def flips(n: int, seed: int) -> np.ndarray:
-    """Signs of n seeds, (flips, n): all that there are, or many; the first as it was, for that is one of them too."""
-    if n <= EXACT:
-        return np.array(list(itertools.product((1.0, -1.0), repeat=n)))
-    found = np.random.default_rng(seed).choice((1.0, -1.0), size=(RESAMPLES + 1, n))
-    found[0] = 1.0
-    return found
+def ranks(found: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[Rank]:
+    """The laws' places, lowest mean rank first."""
+    n, k = found.cells.shape[2], len(found.laws)
+    mean = block_ranks(found.centres[None], found.floors).mean(axis=2)
+    place = _places(mean)[0]
+    middles, low, high = place, np.full(k, math.nan), np.full(k, math.nan)
+    if n > 1:
+        drawn = block_ranks(_drawn_centres(found, draws(n, resamples, seed)), found.floors)
+        places, at = np.sort(_places(np.nanmean(drawn, axis=2)), axis=0), outermost(n, found.level, resamples)
+        middles, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
+    p, best = found.p.min(axis=(0, 1)), ~np.any(found.better, axis=(0, 1))
+    rows = [
+        Rank(
+            law=law,
+            mean=float(mean[0, i]),
+            place=float(place[i]),
+            median=float(middles[i]),
+            low=float(low[i]),
+            high=float(high[i]),
+            p=float(p[i]),
+            best=bool(best[i]),
+        )
+        for i, law in enumerate(found.laws)
+    ]
+    return sorted(rows, key=lambda rank: rank.mean)
 
 
-def beaten(lost: np.ndarray, seed: int = 0) -> np.ndarray:
-    """From `duels`, each law's p-value of the test of `ranks`; with up to ten seeds it is exact."""
-    n, k = lost.shape[:2]
-    size = np.sqrt((lost**2).sum(axis=0))  # which no flip changes; without it a law that is always last hides others
-    scaled = (lost / np.where(size, size, 1.0)).reshape(n, k * k)
-    most = _product(flips(n, seed), scaled).reshape(-1, k, k).max(axis=2)
-    return (most >= most[0] - ROUNDING).mean(axis=0)
+def _drawn_centres(found: Comparison, drawn: np.ndarray) -> np.ndarray:
+    """(resamples, laws, blocks), the centres of resamples; NaN where no run of the block is drawn."""
+    if not found.shares:
+        return np.stack([sum(drawn_medians(own, drawn)) / 2 for own in found.cells], axis=1)
+    there = ~np.isnan(found.cells[0])
+    count = np.einsum("bn,nr->rb", there, drawn)
+    total = np.einsum("kbn,nr->rkb", np.where(there, found.cells, 0.0), drawn)
+    return total / np.where(count, count, math.nan)[:, None]
 
 
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a @ b, without the threads of BLAS: they take longer here, where others are at work, and may round otherwise."""
-    return np.einsum("ij,jk->ik", a, b)
-
-
-def _mean_ranks(lost: np.ndarray) -> np.ndarray:
-    """(..., laws) from duels (..., laws, laws): every law is half a place, up or down."""
-    return (lost.shape[-1] + 1 + lost.sum(axis=-1)) / 2
+def block_ranks(centres: np.ndarray, floors: np.ndarray) -> np.ndarray:
+    """The laws' ranks in each block, (..., laws, blocks) as the centres; NaN where these are."""
+    lowered, twice = centres - least_difference(centres, resolution=floors), np.zeros(centres.shape, np.int16)
+    for rival in range(centres.shape[-2]):
+        own = slice(rival, rival + 1)
+        twice += (lowered > centres[..., own, :]).view(np.int8)
+        twice -= (lowered[..., own, :] > centres).view(np.int8)
+    return np.where(np.isnan(centres), math.nan, (centres.shape[-2] + 1 + twice) / 2)
 
 
 def _places(mean: np.ndarray) -> np.ndarray:
     """Places by mean rank, (draws, laws); ties share theirs."""
-    further = mean[:, :, None] - mean[:, None, :]
-    return _mean_ranks(np.sign(np.where(np.abs(further) < ROUNDING, 0.0, further)))
-
-
-def friedman(scores: Mapping[str, np.ndarray], level: float = 0.95) -> Friedman | None:
-    """Friedman's test over the blocks of scores as `ranks` takes them, corrected for ties; None of one law or block."""
-    from scipy.special import chdtrc
-
-    laws, cells = _cells(scores)
-    medians = np.array([[median(block) for block in law if not np.isnan(block).all()] for law in cells])
-    k, blocks = medians.shape
-    if k < 2 or blocks < 2:
-        return None
-    place = _mean_ranks(duels(medians[:, None]))
-    spread = float(((place - (k + 1) / 2) ** 2).sum())
-    between = float(((place.sum(axis=0) - blocks * (k + 1) / 2) ** 2).sum())
-    return Friedman(
-        blocks=blocks,
-        mean_ranks=dict(zip(laws, place.mean(axis=0).tolist(), strict=True)),
-        p=float(chdtrc(k - 1, (k - 1) * between / spread)) if spread else 1.0,
-        critical_difference=_studentised(k, checked(level)) * math.sqrt(k * (k + 1) / (12 * blocks)),
-    )
-
-
-@functools.cache
-def _studentised(k: int, level: float) -> float:
-    """The quantile of the studentised range of k normal means, of which Demsar's q is 1 / sqrt(2)."""
-    from scipy.stats import studentized_range
-
-    return float(studentized_range.ppf(level, k, math.inf))
+    return (mean.shape[1] + 1 + worse(mean[:, :, None], mean[:, None, :]).sum(axis=2)) / 2

@@ -12,11 +12,13 @@ ends are values of the sample, so that inf is no difficulty. BCa needs the jackk
 are few. The binomial interval of order statistics, the alternative, knows no blocks; of a single block the bootstrap's
 ends are order statistics too, and cover as the binomial distribution says: 93 % or more with 6 to 40 seeds, and
 1 - 2^(1 - n) with fewer, which is all that the range of a sample can cover.
+
+The median of several blocks is the median of their medians. A law with the lower median in every block then has the
+lower one over all of them; the median of all runs together does not promise that.
 """
 
 import functools
 import math
-from collections.abc import Callable
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -51,7 +53,8 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
     of the two to the resampled higher.
 
     Args:
-      values: (n,) a value a seed, or (blocks, n), whose columns are drawn together; inf for never.
+      values: (n,) a value a seed, or (blocks, n), whose columns are drawn together and of which the median is that of
+        the blocks' medians; inf for never.
       level: of the interval.
 
     Raises:
@@ -67,33 +70,39 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
 
 def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
     """As `median_interval`, of (blocks, n) in which NaN is a cell without a run; no column is without any."""
-    n, middle = values.shape[1], median(values)
+    n, centre = values.shape[1], float(middle(middle(values)))
     if n < 2:
-        return Interval(middle, math.nan, math.nan, n)
-    drawn, at = draws(n, resamples, seed), outermost(n, level, resamples)
-    total, levels = drawn @ (~np.isnan(values)).sum(axis=0), np.unique(values[~np.isnan(values)])
-
-    def twice(value: float) -> np.ndarray:  # twice how many of the drawn values are no more than this one
-        return 2 * (drawn @ (values <= value).sum(axis=0))
-
-    low = _first(levels, lambda value: (twice(value) >= total).sum() >= at)
-    high = _first(levels, lambda value: (twice(value) > total).sum() > resamples - at)
-    return Interval(middle, low, high, n)
+        return Interval(centre, math.nan, math.nan, n)
+    at = outermost(n, level, resamples)
+    lower, upper = (np.sort(middle(ends)) for ends in drawn_medians(values, draws(n, resamples, seed)))
+    return Interval(centre, float(lower[at - 1]), float(upper[resamples - at]), n)
 
 
-def median(values: np.ndarray) -> float:
-    """Of the values that are not NaN; inf where the upper half is."""
-    ordered = np.sort(values[~np.isnan(values)])
-    return float((ordered[(ordered.size - 1) // 2] + ordered[ordered.size // 2]) / 2)
+def middle(values: np.ndarray) -> np.ndarray:
+    """The median over the last axis of the values that are not NaN; NaN where all are."""
+    ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
+    low, high = (np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2))
+    return ((low + high) / 2)[..., 0]
 
 
-def _first(levels: np.ndarray, holds: Callable[[float], bool]) -> float:
-    """The first of ascending levels at which it holds: at the last it does, and from the first on it keeps to."""
-    low, high = 0, len(levels) - 1
-    while low < high:
-        half = (low + high) // 2
-        low, high = (low, half) if holds(levels[half]) else (half + 1, high)
-    return float(levels[low])
+def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The lower and the upper of the middle two of each block in each resample of its seeds.
+
+    Args:
+      values: (blocks, n), NaN where no run is.
+      drawn: (n, resamples), how often each seed is drawn.
+
+    Returns:
+      Two arrays (resamples, blocks), NaN where no run of the block is drawn.
+    """
+    found = np.full((2, drawn.shape[1], len(values)), math.nan)
+    for k, block in enumerate(values):
+        order = np.argsort(block)[: (~np.isnan(block)).sum()]
+        counted = 2 * np.cumsum(drawn[order], axis=0, dtype=drawn.dtype)
+        total, ordered = counted[-1] // 2, np.append(block[order], math.nan)
+        found[0, :, k] = ordered[(counted < np.maximum(total, 1)).sum(axis=0)]
+        found[1, :, k] = ordered[(counted <= total).sum(axis=0)]
+    return found[0], found[1]
 
 
 def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
@@ -112,9 +121,10 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int, resamples: int, seed: int) -> np.ndarray:
-    """How often each of n seeds comes in each resample, (resamples, n)."""
+    """How often each of n seeds comes in each resample, (n, resamples)."""
     whole("resamples", resamples, 99, 10**6)
-    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples).astype(float)
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
+    drawn = np.ascontiguousarray(drawn.T, np.int32)
     drawn.setflags(write=False)
     return drawn
 

@@ -21,6 +21,7 @@ import pytest
 
 from smc_mujoco import gl, paper, run
 from smc_mujoco.report import answer, charts, films, kept, page, panels, report, stages, words
+from smc_mujoco.report import scores as scores_of
 from smc_mujoco.report.bars import Bars
 from smc_mujoco.report.findings import Place, Score
 from smc_mujoco.report.plan import QUICK
@@ -224,39 +225,65 @@ def test_a_law_and_a_verdict_that_nobody_foresaw_are_shown(findings):
 # the answer
 
 
-def scores(**medians):
+def scores(condition="nominal", plant="duffing", runs=16, **medians):
     """One cell's scores of settling time; the laws within 0.1 of the best are level with it."""
     best = min(medians.values())
     return [
-        Score("duffing", "nominal", law, "settling_time", m, m, m, m <= best + 0.1, 8, 0) for law, m in medians.items()
+        Score(plant, condition, law, "settling_time", m, m, m, m <= best + 0.1, 16, 0, runs)
+        for law, m in medians.items()
     ]
 
 
-def places(**means):
-    best = min(means.values())
-    return tuple(Place("", "settling_time", law, m, m, m, m <= best + 0.1, math.nan, "") for law, m in means.items())
+def told(findings, *cells):
+    """The answer, of these cells alone."""
+    few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), places=())
+    return " ".join(part.text for part in answer.paragraph(few, ["settling_time"]))
 
 
 def test_laws_that_are_level_share_the_lead_and_no_winner_is_named(findings):
     found = answer.cells(scores(observer_free=1.0, classical=1.05, adaptive=2.0))
     assert answer.leaders(found, "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
     assert answer.undecided(found, ["settling_time"]) == (1, 1)
-    level = dataclasses.replace(
-        findings,
-        scores=tuple(scores(observer_free=1.0, classical=1.05)),
-        places=places(observer_free=1, classical=1.05),
-    )
-    told = " ".join(part.text for part in answer.paragraph(level, ["settling_time"]))
-    assert "no winner on settling time" in told
-    assert "wins" not in told
+    text = told(findings, scores(observer_free=1.0, classical=1.05))
+    assert "no winner on settling time in any of 1 cells; none is better than Observer-free and Classical" in text
+    assert "wins" not in text
 
 
-def test_a_winner_is_named_where_one_law_alone_is_best(findings):
-    clear = dataclasses.replace(
-        findings, scores=tuple(scores(observer_free=2.0, classical=1.0)), places=places(observer_free=2, classical=1)
-    )
-    told = " ".join(part.text for part in answer.paragraph(clear, ["settling_time"]))
-    assert "Classical wins on settling time" in told
+def test_a_winner_is_named_where_one_law_alone_is_best_in_every_cell(findings):
+    text = told(findings, scores(observer_free=2.0, classical=1.0), scores("noise", observer_free=4.0, classical=3.0))
+    assert "Classical wins on settling time in every one of 2 cells" in text
+
+
+def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findings):
+    cells = [scores(plant=plant, observer_free=2.0, classical=1.0) for plant in ("duffing", "van_der_pol")]
+    cells += [
+        scores("noise", plant=plant, observer_free=1.0, classical=3.0) for plant in ("duffing", "van_der_pol", "x")
+    ]
+    text = told(findings, *cells)
+    assert "no law wins on settling time in all 5 cells" in text
+    assert "Observer-free wins on every plant under noise" in text
+    assert "Observer-free wins in 3 and loses in 2" in text
+    assert "Classical wins in 2 and loses in 3; in none nobody wins" in text
+    assert "nor in every condition" in text
+
+
+def test_the_answer_says_where_seeds_change_nothing(findings):
+    cells = scores(runs=1, observer_free=2.0, classical=1.0), scores("noise", observer_free=2.0, classical=1.0)
+    assert "In 1 of the cells seeds change nothing" in told(findings, *cells)
+    assert "seeds change nothing" not in told(findings, cells[1])
+
+
+def test_places_over_all_plants_count_the_cells_that_a_law_wins(folder):
+    from smc_mujoco.table import Table
+
+    rows = scores_of.places(Table.read(folder / "study"))
+    own = [p for p in rows if (p.plant, p.metric) == ("duffing", "itae")]
+    overall = [p for p in rows if (p.plant, p.metric) == ("", "itae")]
+    assert {p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in own} == {
+        p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in overall
+    }
+    assert {p.why for p in overall} == {"2 seeds, too few"}
+    assert {p.of for p in overall} == {2}
 
 
 def test_where_the_papers_law_loses_is_listed_worst_first():
@@ -272,7 +299,8 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
 
 def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
     share = [
-        Place("", "settles", law, 1.0, 1.0, 1.0, True, of, "") for law, of in (("classical", 0.5), ("adaptive", 1))
+        Place("", "settles", law, 1.0, 1.0, 1.0, True, of, 0, 0, 1, "")
+        for law, of in (("classical", 0.5), ("adaptive", 1))
     ]
     few = dataclasses.replace(
         findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)

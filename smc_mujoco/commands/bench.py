@@ -45,7 +45,8 @@ def bench(
             from rich.console import Console
 
             from smc_mujoco.grids import grid
-            from smc_mujoco.leaderboard import leaderboard, leaderboard_table
+            from smc_mujoco.leaderboard import leaderboard
+            from smc_mujoco.leaderboard_table import leaderboard_table
             from smc_mujoco.study import FULL, QUICK, study
 
         clock, console = Clock(), Console()

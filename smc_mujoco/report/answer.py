@@ -7,25 +7,30 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from smc_mujoco.ranking import ROUNDING
+from smc_mujoco.differences import ROUNDING
 from smc_mujoco.report import words
 from smc_mujoco.report.findings import Findings, Place, Score
 
 PAPER = "observer_free"  # the law that the suite was built to test
+NAMED = 3  # laws in a sentence
 VERDICTS = ("supported", "partly supported", "refuted", "not testable")
 
 
 class Standing(NamedTuple):
-    """In how many of `of` cells a law is best or level with the best, and in how many it is so alone."""
+    """In how many of `of` cells a law is best or level with the best, and in how many it is so alone, which is to win.
+
+    `lost`: in how many another law is better.
+    """
 
     law: str
     best: int
     alone: int
+    lost: int
     of: int
 
 
 class Loss(NamedTuple):
-    """A comparison that the paper's law loses by more than the noise: medians, and its own over the best.
+    """A cell in which another law is better than the paper's: medians, and its own over that of the best law.
 
     `times` is a lower bound where the best is less than what rounding leaves of zero, see `rounded`.
     """
@@ -68,12 +73,32 @@ def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
 
 
 def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
-    """How often each law leads, by that."""
-    best = [leaders(found, *key) for key in found if key[2] == metric]
+    """How often each law leads, and how often it is behind, most wins first."""
+    best = {key: leaders(found, *key) for key in found if key[2] == metric}
+    behind = {key: [s.law for s in found[key] if not s.best] for key in best}
     rows = [
-        Standing(law, sum(law in b for b in best), sum(b == [law] for b in best), len(best)) for law in findings.laws
+        Standing(
+            law,
+            sum(law in b for b in best.values()),
+            sum(b == [law] for b in best.values()),
+            sum(law in b for b in behind.values()),
+            len(best),
+        )
+        for law in findings.laws
     ]
-    return sorted(rows, key=lambda row: (-row.best, -row.alone))
+    return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
+
+
+def everywhere(found: Cells, metric: str) -> dict[str, list[str]]:
+    """Law -> the conditions under which it wins on every plant, of at least two."""
+    winners: dict[str, list[list[str]]] = {}
+    for key in (key for key in found if key[2] == metric):
+        winners.setdefault(key[1], []).append(leaders(found, *key))
+    told: dict[str, list[str]] = {}
+    for condition, by_plant in winners.items():
+        if len(by_plant) > 1 and len(by_plant[0]) == 1 and all(each == by_plant[0] for each in by_plant):
+            told.setdefault(by_plant[0][0], []).append(words.condition(condition))
+    return told
 
 
 def undecided(found: Cells, metrics: Sequence[str]) -> Open:
@@ -82,8 +107,13 @@ def undecided(found: Cells, metrics: Sequence[str]) -> Open:
     return Open(sum(len(b) != 1 for b in best), len(best))
 
 
+def repeated(found: Cells) -> int:
+    """In how many plants and conditions seeds change nothing, or not each of them."""
+    return len({(plant, condition) for (plant, condition, _), s in found.items() if s[0].runs < s[0].seeds})
+
+
 def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]:
-    """Where a law is beaten by more than the noise, worst first."""
+    """Where another law is better than this one, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in found.items():
         own = next((s for s in scores if s.law == law), None)
@@ -117,53 +147,56 @@ def paragraph(findings: Findings, metrics: Sequence[str] = words.HEADLINE) -> li
     """The answer, sentence by sentence."""
     found = cells(findings.scores)
     standing = {metric: standings(findings, found, metric) for metric in metrics}
-    places = {metric: overall(findings, metric) for metric in metrics}
-    leads = [Sentence(words.ASKS[m].capitalize(), _leads(m, places[m], standing[m])) for m in metrics]
+    leads = [Sentence(words.ASKS[m].capitalize(), _leads(m, standing[m], everywhere(found, m))) for m in metrics]
     rest = [
-        _sure(undecided(found, metrics), findings.about.seeds),
+        _sure(undecided(found, metrics), findings.about.seeds, repeated(found)),
         *_settled(findings),
         *_paper(standing, losses(found, metrics)),
         *_claims(findings),
     ]
-    return [Sentence("", _first(places)), *leads, *(Sentence("", text) for text in rest)]
+    return [Sentence("", _first(standing)), *leads, *(Sentence("", text) for text in rest)]
 
 
-def _first(places: dict[str, list[Place]]) -> str:
-    tops = {metric: _may(rows) for metric, rows in places.items()}
-    common = set.intersection(*map(set, tops.values())) if tops else set()
-    if common and all(len(top) == 1 for top in tops.values()):
-        return f"{words.law(common.pop())} leads in every respect compared here, though not in every cell."
-    if common:
+def _first(standing: dict[str, list[Standing]]) -> str:
+    winners = [{row.law for row in rows if row.alone == row.of} for rows in standing.values()]
+    unbeaten = [{row.law for row in rows if not row.lost} for rows in standing.values()]
+    if winner := set.intersection(*winners) if winners else set():
+        return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
+    if common := set.intersection(*unbeaten) if unbeaten else set():
         names = _joined([words.law(law) for law in sorted(common)])
-        return f"No law can be called the best: {names} may be in every respect compared here, and so may others."
-    return "No law is the best in every respect: it depends on what is asked."
+        return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
+    return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
 
 
-def _may(rows: Sequence[Place]) -> list[str]:
-    """The laws that may be the best."""
-    return [row.law for row in rows if row.best]
-
-
-def _leads(metric: str, places: Sequence[Place], standing: Sequence[Standing]) -> str:
-    """One sentence on one metric over all runs."""
-    may, what = _may(places), words.metric(metric)
-    count = {row.law: row for row in standing}
-    if len(may) == 1 and len(places) > 1:
-        row = count[may[0]]
-        return (
-            f"{words.law(may[0])} wins on {what} over all runs; it is ahead or level in {row.best} of {row.of} cells."
-        )
-    names = _joined([words.law(law) for law in may])
-    why = places[0].why or ("each loses to another" if not may else "")
-    told = f"no winner on {what} over all runs, " + (why or f"{names} cannot be told apart")
-    top = standing[0]
-    return f"{told}; most often ahead or level is {words.law(top.law)}, in {top.best} of {top.of} cells."
-
-
-def _sure(found: Open, seeds: int) -> str:
+def _leads(metric: str, standing: Sequence[Standing], conditions: dict[str, list[str]]) -> str:
+    """On one metric what holds in every cell, else in every plant, else who wins in how many and loses in how many."""
+    what, top = words.metric(metric), standing[0]
+    if top.alone == top.of:
+        return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
+    told = [
+        f"{words.law(row.law)} wins in {row.alone} and loses in {row.lost or 'none'}"
+        for row in standing[:NAMED]
+        if row.alone
+    ]
+    if not told:
+        level = [words.law(row.law) for row in standing if not row.lost]
+        never = f"; none is better than {_joined(level)} in any" if 0 < len(level) <= NAMED else ""
+        return f"no winner on {what} in any of {top.of} cells{never}."
+    plants = [f"{words.law(law)} wins on every plant under {_joined(names)}" for law, names in conditions.items()]
+    nobody = top.of - sum(row.alone for row in standing)
     return (
-        f"In {found.open} of {found.of} comparisons, of {seeds} seeds each and each tested by itself, no single winner "
-        "can be declared."
+        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{_joined(told)}; "
+        f"in {nobody or 'none'} nobody wins."
+    )
+
+
+def _sure(found: Open, seeds: int, repeats: int) -> str:
+    told = (
+        f"In {found.open} of {found.of} comparisons no single winner can be declared; each has {seeds} seeds, and the "
+        "tests are corrected for all comparisons of a metric on a plant."
+    )
+    return told + (
+        f" In {repeats} of the cells seeds change nothing, or not each: equal runs count once." if repeats else ""
     )
 
 

@@ -21,7 +21,8 @@ OFF = 1e-6  # in s: less is s = 0, as the claim on V' has it
 class Score(NamedTuple):
     """A metric of a law on a plant in a condition over the seeds: median and 95 % interval; inf is never.
 
-    `best`: no other law is better by more than the noise; several laws may be. `failed`: runs that have no score.
+    `best`: no other law is better there, as `ranking` has it; several laws may be. `seeds`: of the runs, `runs`: how
+    many of them are distinct, `failed`: how many have no score.
     """
 
     plant: str
@@ -34,13 +35,16 @@ class Score(NamedTuple):
     best: bool
     seeds: int
     failed: int
+    runs: int
 
 
 class Place(NamedTuple):
-    """A law's place in a metric over all runs of a plant, "" of all plants; 1 is the best, ties share theirs.
+    """A law in a metric over all cells of a plant, "" of all plants.
 
-    `mean`: its mean rank; `low`, `high`: the 95 % interval of its place; `best`: it may be the best; `median`: of the
-    runs, for "settles" the share that does, NaN where units differ; `why`: there can be no winner, "" if there can.
+    `mean`: its mean rank over the cells, 1 is the best; `low`, `high`: the 95 % interval of its place, NaN of all
+    plants; `best`: no law is better in any cell; `median`: of the cells' medians, for "settles" the share of runs that
+    does, NaN where units differ; `wins`, `losses`, `of`: in how many cells it wins, in how many another law is better,
+    and how many there are; `why`: there can be no winner, "" if there can.
     """
 
     plant: str
@@ -51,6 +55,9 @@ class Place(NamedTuple):
     high: float
     best: bool
     median: float
+    wins: int
+    losses: int
+    of: int
     why: str
 
 

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from smc_mujoco.differences import OF_SCALE, OF_VALUE
 from smc_mujoco.metrics import metrics
+from smc_mujoco.ranking import SEEDS
 from smc_mujoco.report import words
 
 
@@ -32,7 +34,8 @@ STATISTICS = (
         "median",
         "median",
         "Of the runs of a cell over its seeds. Seed 0 starts at the plant’s own x0, seed s at x0 (1 + 0.2 z), z "
-        "uniform in [-1, 1]; where there is noise, the seed is the noise’s too. A run that fails counts as never.",
+        "uniform in [-1, 1]; where there is noise, the seed is the noise’s too. A run that fails counts as never. "
+        "Seeds in which every law does the same are one run.",
     ),
     Term(
         "interval",
@@ -42,20 +45,23 @@ STATISTICS = (
     ),
     Term(
         "best",
-        "best, or level with the best",
-        "No other law of the cell is better by more than the noise: a permutation test over whole seeds, corrected"
-        " for the number of laws, does not reject at 95 % that no law is better. One such law alone is the winner;"
-        " where there are several, none is declared. Fewer than six seeds can decide nothing. Values that differ by "
-        "less than 1e-9 in SI units, or by 1e-6 of themselves, are ties. Each comparison is tested by itself: of a "
-        "hundred, a few may name a winner by chance.",
+        "better, winner",
+        "A law is better than another in a cell if three things hold: its median is lower by more than the least "
+        f"relevant difference ({100 * OF_VALUE:g} % of the larger; for a position {100 * OF_SCALE:g} % of the largest "
+        f"|x0| and half a count of the encoder, for a command {100 * OF_SCALE:g} % of the bound on u, for a percentage "
+        f"{100 * OF_SCALE:g}, where that is more); the sign test over the seeds rejects that both are ahead equally "
+        f"often; there are {SEEDS} distinct runs or more. The tests are corrected by Holm’s method for all pairs of "
+        "laws in all conditions of a plant, metric by metric: with 95 %, none of these is wrong. A law that is better "
+        "than every other, directly or through a third, is the winner of the cell, and has its lowest median. Over "
+        "several cells only what holds in each is called a win.",
     ),
     Term(
         "rank",
         "rank, place",
-        "In each run, the law with the lowest value has rank 1, and so on; ties share the mean of their ranks, and"
-        " so do runs that never get there. Mean rank is over all runs that the laws share; the place orders the "
+        "In each cell the law with the lowest median has rank 1, and so on; laws whose medians differ by less than the "
+        "least relevant difference share the mean of their ranks. Mean rank is over all cells; the place orders the "
         "laws by it, with a 95 % interval by bootstrap over the seeds. Ranks count how often a law is ahead, not by "
-        "how much; every plant and condition of the grid weighs the same.",
+        "how much, and decide nothing; every plant and condition of the grid weighs the same.",
     ),
     Term(
         "settles",
