@@ -16,7 +16,17 @@ from smc_mujoco.claims import catalogue, claim, claims, evaluations, evidence, l
 from smc_mujoco.claims.checks import Beside, check, ratio
 from smc_mujoco.claims.evidence import Runs
 from smc_mujoco.claims.variants import reversed_gain, squeezed, with_gains, zero_gain
-from smc_mujoco.claims.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, combined, numbers
+from smc_mujoco.claims.verdict import (
+    EXISTENTIAL,
+    NAMED,
+    NOT_TESTABLE,
+    PARTLY,
+    REFUTED,
+    SUPPORTED,
+    UNIVERSAL,
+    combined,
+    numbers,
+)
 from smc_mujoco.commands.claims import claims as command
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.grids import grid
@@ -30,6 +40,7 @@ package = importlib.import_module("smc_mujoco.claims")  # smc.claims is the func
 
 LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 36 37 38 39 40
           45 46 48 49 50 51 52 55 56 57 59 61 T"""
+UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
 CHEAP = ("3", "5", "18", "25")
 OURS = "observer_free"
 
@@ -83,7 +94,7 @@ YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside
         ([YES], SUPPORTED),
         ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED),
         ([NO], REFUTED),
-        ([YES, NO], PARTLY),
+        ([YES, NO], REFUTED),
         ([], NOT_TESTABLE),
         ([ASIDE], NOT_TESTABLE),
         ([NO, ASIDE], REFUTED),
@@ -92,6 +103,39 @@ YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside
 )
 def test_the_verdict_is_of_the_checks_alone(found, expected):
     assert verdict(found) == expected
+
+
+ABOUT = [one._replace(sentence="a") for one in (YES, NO)]
+OTHER = YES._replace(what="other", sentence="b")
+
+
+@pytest.mark.parametrize(
+    ("found", "quantifier", "expected"),
+    [
+        ([YES, NO], UNIVERSAL, REFUTED),
+        ([YES, NO], EXISTENTIAL, SUPPORTED),
+        ([NO], EXISTENTIAL, REFUTED),
+        ([*ABOUT, OTHER], NAMED, PARTLY),
+        ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
+        ([ABOUT[1], OTHER], UNIVERSAL, PARTLY),
+    ],
+)
+def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(found, quantifier, expected):
+    assert verdict(found, quantifier) == expected
+
+
+def test_one_counter_example_refutes_what_is_said_of_all_gains():
+    found = {"study": SUPPORTED, "tuned": REFUTED}
+    assert combined(found, UNIVERSAL)[:2] == (REFUTED, True)
+    assert combined(found, EXISTENTIAL)[:2] == (SUPPORTED, True)
+    assert combined(found, NAMED)[:2] == (PARTLY, True)
+    assert combined({"study": PARTLY, "tuned": SUPPORTED}, UNIVERSAL)[0] == PARTLY
+
+
+def test_universal_claims_are_those_of_the_list():
+    assert {id for id, one in catalogue().items() if one.quantifier == UNIVERSAL} == set(
+        ["11", "18", "19", "20", "24", "50", "59"]
+    )
 
 
 def test_sets_that_agree_give_their_verdict_and_others_flip():
@@ -125,7 +169,7 @@ def test_a_claim_says_what_it_depends_on(only):
     only(entry(found={"study": [YES, ASIDE], "tuned": [NO]}, note="Mind the gap."))
     (one,) = claims(gains=["study", "tuned"])
     assert (one.verdict, one.flips, one.verdicts) == (PARTLY, True, {"study": SUPPORTED, "tuned": REFUTED})
-    assert one.numbers["study"] == {"yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True}}
+    assert one.numbers["study"] == {"yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True, "sentence": ""}}
     assert one.beside == {"study": {"theory": 7.0}, "tuned": {}}
     assert one.note.startswith("Mind the gap. The verdict depends on the gains")
     assert one.checks("tuned") == [NO]

@@ -21,7 +21,7 @@ from smc_mujoco.claims import (
 )
 from smc_mujoco.claims.checks import Check
 from smc_mujoco.claims.evidence import Runs
-from smc_mujoco.claims.variants import reversed_gain, zero_gain
+from smc_mujoco.claims.variants import reversed_gain, with_gains, zero_gain
 from smc_mujoco.claims.verdict import PARTLY, REFUTED, SUPPORTED, verdict
 from smc_mujoco.gains import SETS
 from smc_mujoco.law import law_function
@@ -32,7 +32,7 @@ from smc_mujoco.trace import ARRAYS, Trace
 
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)
 OURS, CLASSICAL, ADAPTIVE, HOSMC = "observer_free", "classical", "adaptive", "super_twisting"
-CONDITIONED = "conditioned_super_twisting"
+CONDITIONED, UNCLAMPED = "conditioned_super_twisting", "super_twisting_unclamped"
 T = np.arange(10_001) * 1e-3
 
 Told = Callable[[Scenario], dict[str, float]]
@@ -66,6 +66,18 @@ def of(runs: Runs, id: str) -> list[Check]:
     return [one for one in catalogue()[id](runs) if isinstance(one, Check)]
 
 
+def judged(runs: Runs, id: str) -> str:
+    """The verdict on a claim under one set of gains."""
+    return verdict(catalogue()[id](runs), catalogue()[id].quantifier)
+
+
+def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
+    """Claims 11, 48 and 49 are of min(lambda, u_max)."""
+    runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.u_max, "max_step": 0.021 * s.u_max})
+    runs.mutated = lambda law: with_gains(law, lam=60.0)
+    assert [judged(runs, id) for id in ("11", "49")] == [REFUTED, REFUTED]
+
+
 def by_law(**told: tuple[float, ...]) -> Told:
     """Law -> settling time, overshoot."""
     return lambda s: dict(zip(("settling_time", "overshoot"), told[s.law.name], strict=False))
@@ -96,8 +108,9 @@ SCORED = [
     ("28", lambda s: {"settling_time": 2.0 if s.law.name == CLASSICAL else 1.0, "ripple": 6e-4}, SUPPORTED),
     ("28", lambda s: {"settling_time": 2.0 if s.law.name == CLASSICAL else 1.0, "ripple": 4e-4}, PARTLY),
     ("28", lambda s: {"settling_time": 1.0, "ripple": 4e-4}, REFUTED),
-    ("29", by_law(observer_free=(1.0, 1.0), super_twisting=(1.0, 1.1)), SUPPORTED),
-    ("29", by_law(observer_free=(1.0, 1.0), super_twisting=(1.0, 1.0)), REFUTED),
+    ("29", by_law(observer_free=(1.0, 1.0), super_twisting=(1.0, 1.6)), SUPPORTED),
+    ("29", by_law(observer_free=(1.0, 1.0), super_twisting=(1.0, 1.4)), REFUTED),  # of 0.5 % of |x0|
+    ("29", by_law(observer_free=(1.0, 50.0), super_twisting=(1.0, 51.0)), REFUTED),  # of 3 %
     ("31", by_law(observer_free=(1.0, 2.0)), SUPPORTED),
     ("31", by_law(observer_free=(1.0, 15.0)), SUPPORTED),
     ("31", by_law(observer_free=(1.0, 15.1)), REFUTED),
@@ -107,12 +120,12 @@ SCORED = [
     ("33", by_law(observer_free=(1.0, 2.0), adaptive=(1.0, 1.0)), REFUTED),
     ("33", by_law(observer_free=(never, 0.0), adaptive=(1.0, 1.0)), REFUTED),
     ("34", by_law(observer_free=(1.0,), classical=(1.1, 0.9)), SUPPORTED),
-    ("34", by_law(observer_free=(1.0,), classical=(0.9, 0.9)), PARTLY),
+    ("34", by_law(observer_free=(1.0,), classical=(1.02, 0.9)), PARTLY),
     ("34", by_law(observer_free=(1.0,), classical=(0.9, 1.1)), REFUTED),
     ("36", by_law(observer_free=(1.0,), adaptive=(1.2,), super_twisting=(0.8,)), SUPPORTED),
-    ("36", by_law(observer_free=(1.0,), adaptive=(1.2,), super_twisting=(0.7,)), PARTLY),
+    ("36", by_law(observer_free=(1.0,), adaptive=(1.2,), super_twisting=(0.7,)), REFUTED),
     ("36", by_law(observer_free=(1.0,), adaptive=(1.3,), super_twisting=(never,)), REFUTED),
-    ("37", by_law(observer_free=(1.0, 1.0), classical=(1.1, 1.1)), SUPPORTED),
+    ("37", by_law(observer_free=(1.0, 1.0), classical=(1.1, 1.6)), SUPPORTED),
     ("37", by_law(observer_free=(1.0, 1.0), classical=(1.1, 0.9)), PARTLY),
     ("37", by_law(observer_free=(1.0, 1.0), classical=(0.9, 0.9)), REFUTED),
     ("38", lambda s: {"mean_settling_time": 0.9, "spread_settling_time": 0.9}, SUPPORTED),
@@ -129,14 +142,14 @@ SCORED = [
     ("49", lambda s: {"max_step": 0.119}, SUPPORTED),
     ("49", lambda s: {"max_step": 0.12}, REFUTED),
     ("50", by_plant("overshoot", others=0.9), SUPPORTED),
-    ("50", by_plant("overshoot", duffing=1.1), PARTLY),
+    ("50", by_plant("overshoot", duffing=1.1), REFUTED),
     ("50", by_plant("overshoot", others=1.1), REFUTED),
     ("50", lambda s: {"overshoot": 0.0, "settling_time": never}, REFUTED),
     ("51", by_plant("settling_time", others=1.09), SUPPORTED),
-    ("51", by_plant("settling_time", duffing=1.11, others=1.0), PARTLY),
+    ("51", by_plant("settling_time", duffing=1.11, others=1.0), REFUTED),
     ("51", by_plant("settling_time", others=never), REFUTED),
     ("52", by_plant("tv_rate", others=0.009), SUPPORTED),
-    ("52", by_plant("tv_rate", duffing=0.01, others=0.009), PARTLY),
+    ("52", by_plant("tv_rate", duffing=0.01, others=0.009), REFUTED),
     ("52", by_plant("tv_rate", others=0.01), REFUTED),
 ]
 
@@ -177,9 +190,10 @@ SCORED += [
     ("1", estimated_later(1.25), SUPPORTED),
     ("1", estimated_later(0.7), REFUTED),
     ("1", estimated_later(never), REFUTED),
+    ("1", lambda s: {"settling_time": 1.5 if s.velocity.gains.get("tau") == 0.005 else 1.0}, PARTLY),
     ("1", lambda s: {"settling_time": never}, REFUTED),
     ("3", by_plant("tv_rate", others=0.009), SUPPORTED),
-    ("3", by_plant("tv_rate", duffing=0.01), PARTLY),
+    ("3", by_plant("tv_rate", duffing=0.01), REFUTED),
     ("3", by_plant("tv_rate", others=0.01), REFUTED),
     ("4", of_ours("max_u", 1.0), SUPPORTED),
     ("4", of_ours("max_u", 1.001), REFUTED),
@@ -187,7 +201,7 @@ SCORED += [
     ("5", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.x0))}, SUPPORTED),
     ("5", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.x0))}, REFUTED),
     ("7", sized(2.0, 2.0), SUPPORTED),
-    ("7", sized(2.0, 2.1), PARTLY),
+    ("7", sized(2.0, 2.1), REFUTED),
     ("7", sized(2.1, never), REFUTED),
     ("11", of_ours("tv_rate", 0.9e-3), SUPPORTED),
     ("11", of_ours("tv_rate", 1.1e-3), REFUTED),
@@ -198,10 +212,10 @@ SCORED += [
     ("13", joined(0.9, 0.9), PARTLY),
     ("13", joined(never, never), REFUTED),
     ("15", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.x0))}, SUPPORTED),
-    ("15", lambda s: {"settling_time": never}, PARTLY),
+    ("15", lambda s: {"settling_time": never}, REFUTED),
     ("15", lambda s: {"settling_time": never, "ultimate_bound": 9.0}, REFUTED),
     ("20", held_by(0.4), SUPPORTED),
-    ("20", held_by(0.9), PARTLY),
+    ("20", held_by(0.9), REFUTED),
     ("20", lambda s: {"ultimate_bound": 9.0}, REFUTED),
     ("21", lambda s: {"ultimate_bound": 0.0}, SUPPORTED),
     ("25", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.x0))}, REFUTED),
@@ -210,7 +224,7 @@ SCORED += [
 
 @pytest.mark.parametrize(("id", "told", "expected"), SCORED)
 def test_a_verdict_follows_the_scores_to_the_threshold(id, told, expected):
-    assert verdict(of(Stub(told), id)) == expected
+    assert judged(Stub(told), id) == expected
 
 
 @pytest.mark.parametrize("id", ["11", "20"])
@@ -228,20 +242,20 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
 def test_a_nonlinear_input_gain_is_compensated_if_it_changes_little(shift, expected):
     """Claim 10: the run on the plant with the gain is shifted."""
     drawn = lambda s: (0.0 * T + shift * max(map(abs, s.x0)) * s.law.name.endswith("squeezed"), 0.0 * T)  # noqa: E731
-    assert verdict(of(Stub(drawn=drawn), "10")) == expected
+    assert judged(Stub(drawn=drawn), "10") == expected
 
 
 @pytest.mark.parametrize(("rate", "expected"), [(-1.0, SUPPORTED), (1.0, REFUTED)])
 def test_v_decreases_where_it_never_rises(rate, expected):
     """Claim 19, with v = 0 and u = 0."""
-    assert verdict(of(Stub(drawn=lambda s: (np.exp(rate * T), 0.0 * T)), "19")) == expected
+    assert judged(Stub(drawn=lambda s: (np.exp(rate * T), 0.0 * T)), "19") == expected
 
 
 @pytest.mark.parametrize(("rate", "expected"), [(-1.0, SUPPORTED), (1.0, REFUTED)])
 def test_the_plane_shows_a_rise_of_v_if_there_is_one(rate, expected, monkeypatch):
     """Claim 18: no plant of the study falls everywhere, so that a rate does instead."""
     monkeypatch.setattr(lyapunov, "vdot", lambda plant, lam, k1, x, v: rate + 0.0 * x)
-    assert verdict(of(Stub(quick=True), "18")) == expected
+    assert judged(Stub(quick=True), "18") == expected
 
 
 @pytest.mark.parametrize(("time", "expected"), [(1.0, SUPPORTED), (1.1, REFUTED)])
@@ -249,11 +263,11 @@ def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
     """Claim 14; another may be slower."""
     told = {OURS: time, CLASSICAL: 1.0}
     monkeypatch.setattr(contributions, "nanoseconds", lambda laws, quick: dict.fromkeys(laws, 9.0) | told)
-    assert verdict(of(Stub(), "14")) == expected
+    assert judged(Stub(), "14") == expected
 
 
 @pytest.mark.parametrize(
-    ("plain", "conditioned", "expected"), [(3.0, 3.0, SUPPORTED), (99.0, 1.0, PARTLY), (1.0, 1.0, REFUTED)]
+    ("plain", "conditioned", "expected"), [(3.0, 3.0, SUPPORTED), (99.0, 1.0, REFUTED), (1.0, 1.0, REFUTED)]
 )
 def test_wind_up_alone_does_not_support_the_largest_oscillation(plain, conditioned, expected):
     """Claim 32: both the plain law, which never settles here, and the conditioned one must swing furthest."""
@@ -263,8 +277,9 @@ def test_wind_up_alone_does_not_support_the_largest_oscillation(plain, condition
         ADAPTIVE: (1.0, 2.0),
         HOSMC: (never, plain),
         CONDITIONED: (1.0, conditioned),
+        UNCLAMPED: (never, 9.0),
     }
-    assert verdict(of(Stub(by_law(**told)), "32")) == expected
+    assert judged(Stub(by_law(**told)), "32") == expected
 
 
 @pytest.mark.parametrize(
@@ -280,7 +295,7 @@ def test_wind_up_alone_does_not_support_the_largest_oscillation(plain, condition
 def test_near_first_is_within_a_tenth_of_the_best_rival_in_each_metric(ours, expected):
     """Claim 35; the best in settling and the best in overshoot are different rivals."""
     told = by_law(observer_free=ours, classical=(1.0, 4.0), adaptive=(3.0, 2.0), super_twisting=(never, 9.0))
-    assert verdict(of(Stub(told), "35")) == expected
+    assert judged(Stub(told), "35") == expected
 
 
 @pytest.mark.parametrize(
@@ -289,9 +304,9 @@ def test_near_first_is_within_a_tenth_of_the_best_rival_in_each_metric(ours, exp
 )
 def test_rejection_needs_a_small_deviation_and_no_better_rival(away, residuals, expected):
     """Claim 46: |x0| is 2 m, so 5 % of it is 0.1 m."""
-    told = {OURS: 1.0} | dict(zip(LAWS[1:], residuals, strict=True))
+    told = {OURS: 1.0} | dict(zip(LAWS[1:], residuals, strict=True)) | {UNCLAMPED: 9.0}
     drawn = lambda s: (np.where(T > 5.0, away if s.disturbance else 0.0, 0.0), 0.0 * T)  # noqa: E731
-    assert verdict(of(Stub(lambda s: {"ultimate_bound": told[s.law.name]}, drawn), "46")) == expected
+    assert judged(Stub(lambda s: {"ultimate_bound": told[s.law.name]}, drawn), "46") == expected
 
 
 @pytest.mark.parametrize(
@@ -305,7 +320,7 @@ def test_rejection_needs_a_small_deviation_and_no_better_rival(away, residuals, 
 def test_smoothness_under_noise_is_judged_by_size_steps_and_frequency(u, expected):
     """Claim 48; lambda is 6 N."""
     runs = Stub(lambda s: {}, lambda s: (0.0 * T, u))
-    assert verdict(of(runs, "48")) == expected
+    assert judged(runs, "48") == expected
 
 
 def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
@@ -319,15 +334,15 @@ def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
 
 
 def test_a_cheap_tanh_must_stay_near_the_exact_one_and_settle():
-    """Claim 55, every variant as drawn: like the exact law, 2 % off, and 2 % off without settling."""
+    """Claim 55, every variant as drawn: like the exact law, one form 2 % off, and all off without settling."""
     settled = {
         SUPPORTED: lambda s: np.exp(-3.0 * T),
-        PARTLY: lambda s: np.exp(-3.0 * T) + (s.law.name != OURS) * 0.05 * T * np.exp(-T),
+        PARTLY: lambda s: np.exp(-3.0 * T) + ("single" in s.law.name) * 0.05 * T * np.exp(-T),
         REFUTED: lambda s: np.exp(-3.0 * T) + (s.law.name != OURS) * 0.5,
     }
     for expected, x in settled.items():
         drawn = lambda s, x=x: (s.x0[0] * x(s), 0.0 * T)  # noqa: E731
-        assert verdict(of(Stub(drawn=drawn), "55")) == expected
+        assert judged(Stub(drawn=drawn), "55") == expected
 
 
 def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
@@ -344,10 +359,10 @@ def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
 def test_saturation_is_avoided_if_the_bound_changes_nothing(shift, expected):
     """Claim 56: only the run under half of lambda is shifted, by 2 % of |x0|."""
     drawn = lambda s: (0.0 * T + (shift * max(map(abs, s.x0)) if math.isfinite(s.u_max) else 0.0), 0.0 * T)  # noqa: E731
-    assert verdict(of(Stub(drawn=drawn), "56")) == expected
+    assert judged(Stub(drawn=drawn), "56") == expected
 
 
-@pytest.mark.parametrize(("slowed", "expected"), [(0.0, SUPPORTED), (0.15, PARTLY), (0.25, REFUTED)])
+@pytest.mark.parametrize(("slowed", "expected"), [(0.0, SUPPORTED), (0.15, REFUTED), (0.25, REFUTED)])
 def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected):
     """Claim 57: the rate falls by `slowed` per x0 of distance; from 1 % of x0 it is 4 1/s."""
 
@@ -356,7 +371,7 @@ def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected)
         return s.x0[0] * np.exp(-4.0 * (1.0 - slowed * far) * T), 0.0 * T
 
     found = of(Stub(drawn=drawn), "57")
-    assert verdict(found) == expected
+    assert verdict(found, catalogue()["57"].quantifier) == expected
     assert [one.value for one in found[:2]] == pytest.approx([slowed, 2 * slowed], abs=0.02)
 
 
@@ -370,7 +385,9 @@ def test_the_decay_rate_of_an_exponential_is_its_own_and_of_an_oscillation_its_e
         assert math.isnan(practical.decay_rate(Stub(drawn=lambda s, x=x: (x, x)).trace(base)))
 
 
-@pytest.mark.parametrize(("mild", "hard", "expected"), [(0.5, 1.0, SUPPORTED), (0.5, 1.1, PARTLY), (2.0, 2.0, REFUTED)])
+@pytest.mark.parametrize(
+    ("mild", "hard", "expected"), [(0.5, 1.0, SUPPORTED), (0.5, 1.1, REFUTED), (2.0, 2.0, REFUTED)]
+)
 def test_a_jump_is_survived_if_x_stays_within_its_start(mild, hard, expected):
     """Claim 59: what was before the jump does not count."""
 
@@ -380,7 +397,7 @@ def test_a_jump_is_survived_if_x_stays_within_its_start(mild, hard, expected):
         after = mild if factor <= 3.0 else hard
         return max(map(abs, s.x0)) * np.where(T < 5.0, 9.0, after), 0.0 * T
 
-    assert verdict(of(Stub(drawn=drawn), "59")) == expected
+    assert judged(Stub(drawn=drawn), "59") == expected
 
 
 # delays
@@ -412,12 +429,12 @@ def test_a_quick_search_ends_within_eight_periods_below():
 
 @pytest.mark.parametrize(
     ("ours", "rivals", "expected"),
-    [(0.1, (0.09, 0.02, 0.0), SUPPORTED), (0.1, (0.1, 0.02, 0.0), PARTLY), (0.1, (0.3, 0.1, 0.2), REFUTED)],
+    [(0.1, (0.09, 0.02, 0.0), SUPPORTED), (0.1, (0.1, 0.02, 0.0), REFUTED), (0.1, (0.3, 0.1, 0.2), REFUTED)],
 )
 def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
     """Claim 61: as much is not more."""
-    told = {OURS: ours} | dict(zip(LAWS[1:], rivals, strict=True))
-    assert verdict(of(Stub(bearing(told)), "61")) == expected
+    told = {OURS: ours} | dict(zip(LAWS[1:], rivals, strict=True)) | {UNCLAMPED: 0.0}
+    assert judged(Stub(bearing(told)), "61") == expected
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
@@ -461,6 +478,7 @@ def test_the_cells_that_runs_decide_follow_them():
         fixed = {f"{row}: classical (paper: --)" for row in rows[:2]}
         assert {one.holds for one in cells if one.what.split(",")[0] not in fixed} == {expected}
         assert {one.holds for one in cells if one.what.split(",")[0] in fixed} == {True}
+        assert {one.what.split(",")[0] for one in cells if one.what.endswith("cannot fail")} == fixed
 
 
 def test_the_table_has_its_twenty_cells_with_the_papers_marks():

@@ -79,7 +79,7 @@ def table_one(runs: Runs) -> list[Check | Beside]:
             asked = relation if mark == "+" else OPPOSITE[relation]
             sure = ", cannot fail" if (name, column) in CERTAIN else ""
             cell = f"{name}: {column}"
-            found.append(check(f"{cell} (paper: {paper}{sure}), {unit}", values[law], asked, limit, cell))
+            found.append(check(f"{cell} (paper: {paper}), {unit}{sure}", values[law], asked, limit, cell))
     for column, law in COLUMNS.items():
         step = properties["smoothness"][1][law]
         if STRICT <= step < SMOOTH:

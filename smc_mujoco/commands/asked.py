@@ -37,9 +37,9 @@ Spread = Annotated[
 ]
 
 
-def names(text: str | None) -> list[str]:
-    """The names in a,b."""
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
+def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
+    """The names in a,b; the default if none is given."""
+    return default if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
 def plants(texts: Sequence[str]) -> "list[str | Plant]":

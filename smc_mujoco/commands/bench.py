@@ -53,9 +53,9 @@ def bench(
         chosen = QUICK if quick else FULL
         with clock("in all"):
             scenarios = grid(
-                asked.plants(asked.names(plants) or chosen.plants),
-                asked.names(laws) or chosen.laws,
-                asked.conditions(asked.names(conditions) or (() if condition else chosen.conditions), condition),
+                asked.plants(asked.names(plants, chosen.plants)),
+                asked.names(laws, chosen.laws),
+                asked.conditions(asked.names(conditions, () if condition else chosen.conditions), condition),
                 seeds or chosen.seeds,
                 gains,
                 chosen.duration if duration is None else duration,

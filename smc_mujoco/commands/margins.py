@@ -62,8 +62,8 @@ def margins(
         if json:
             writable(ended(json, ".json"))
         chosen = plants or (QUICK["plants"] if quick else paper.PLANTS)
-        names = asked.names(laws) or (paper.LAWS if quick else sets.LAWS)
-        kind = asked.names(kinds) or (QUICK["kinds"] if quick else KINDS)
+        names = asked.names(laws, paper.LAWS if quick else sets.LAWS)
+        kind = asked.names(kinds, QUICK["kinds"] if quick else KINDS)
         with clock("in all"), bar("margins") as drawn:
             machines, around = asked.plants(chosen), asked.starts(x0, None)
             found = search(machines, names, kind, gains, quick, threads, drawn.reached, condition, around)
