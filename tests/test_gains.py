@@ -1,46 +1,82 @@
 """The sets of gains: what ships was tuned alike, is what its files say, and comes out again."""
 
+import dataclasses
 import itertools
 
 import pytest
 
-from smc_mujoco import gains, paper, tuned, tuning
+from smc_mujoco import bounds, gains, grids, paper, tuned, tuning
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.law import catalogue
 
-PAIRS = list(itertools.product(gains.OBJECTIVES, paper.PLANTS))
+TUNINGS = [
+    (name, plant, seed) for name, plant in itertools.product(gains.OBJECTIVES, paper.PLANTS)
+    for seed in range(gains.SEEDS[name])
+]  # fmt: skip
 
 
-def shipped(gain_set: str, plant: str) -> list[tuned.Tuned]:
-    return [tuned.shipped(plant, law, gains.OBJECTIVES[gain_set]) for law in gains.LAWS]
+def shipped(gain_set: str, plant: str, seed: int = 0) -> list[tuned.Tuned]:
+    laws = gains.general() if gain_set == "tuned" and seed == 0 else gains.LAWS
+    return [tuned.shipped(plant, name, gains.OBJECTIVES[gain_set], seed) for name in laws]
 
 
-@pytest.mark.parametrize(("gain_set", "plant"), PAIRS)
-def test_all_laws_were_tuned_alike(gain_set, plant):
-    board = tuning.compare(shipped(gain_set, plant))  # refuses another rule, budget, seed, objective or width of bounds
-    assert {t.law.name for t in board} == set(gains.LAWS)
-    assert {t.budget for t in board} == {len(t.history) for t in board} == {256}
+@pytest.mark.parametrize(("gain_set", "plant", "seed"), TUNINGS)
+def test_all_laws_were_tuned_alike(gain_set, plant, seed):
+    board = tuning.compare(shipped(gain_set, plant, seed))  # refuses another rule, budget, seed, objective or bounds
+    assert {t.rule for t in board} == {tuning.RULE}
+    assert {t.seed for t in board} == {seed}
+    assert {t.budget for t in board} == {len(t.history) for t in board} == {96}
+    assert {t.definition for t in board} == {tuning.find_objective(gains.OBJECTIVES[gain_set])}
+
+
+def test_every_general_law_is_a_rival():
+    assert len(gains.general()) >= 35
+    assert len(set(gains.general())) == len(gains.general())
+    left_out = set(catalogue()) - set(gains.general())
+    assert left_out == {*gains.FORMS, "none", "swing_up", "hierarchical"}
+    assert set(gains.FORMS) <= set(bounds.SCALES)
+
+
+def test_no_force_among_the_gains_is_more_than_the_actuator_gives():
+    for plant in paper.PLANTS:
+        for found in shipped("tuned", plant):
+            forces = [gain for gain in found.gains if bounds.unit(found.law, gain) == bounds.FORCE]
+            assert all(found.gains[gain] <= found.scales["F"] * (1.0 + 1e-3) for gain in forces), found
 
 
 def test_a_law_with_a_wider_budget_than_its_rivals_is_refused():
-    import dataclasses
-
-    fair = shipped("tuned", "duffing")
+    fair = shipped("tuned", "duffing")[:3]
     favoured = dataclasses.replace(fair[0], budget=512)
     with pytest.raises(ScenarioError, match="budget"):
         tuning.compare([favoured, *fair[1:]])
 
 
-@pytest.mark.parametrize(("gain_set", "plant"), PAIRS)
-def test_gains_are_the_best_of_the_history_in_their_file(gain_set, plant):
-    for found in shipped(gain_set, plant):
-        best = min(found.history, key=lambda e: e.objective)
+@pytest.mark.parametrize(("gain_set", "plant", "seed"), TUNINGS)
+def test_gains_are_the_best_of_the_finals_in_their_file(gain_set, plant, seed):
+    for found in shipped(gain_set, plant, seed):
+        best = min(found.finals, key=lambda e: e.objective)
         assert found.objective == best.objective
         assert tuple(found.gains.values()) == best.gains
-        assert dict(gains.law(plant, found.law.name, gain_set).gains) == dict(found.law.gains)
+        assert {e.gains for e in found.finals} <= {e.gains for e in found.history}
+        given = gains.law(plant, found.law.name, gain_set, seed).gains
+        assert {name: given[name] for name in found.gains} == found.gains
+
+
+def test_runs_take_the_gains_of_three_tunings_in_turn():
+    made = grids.grid("duffing", ["observer_free", "power_rate"], "nominal", 6)
+    own, other = ([s.law for s in made if s.law.name == name] for name in ("observer_free", "power_rate"))
+    assert own[:3] == own[3:]
+    assert len(set(own)) == 3
+    assert len(set(other)) == 1
+
+
+def test_forms_of_a_law_take_its_gains():
+    exact, single = (gains.law("duffing", name) for name in ("observer_free", "observer_free_single"))
+    assert dict(exact.gains) == dict(single.gains)
 
 
 def test_the_bound_is_the_same_for_every_law_and_both_sets():
-    assert {t.definition.u_max for pair in PAIRS for t in shipped(*pair)} == {paper.U_MAX}
+    assert {t.definition.u_max for name, plant, seed in TUNINGS for t in shipped(name, plant, seed)} == {paper.U_MAX}
 
 
 @pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
@@ -77,7 +113,7 @@ def test_the_law_without_a_clamp_takes_the_gains_of_its_rival(gain_set):
     ("arguments", "words"),
     [
         (("duffing", "classical", "best"), "unknown set of gains 'best'"),
-        (("duffing", "twisting", "tuned"), "smc-mujoco tune duffing twisting"),
+        (("duffing", "hierarchical", "tuned"), "smc-mujoco tune duffing hierarchical"),
         (("overhead_crane", "classical", "tuned"), "no gains in set 'tuned'"),
         (("duffing", "clasical", "study"), "did you mean 'classical'"),
         (("duffing", "twisting", "study"), "unknown law of the paper's study"),

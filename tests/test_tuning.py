@@ -142,7 +142,7 @@ def test_a_law_of_ones_own_is_tuned_once_its_units_are_known(monkeypatch):
 
 def test_an_optimum_at_a_bound_is_told_and_the_bound_moved(monkeypatch):
     monkeypatch.setitem(bounds.SCALES, "observer_free", {"lam": bounds.Unit(force=-2), "k1": bounds.RATE})
-    goal, budgets = Objective(conditions=("nominal",), duration=1.5), (STAGE, 2 * STAGE)
+    goal, budgets = Objective(conditions=("nominal",), duration=1.5), (2 * STAGE, 3 * STAGE)
     first, then = (tune("duffing", "observer_free", budget=budget, objective=goal) for budget in budgets)
     assert first.at_bound == {"lam": "upper"}
     assert first.searched == first.bounds == then.bounds
@@ -150,7 +150,7 @@ def test_an_optimum_at_a_bound_is_told_and_the_bound_moved(monkeypatch):
     assert then.searched["lam"] == (then.bounds["lam"][0], pytest.approx(then.bounds["lam"][1] * 10))
     assert then.objective < first.objective
     assert then.gains["lam"] > first.bounds["lam"][1]
-    assert len(then.history) == 2 * STAGE
+    assert len(then.history) == 3 * STAGE
 
 
 @pytest.mark.parametrize(("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")])
