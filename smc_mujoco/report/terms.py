@@ -82,9 +82,9 @@ STATISTICS = (
     Term(
         "verdict",
         "verdict",
-        "Of a claim under one set of gains: supported where every check holds, refuted where none does, partly "
-        "supported between, not testable where there is nothing to check. Over the sets: the one that they share, "
-        "else partly supported, and marked as depending on the gains. Thresholds were fixed before any run.",
+        "A claim consists of sentences, each with checks. Under one set of gains it is supported where every sentence "
+        "holds, refuted where none does, partly supported between. Over the sets: what they have in common, else partly "
+        "supported, and marked as depending on the gains; a universal claim is refuted by one counter-example. Thresholds were fixed before any run.",
     ),
     Term(
         "lyapunov",
