@@ -15,10 +15,12 @@ help: ## list the targets
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
 
-test: setup ## all tests
+test: ## all tests
+	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest
 
-check: setup ## lint, format and types
+check: ## lint, format and types
+	@./setup.sh requirements-test.lock
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	@# without this variable pyright asks the package index for a newer version of itself

@@ -140,7 +140,7 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     from smc_mujoco.draw import video
 
     if sentence := video.missing() or gl.note():
-        console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
+        console.print(sentence, style="yellow", soft_wrap=True, highlight=False, markup=False)
     if video.missing():
         return []
     runs = traces[scene.film]
