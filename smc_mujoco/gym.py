@@ -60,6 +60,7 @@ class Timed:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
+        """Take it over, with the episode's own length."""
         self._spec = copy.copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.last
