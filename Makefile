@@ -15,10 +15,12 @@ help: ## list the targets
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
 
-test: setup ## all tests
+test: ## all tests
+	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest
 
-check: setup ## lint, format and types
+check: ## lint, format and types
+	@./setup.sh requirements-test.lock
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	@# without this variable pyright asks the package index for a newer version of itself
@@ -48,10 +50,12 @@ bench: ## speed, beside bare MuJoCo and other packages
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
-	$(LOCK) pyproject.toml --group test --group check -o requirements.lock
+	$(LOCK) pyproject.toml --extra dm --extra film --extra report --extra rl --group use -o requirements.lock
 	@# what requirements.lock has already is left out of the others, but for what it has for Windows alone
-	for group in bench docs; do $(LOCK) --group $$group -c requirements.lock -o requirements-$$group.lock \
-		$$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock) || exit; done
+	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
+	$(LOCK) pyproject.toml --extra all --group test --group check $$beside -o requirements-test.lock && \
+	for group in bench docs; do \
+		$(LOCK) --group $$group $$beside -c requirements-test.lock -o requirements-$$group.lock || exit; done
 
 setup:
 	@./setup.sh

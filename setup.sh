@@ -1,6 +1,7 @@
 #!/bin/sh
-# Makes .venv, the project's own environment: the packages of requirements.lock, of one more lock
-# where an argument names it, and the project itself, editable. Run again, it changes nothing.
+# Makes .venv, the project's own environment: the packages of requirements.lock, which the commands
+# need, and the project itself, editable; then those of one more lock, where an argument names it, as in
+# ./setup.sh requirements-test.lock. Run again, it adds what is missing and leaves the rest.
 # PYTHON names the interpreter (default: python3). What pip says goes to .venv/setup.log.
 set -eu
 cd "$(dirname "$0")"
@@ -53,6 +54,7 @@ if ! wanted | cmp -s - .venv/installed; then
     wanted >.venv/installed
 fi
 if [ -n "$extra" ] && ! cmp -s "$extra" ".venv/$extra"; then
+    [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.5 GB)"
     install --only-binary :all: --require-hashes -r "$extra"
     cp "$extra" .venv/
 fi

@@ -141,6 +141,7 @@ _HOMES = {
     "tuning": ("tune",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
+__all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]  # it knows the imports above
 
 gl.choose()  # before anything imports mujoco
 

@@ -11,10 +11,11 @@ The rule. X and V are the largest |x| and |v| of the grid; a run is home while |
 every channel. States are run for 15 % of the duration; those still open again, from the start, for 40 %, and the rest
 for all of it (runs are deterministic, and keep no state between: this costs at most 1.55 times the last).
 - converges, early: home throughout the last third of the horizon, and (x/X)^2 + (v/V)^2 smaller by a tenth in the
-  second half of it than in the first; or within a tenth of home and not leaving, larger by 5 %, as ripple may be.
+  second half of it than in the first; or near, within a tenth of home, in the second half. There its size tells
+  nothing: a law that switches leaves a ripple, whose beat makes now one half larger, now the other.
 - does not, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away from home.
-- at the end: converges if home throughout the last 20 % of the run and not leaving, does not if never home in them;
-  else undecided. What leaves by less than those 5 %, 2.5 % a second in runs of 10 s, is taken to stay.
+- at the end: converges if home throughout the last 20 % of the run, and near or not leaving, larger by 5 %; does not if
+  never home in them; else undecided. What leaves by less, 2.5 % a second in runs of 10 s, is taken to stay.
 Early verdicts are no proofs, as a run that is home and shrinking might leave later: tests hold them against runs to
 the end. `basin` integrates with implicitfast, four times as fast as RK4 and 1e-3 rad or m from it: less than a
 fiftieth of a cell.
@@ -49,7 +50,7 @@ HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 LATE = 3  # the part of an early horizon that counts is its last third
 BATCH_BYTES = 48 * 2**20  # of traces that are in memory at once, about
 STILL = 1e-6  # of X, V and u_max
-LEAVING, SHRINKING, NEAR, ROUNDING = 1.05, 0.9, (0.1 * BAND) ** 2, 1e-12  # of the squared distance: factors, sizes
+LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the squared distance: two factors, a size
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about how fast the study's plants swing
 LEAST_SAMPLES = 10  # of the shortest runs: two halves of the last fifth of them have one each
@@ -196,9 +197,7 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     square = ((trace.x[late] / far[0]) ** 2 + (trace.v[late] / far[1]) ** 2).sum(axis=1)
     middle = square.size // 2
     sooner, later = square[:middle].max(), square[middle:].max()
-    stays = home.all() and later <= LEAVING * sooner + ROUNDING
-    if not final:  # so short a time tells what leaves slowly from what chatters only near the middle
-        stays = stays and later <= max(SHRINKING * sooner, NEAR)
+    stays = home.all() and later <= max((LEAVING if final else SHRINKING) * sooner, NEAR)
     if final or stays:
         return CONVERGES if stays else UNDECIDED if home.any() else DOES_NOT
     moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])

@@ -147,6 +147,7 @@ SCALES: dict[str, Units] = {  # law -> gain -> its unit
     },
     "nonsingular_fast_terminal": {
         "k": FORCE,
+        "rate": FORCE_PER_POSITION,
         "a": lambda g: Unit(position=1 - g["q"]),
         "q": HELD,
         "b": lambda g: Unit(position=1 - g["p"], time=g["p"]),

@@ -25,7 +25,6 @@ from smc_mujoco.commands import (
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )

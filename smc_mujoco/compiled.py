@@ -91,7 +91,8 @@ def loader(kind: type) -> Callable:
     @intrinsic
     def load(typingctx, address):
         def codegen(context, builder, signature, args):
-            return builder.load(builder.inttoptr(args[0], context.get_value_type(record).as_pointer()))
+            stored = context.get_value_type(record)
+            return builder.load(builder.inttoptr(args[0], stored.as_pointer()), typ=stored)
 
         return record(types.intp), codegen
 

@@ -3,30 +3,36 @@
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
 An observation is positions and velocities, and for `track` r, r', r'', one after another; an action is the command of
-the driven channels, in parts of their limits. An episode is truncated at the scenario's duration, and terminated where
-the plant leaves the finite world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
+the driven channels, in parts of their limits, in float32, which learners give. An episode is truncated at the
+scenario's duration, which is also the max_episode_steps of its spec, and terminated where the plant leaves the finite
+world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
 """
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
-import gymnasium
 import mujoco
 import numpy as np
-from gymnasium import spaces
 
 from smc_mujoco import gl, registration
 from smc_mujoco.errors import ScenarioError, shown
 from smc_mujoco.harness import WORLD
+from smc_mujoco.optional import extra
 from smc_mujoco.plant import Plant
 from smc_mujoco.setting import Setting, bounded, setting
+
+with extra("rl", "smc_mujoco.gym"):
+    import gymnasium
+    from gymnasium import spaces
+    from gymnasium.envs.registration import EnvSpec
 
 registration.register()  # for who imports this module alone
 
 
 def action_space(found: Setting) -> spaces.Box:
     """Commands of the driven channels, in parts of their limits."""
-    return spaces.Box(-1.0, 1.0, found.shape, np.float64)
+    return spaces.Box(-1.0, 1.0, found.shape, np.float32)
 
 
 def observation_space(found: Setting) -> spaces.Box:
@@ -37,13 +43,37 @@ def observation_space(found: Setting) -> spaces.Box:
     return spaces.Box(-high, high, dtype=np.float64)
 
 
-class PlantEnv(gymnasium.Env):
+class Timed:
+    """An environment whose spec, which `gymnasium.make` sets, has its own length as max_episode_steps.
+
+    Attributes:
+      last: the sample at which an episode is truncated.
+    """
+
+    last: int
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What gymnasium made the environment from."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        """Take it over, with the episode's own length."""
+        self._spec = copy.copy(spec)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self.last
+
+
+class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
     """One plant with a task.
 
     Attributes:
       setting: the plant with its task.
       data: the simulation's state.
       sample: control samples since the episode began.
+      last: the sample at which an episode is truncated.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
@@ -63,6 +93,7 @@ class PlantEnv(gymnasium.Env):
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         self.setting, self.render_mode, self.sample = setting(plant, task, changes), render_mode, 0
+        self.last = self.setting.scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / self.setting.scenario.control_period))}
         self.data = mujoco.MjData(self.setting.model)
         self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
@@ -86,7 +117,7 @@ class PlantEnv(gymnasium.Env):
         mujoco.mj_step(found.model, data, found.scenario.steps)
         self.sample += 1
         x, v = data.qpos[found.qpos], data.qvel[found.qvel]
-        observation, truncated = found.observe(x, v, self.sample), self.sample >= found.scenario.samples
+        observation, truncated = found.observe(x, v, self.sample), self.sample >= self.last
         if found.lost(x, v):
             return bounded(observation), 0.0, True, truncated, {}
         return observation, float(found.reward(x, v, self.sample)), False, truncated, {}

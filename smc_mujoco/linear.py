@@ -116,8 +116,8 @@ def _moved(k: float, d: float, h: float, inertia: float) -> tuple[np.ndarray, np
     return rates @ summed, summed[:, 1] / inertia
 
 
-def held(plant: Plant, law: Law, u_max: float = math.inf) -> np.ndarray | None:
-    """The force that holds every channel at the same x > 0, for x of ASIDE as far as it rises; N or N m."""
+def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The force that holds every channel at the same x > 0, N or N m, as a function of x; None for other laws."""
     if law.name not in LOCAL:
         return None
     linear(plant)  # or refuses
@@ -125,7 +125,16 @@ def held(plant: Plant, law: Law, u_max: float = math.inf) -> np.ndarray | None:
     ratios = [plant.nominal(np.full(plant.n, 1.0), still, i, p) for i in range(plant.n)]
     if np.ptp([f / g for f, g in ratios]) > SAME * (1.0 + abs(ratios[0][0] / ratios[0][1])):
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant whose joints are alike")
-    own = [plant.nominal(np.full(plant.n, x), still, 0, p) for x in ASIDE]
-    force = np.minimum(LOCAL[law.name][1](law.gains, ASIDE), u_max) - np.array([f / g for f, g in own])
-    falls = np.flatnonzero(np.diff(np.r_[0.0, force]) < 0.0)
-    return force[: falls[0]] if falls.size else force
+
+    def force(x: np.ndarray) -> np.ndarray:
+        own = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
+        return np.minimum(LOCAL[law.name][1](law.gains, x), u_max) - np.array([f / g for f, g in own])
+
+    return force
+
+
+def rising(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """The force of `holding` at ASIDE, as far as it rises."""
+    values = force(ASIDE)
+    falls = np.flatnonzero(np.diff(np.r_[0.0, values]) < 0.0)
+    return values[: falls[0]] if falls.size else values

@@ -104,12 +104,20 @@ def opened(file: File) -> Act:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network:
-    """A torch module as it is now, on the CPU and as in evaluation: whoever trains it on changes no law."""
+    """A torch module as it is now, on the CPU and as in evaluation: training it on changes no law.
+
+    Attributes:
+      module: the torch module.
+      predicts: whether its method `predict` is asked, as that of a policy of stable-baselines3 is, and not itself.
+    """
 
     module: Any
+    predicts: bool = False
 
-    def __call__(self, observation: np.ndarray) -> np.ndarray:
+    def __call__(self, observation: np.ndarray) -> Any:
         """The action."""
+        if self.predicts:
+            return _predicted(self.module, observation)
         return _asked(sys.modules["torch"], self.module, observation)
 
     def __reduce__(self) -> tuple:
@@ -118,21 +126,22 @@ class Network:
         torch.save(self.module, held)
         kinds = {type(part) for part in self.module.modules()}
         ordered = sorted(kinds, key=lambda kind: (kind.__module__, kind.__qualname__))
-        return _restored, (held.getvalue(), tuple(ordered), torch.__version__)
+        return _restored, (held.getvalue(), tuple(ordered), torch.__version__, *[True] * self.predicts)
 
 
-def _restored(held: bytes, kinds: tuple[type, ...], version: str) -> Network:
+def _restored(held: bytes, kinds: tuple[type, ...], version: str, predicts: bool = False) -> Network:
     """What `Network.__reduce__` tells of."""
-    return Network(_library("torch", "network").load(io.BytesIO(held), weights_only=False))
+    return Network(_library("torch", "network").load(io.BytesIO(held), weights_only=False), predicts)
 
 
 def policy(act: Any, *, reference: bool = False) -> Law:
     """A policy as a law.
 
     Args:
-      act: a callable from an observation to an action, in parts of its limit, beyond which it saturates; a torch
-        module, taken as it is now and put in evaluation mode; or the path of a file of onnx (.onnx), of torch.export
-        (.pt2) or of TorchScript (.pt, .pth, .ts).
+      act: a callable from an observation to an action, in parts of its limit, beyond which it saturates; what has
+        such a method `predict`, as a model of stable-baselines3, asked for its deterministic action; a torch module,
+        taken as it is now and put in evaluation mode, and so is the policy of a model; or the path of a file of onnx
+        (.onnx), of torch.export (.pt2) or of TorchScript (.pt, .pth, .ts).
       reference: whether its observation ends in r, r', r'', as that of the task `track` does.
 
     The observation is x, v, or x, q, v, q' of a joint with one that moves with it: a float64 array of a single
@@ -157,14 +166,17 @@ def _callable(act: Any) -> tuple[Act, str]:
         file = File(str(path.resolve()), _digest(path))
         opened(file)  # now, not in the run
         return file, path.stem
-    if not callable(act):
-        raise ScenarioError(f"policy is {shown(act)}: give a callable from an observation to an action")
     torch, name = sys.modules.get("torch"), type(act).__name__
+    predicts = callable(getattr(act, "predict", None))
+    if predicts and not callable(act):  # a model of stable-baselines3 has its policy's own predict
+        act = getattr(act, "policy", act)
+    elif not callable(act):
+        raise ScenarioError(f"policy is {shown(act)}: give a callable from an observation to an action")
     if torch is None or not isinstance(act, torch.nn.Module):
-        return act, getattr(act, "__name__", name)
+        return (act if callable(act) else functools.partial(_predicted, act)), getattr(act, "__name__", name)
     try:
         module: Any = copy.deepcopy(act)
-        return Network(module.to("cpu").eval()), name
+        return Network(module.to("cpu").eval(), predicts), name
     except Exception as error:
         why = " ".join(str(error).split())[:200]
         raise ScenarioError(f"policy {name!r} cannot be copied ({why}): give a file, by torch.onnx.export") from error
@@ -201,6 +213,12 @@ def _of_torch_file(torch: ModuleType, path: Path) -> Act:
         else:
             module = torch.jit.load(str(path), map_location="cpu").eval()
     return functools.partial(_asked, torch, module)
+
+
+def _predicted(model: Any, observation: np.ndarray) -> Any:
+    """The action that a model gives: `predict` returns it alone, or first of a pair with what it remembers."""
+    found = model.predict(observation, deterministic=True)
+    return found[0] if isinstance(found, tuple) else found
 
 
 def _asked(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndarray:

@@ -137,12 +137,12 @@ def _labels(runs: Mapping[str, Trace]) -> list[str]:
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
     """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
-    if sentence := gl.missing() or gl.note():
-        console.print(sentence, style="yellow", soft_wrap=True, highlight=False)
-    if gl.missing():
-        return []
     from smc_mujoco.draw import video
 
+    if sentence := video.missing() or gl.note():
+        console.print(sentence, style="yellow", soft_wrap=True, highlight=False, markup=False)
+    if video.missing():
+        return []
     runs = traces[scene.film]
     shown = list(runs.values())
     with bar("film", len(video.clock(shown, video.FPS))) as drawn:

@@ -1,6 +1,6 @@
-"""Plants as dm_env environments, through dm_control's control.Environment.
+"""Plants as dm_env environments, through dm_control's control.Environment: `pip install 'smc-mujoco[dm]'`.
 
-    environment = suite.load("duffing", "regulate", random=0)
+    environment = suite.load("duffing", "regulate", task_kwargs={"random": 0})
     timestep = environment.reset()
     while not timestep.last():
         timestep = environment.step(agent(timestep))
@@ -11,19 +11,29 @@ An action is the command of the driven channels, in parts of their limits. Obser
 """
 
 import contextlib
+import functools
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from importlib.metadata import version
 from typing import Any
 
+import mujoco
 import numpy as np
-from dm_control.mujoco import Physics
-from dm_control.mujoco.wrapper import MjModel
-from dm_control.rl import control
 from dm_env import specs
 
-from smc_mujoco.errors import ScenarioError, shown
-from smc_mujoco.plant import Plant
+from smc_mujoco.errors import ScenarioError, shown, unknown
+from smc_mujoco.optional import MissingPackageError, cure, extra
+from smc_mujoco.plant import Plant, plants
 from smc_mujoco.setting import Setting, bounded, setting
+from smc_mujoco.tasks import tasks
+
+with extra("dm", "smc_mujoco.suite"):
+    from dm_control.mujoco import Physics
+    from dm_control.mujoco.wrapper import MjModel
+    from dm_control.rl import control
+
+TASK_KWARGS = {"random": "random", "time_limit": "duration"}  # of dm_control's suite: what it is called here
+ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep": "control_period"}
 
 
 class PlantPhysics(Physics):
@@ -94,6 +104,8 @@ class PlantTask(control.Task):
 def load(
     domain: Plant | str,
     task: str = "regulate",
+    task_kwargs: Mapping[str, Any] | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
     *,
     random: int | np.random.RandomState | np.random.Generator | None = None,
     changes: Mapping[str, Any] | None = None,
@@ -104,25 +116,67 @@ def load(
     Args:
       domain: a Plant or the name of one.
       task: one of `smc_mujoco.tasks.tasks(domain)`.
+      task_kwargs: of dm_control's suite: random, and time_limit, in s, which is the field duration.
+      environment_kwargs: of dm_control's suite: flat_observation, and control_timestep, in s, which is the field
+        control_period. Both hold over the arguments below.
       random: a seed or a numpy generator, of the starts; None for another start every time.
       changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max": 3.0}.
       flat_observation: whether an observation is one array, {"observations": ...}, as dm_control's suite offers.
 
     Raises:
       ScenarioError: a plant, task or field that there is not, a task that is not for the plant, a value out of range.
+      MissingPackageError: dm_control does not fit the MuJoCo that is installed.
     """
+    named = _named("task_kwargs", task_kwargs, TASK_KWARGS)
+    named |= _named("environment_kwargs", environment_kwargs, ENVIRONMENT_KWARGS)
+    random = named.pop("random", random)
+    flat_observation = named.pop("flat_observation", flat_observation)
+    if named and isinstance(changes, Mapping | None):
+        changes = {**(changes or {}), **named}
     found = setting(domain, task, changes)
     if not isinstance(random, np.random.RandomState | np.random.Generator):
         random = _generator(random)
     scenario = found.scenario
     return control.Environment(
-        PlantPhysics.from_model(MjModel(found.model)),
+        _physics(found.model),
         PlantTask(found, random),
         time_limit=(scenario.samples - 0.5) * scenario.control_period,  # half a sample less: sums of floats miss it
         n_sub_steps=scenario.steps,
         flat_observation=flat_observation,
         legacy_step=False,  # x and v are the state's own, and need no second look at it
     )
+
+
+@functools.cache
+def _all_tasks() -> tuple[tuple[str, str], ...]:
+    return tuple((plant, task) for plant in plants() for task in tasks(plant))
+
+
+def __getattr__(name: str) -> object:
+    """ALL_TASKS: every plant with each of its tasks; found out when asked for, as it loads the plants' models."""
+    if name == "ALL_TASKS":
+        return _all_tasks()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _named(what: str, given: object, known: Mapping[str, str]) -> dict[str, Any]:
+    """Arguments in the words of dm_control's suite as ours."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise ScenarioError(f"{what} is {shown(given)}: give a mapping of {', '.join(known)}")
+    for name in given:
+        if name not in known:
+            raise unknown(f"name in {what}", name, known)
+    return {known[name]: value for name, value in given.items()}
+
+
+def _physics(model: mujoco.MjModel) -> PlantPhysics:
+    try:
+        return PlantPhysics.from_model(MjModel(model))
+    except AttributeError as error:  # dm_control looks for every field that it knows
+        here = f"dm_control {version('dm-control')} does not know MuJoCo {mujoco.__version__}"
+        raise MissingPackageError(f"{here} ({error}): {cure('dm')}, which brings two that fit") from error
 
 
 def _generator(seed: object) -> np.random.Generator:

@@ -20,12 +20,13 @@ Systems, 1997, chapter 2; the rest derived here.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from smc_mujoco.errors import number
 from smc_mujoco.law import Law
-from smc_mujoco.linear import ASIDE, SAME, Linear, held, linear, sampled
+from smc_mujoco.linear import ASIDE, Linear, holding, linear, rising, sampled
 from smc_mujoco.plant import Plant
 
 # stability
@@ -155,11 +156,15 @@ def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> flo
 
     None for a law without theory. Followed from x = 0 to the first summit of that force: beyond it nothing holds.
     """
-    force = held(plant, law, u_max)
+    force = holding(plant, law, u_max)
     if force is None:
         return None
-    beyond = np.flatnonzero(force >= abs(number("d", d)))
-    return float(np.interp(abs(d), np.r_[0.0, force], np.r_[0.0, ASIDE[: force.size]])) if beyond.size else math.inf
+    values, d = rising(force), abs(number("d", d))
+    beyond = np.flatnonzero(values >= d)
+    if beyond.size:
+        return float(np.interp(d, np.r_[0.0, values], np.r_[0.0, ASIDE[: values.size]]))
+    summit, most = _summit(force, values.size)
+    return summit if d <= most else math.inf
 
 
 def borne(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
@@ -167,8 +172,20 @@ def borne(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float
 
     Dry friction up to this level cannot hold the plant further out; a plant may still happen to stop further in.
     """
-    force = held(plant, law, u_max)
+    force = holding(plant, law, u_max)
     if force is None:
         return None
     most = number("most", most, above=0.0)
-    return float(force[ASIDE[: force.size] <= most * (1.0 + SAME)].max(initial=0.0))
+    summit, highest = _summit(force, rising(force).size)
+    return max(highest if most >= summit else float(force(np.array([most]))[0]), 0.0)
+
+
+def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
+    """Where a force that rises over the first `size` places of ASIDE is largest, and how large."""
+    from scipy.optimize import minimize_scalar
+
+    ends = ASIDE[max(size - 2, 0)], ASIDE[min(size, ASIDE.size - 1)]
+    found = minimize_scalar(
+        lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
+    )
+    return float(found.x), -float(found.fun)

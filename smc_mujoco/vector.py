@@ -13,26 +13,26 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 
 from smc_mujoco import callback
 from smc_mujoco.errors import ScenarioError, shown, whole
-from smc_mujoco.gym import action_space, observation_space
+from smc_mujoco.gym import Timed, action_space, observation_space
 from smc_mujoco.own_model import smooth
 from smc_mujoco.plant import DIRECTLY, Plant
 from smc_mujoco.run import cores
 from smc_mujoco.setting import bounded, setting
 
 # isort: split
+from gymnasium.utils import seeding  # by now imported by gym
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 MOST = 1_000_000  # copies: a number that is surely meant as something else
 SEEDS = 2**64
 
 
-class BatchEnv(VectorEnv):
+class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Copies of one plant with one task; they are not drawn.
 
     Attributes:

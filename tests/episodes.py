@@ -1,6 +1,9 @@
 """Episodes of environments, and the runs that they are to be: what the tests of agents share."""
 
+from types import ModuleType
+
 import numpy as np
+import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import tasks
@@ -14,6 +17,17 @@ LAW = smc.law("observer_free", lam=6.0, k1=3.076)
 def start(plant, task):
     """A start within the task's own, as x0."""
     return setting(plant, task).draw(np.random.default_rng(7))[0]
+
+
+def dm_control_suite() -> ModuleType:
+    """smc_mujoco.suite; where dm_control is missing, or does not fit this MuJoCo, what asks is skipped."""
+    try:
+        from smc_mujoco import suite
+
+        suite.load("duffing")
+    except ImportError as error:
+        pytest.skip(str(error), allow_module_level=True)
+    return suite
 
 
 def driven_by_dm(environment, act):

@@ -6,18 +6,21 @@ import threading
 import warnings
 from pathlib import Path
 
-import dm_control.suite
 import mujoco
 import numpy as np
 import pytest
-from dm_control.rl import control
-from dm_control.utils import rewards
 from dm_env import StepType, test_utils
-from episodes import EVERY, LAW, columns, driven_by_dm, run_of, start
+from episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, run_of, start
 
 import smc_mujoco as smc
-from smc_mujoco import callback, gl, suite, tasks
+from smc_mujoco import callback, gl, optional, tasks
 from smc_mujoco.setting import setting
+
+suite = dm_control_suite()
+
+import dm_control.suite  # noqa: E402
+from dm_control.rl import control  # noqa: E402
+from dm_control.utils import rewards  # noqa: E402
 
 # the physics are the benchmark's
 
@@ -263,6 +266,33 @@ def test_environments_are_dm_control_s_own():
     assert smc.agent("classical", environment)(timestep).shape == (1,)
 
 
+def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
+    assert {("duffing", "regulate"), ("cart_pole", "swing_up")} < {*suite.ALL_TASKS} == {*EVERY}
+    ours = {"changes": {"duration": 0.2, "control_period": 0.02}, "random": 3, "flat_observation": True}
+    theirs = {"random": 3, "time_limit": 0.2}, {"control_timestep": 0.02, "flat_observation": True}
+    one, other = suite.load("duffing", "track", *theirs), suite.load("duffing", "track", **ours)
+    assert one.control_timestep() == 0.02
+    for k in range(12):
+        first, second = one.step([0.5]), other.step([0.5])
+        assert first.observation["observations"].tolist() == second.observation["observations"].tolist()
+        assert (first.last(), second.last()) == (k == 10, k == 10)
+    both = suite.load("duffing", "track", {"time_limit": 0.2}, changes={"u_max": 2.0, "duration": 3.0})
+    scenario = both.task.setting.scenario
+    assert (scenario.duration, scenario.u_max) == (0.2, 2.0)
+
+
+def test_a_mujoco_that_dm_control_does_not_know_is_one_sentence(monkeypatch):
+    def unknown(model):
+        raise AttributeError("'MjModel' object has no attribute 'flex_vertedge'")
+
+    monkeypatch.setattr(suite.PlantPhysics, "from_model", unknown)
+    with pytest.raises(
+        optional.MissingPackageError, match=r"dm_control \S+ does not know MuJoCo \d\S+ \(.*flex"
+    ) as raised:
+        suite.load("duffing")
+    assert "smc-mujoco[dm]" in str(raised.value) or "take Python 3.12" in str(raised.value)
+
+
 # errors
 
 
@@ -290,6 +320,11 @@ class Lost(smc.Signal):
         (lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}), "take 'track'"),
         (lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}), "finite number at t = 1.001 s"),
         (lambda: suite.load("duffing", changes=3), "changes is 3"),
+        (lambda: suite.load("duffing", "track", {"time_limit": 1.0}, changes=3), "changes is 3"),
+        (lambda: suite.load("duffing", "track", 3), "task_kwargs is 3: give a mapping of random, time_limit"),
+        (lambda: suite.load("duffing", "track", {"randon": 1}), "in task_kwargs 'randon': did you mean 'random'"),
+        (lambda: suite.load("duffing", "track", None, {"n_sub_steps": 1}), "in environment_kwargs 'n_sub_steps'"),
+        (lambda: suite.load("duffing", "track", {"time_limit": -1.0}), "duration is -1"),
         (lambda: suite.load("duffing").task.setting.command([np.inf]), "action is \\[inf\\]: give finite numbers"),
         (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
         (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),

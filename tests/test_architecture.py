@@ -19,7 +19,7 @@ CATALOGUES = ("laws", "surfaces", "plants", "estimators")
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
     {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook"},
-    {"files", "layout", "mjcf", "compiled", "component", "conditions"},
+    {"files", "layout", "mjcf", "compiled", "component", "conditions", "optional"},
     {"estimators", "signals", "plant"},
     {"law", "series", "references", "part", "mechanism"},
     {

@@ -113,6 +113,32 @@ def test_the_channels_of_a_network_start_alike():
     assert (found.outcome == CONVERGES).all()
 
 
+@pytest.mark.parametrize("law", [smc.law("classical", k=6.0, c=2.849), smc.law("adaptive", gamma=66.11, c=2.853)])
+def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple(law):
+    """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the end."""
+    x, v = np.linspace(-4.0, 4.0, 5), np.linspace(-12.0, 12.0, 5)
+    assert (maps.of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
+    assert (maps.of(base("van_der_pol", law, 8.0), x, v, early=False).outcome == CONVERGES).all()
+
+    state, h = np.array(np.meshgrid(x, v)), 1e-3
+    gain = np.full((5, 5), law.gains.get("k", 0.0))
+    for sample in range(8000):
+        s = state[1] + law.gains["c"] * state[0]
+        u = np.clip(-gain * np.sign(s), -6.0, 6.0)
+        gain = gain + h * law.gains.get("gamma", 0.0) * np.abs(s)
+
+        def rate(z, u=u):
+            return np.array([z[1], (1.0 - z[0] ** 2) * z[1] - z[0] + u])
+
+        a = rate(state)
+        b = rate(state + h / 2 * a)
+        c = rate(state + h / 2 * b)
+        state = state + h / 6 * (a + 2 * b + 2 * c + rate(state + h * c))
+        if sample >= 6400:
+            assert np.abs(state[0]).max() < 0.02 * 4.0
+            assert np.abs(state[1]).max() < 0.02 * 12.0
+
+
 # analytic limits
 
 

@@ -183,9 +183,9 @@ def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
 @ESTIMATORS
 @pytest.mark.parametrize("sigma", [0.001, 0.01])
 def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name, sigma):
-    """Without a velocity sensor. Super-twisting of the study winds up on van_der_pol by itself."""
+    """Without a velocity sensor."""
     laws = paper.LAWS if name == "levant" else ("observer_free", "classical")
-    pairs = [(plant, law) for plant in paper.GAINS for law in laws if (plant, law) != ("van_der_pol", "super_twisting")]
+    pairs = [(plant, law) for plant in paper.GAINS for law in laws]
     changes = {"velocity": name, "noise": smc.Noise(position=sigma)}
     traces = smc.run([paper.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
     for pair, trace in zip(pairs, traces, strict=True):
@@ -378,6 +378,15 @@ def test_levant_s_error_under_noise_is_of_the_best_order(n, most):
     constants = np.array(constants)
     assert np.all(constants <= most), constants
     assert np.all(constants.max(axis=0) < 1.6 * constants.min(axis=0)), constants
+
+
+def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
+    g = max(
+        plant.nominal(np.zeros(plant.n), np.zeros(plant.n), 0, plant.values({}))[1]
+        for plant in map(smc.plant, paper.PLANTS)
+    )
+    lag = paper.fields("lag_20ms", "duffing")["actuator"].tau
+    assert smc.estimator("levant").gains["L"] == pytest.approx(2.0 * g * paper.U_MAX / lag, rel=1e-9)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

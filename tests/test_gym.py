@@ -147,6 +147,23 @@ def test_max_episode_steps_truncates_copies_as_it_does_one():
     assert ends == 4 * [([False, False], False)] + [([True, True], True)]
 
 
+@pytest.mark.parametrize("named", [{}, {"max_episode_steps": 7}])
+def test_the_spec_tells_how_long_an_episode_is(named):
+    changes = {"duration": 0.2, "control_period": 0.01}
+    one = gymnasium.make("smc_mujoco:Duffing-v0", changes=changes, **named)
+    many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, changes=changes, **named)
+    again = gymnasium.make(one.spec)
+    for environment in (one, many, again):
+        assert environment.spec.max_episode_steps == named.get("max_episode_steps", 20)
+        environment.reset(seed=0)
+        action = environment.action_space.sample()
+        assert action.dtype == np.float32
+        steps = next(k for k in range(1, 50) if np.any(environment.step(action)[3]))
+        assert steps == environment.spec.max_episode_steps
+    assert gymnasium.spec("Duffing-v0").max_episode_steps is None  # which the duration decides
+    assert PlantEnv("duffing").spec is None
+
+
 def test_a_copy_that_is_over_starts_anew_and_the_others_go_on():
     many = BatchEnv("duffing", 3, changes={"duration": 0.02})
     many.reset(seed=0)

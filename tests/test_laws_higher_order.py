@@ -5,6 +5,7 @@ On the chains of plants_ab.py, sampled without error; relative degree 3 on mecha
 
 import math
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -60,6 +61,32 @@ def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explic
     assert max(turns["implicit_super_twisting"], turns["proper_super_twisting"]) < 1e-6
     assert turns["super_twisting"] > 0.3
     assert turns["classical"] > 1000 * turns["super_twisting"]
+
+
+@pytest.mark.parametrize("name", ["implicit_super_twisting", "proper_super_twisting"])
+def test_implicit_laws_solve_their_inclusion(name):
+    """20,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2 sgn(z)."""
+    rng = np.random.default_rng(12)
+    k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (20_000, 3)).T
+    s, w = rng.normal(size=(2, 20_000)) * 10.0 ** rng.uniform(-6, 0, (2, 20_000))
+    s *= np.where(rng.random(20_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
+    function, on = law(name).function, 0
+    for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
+        k1_, k2_, h, s_, w_ = values
+        memory = np.array([w_])
+        u, _ = function(on_surface(s_, dt=h), SimpleNamespace(k1=k1_, k2=k2_, c=0.0), memory)
+        after = memory[0]
+        ahead, root = s_ + h * u, (after - u) / k1_
+        if name == "proper_super_twisting":
+            ahead, root = s_ + h * (u - after), (2.0 * after - w_ - u) / k1_
+        z, scale = root * abs(root), abs(s_) + h * (abs(u) + abs(w_) + abs(after))
+        assert abs(ahead - z) <= 1e-12 * (scale + abs(z)), values
+        if abs(z) <= 1e-12 * scale:
+            on += 1
+            assert abs(after - w_) <= h * k2_ * (1.0 + 1e-12) + 1e-15, values
+        else:
+            assert after == pytest.approx(w_ - h * k2_ * math.copysign(1.0, z), rel=1e-12, abs=1e-15), values
+    assert 1_000 < on < 19_000
 
 
 @pytest.mark.parametrize("name", TWISTED)
@@ -287,10 +314,48 @@ def test_terminal_laws_end_when_their_surface_says_whatever_the_disturbance(name
 @pytest.mark.parametrize("name", ["terminal", "nonsingular_terminal", "nonsingular_fast_terminal"])
 def test_a_terminal_law_is_the_classical_law_on_its_surface(name):
     rule, slid, first = law(name), surface(name), law("classical", k=4.0)
+    if "rate" in rule.gains:
+        first = law("exponential_reaching", k=4.0, q=rule.gains["rate"])
     assert {key: rule.gains[key] for key in slid.gains} == dict(slid.gains)
     for e, de in np.random.default_rng(1).normal(size=(200, 2)):
         s, eq = call(slid, measured(e, de), np.zeros(slid.memory))
         assert one(rule, e=e, de=de) == call(first, on_surface(s, eq=eq), np.zeros(first.memory))
+
+
+def test_the_linear_term_of_the_fast_terminal_law_brings_it_in_from_afar():
+    """From e = 5, and no later than the law without a; without the term it needs 15 s."""
+    fast, slow, plain = (
+        plant_b(law(name, **gains), x=(5.0, 0.0), duration=20.0).reached(1e-2)
+        for name, gains in (
+            ("nonsingular_fast_terminal", {}),
+            ("nonsingular_fast_terminal", {"rate": 0.0}),
+            ("nonsingular_terminal", {}),
+        )
+    )
+    assert fast < plain < 4.0
+    assert slow > 15.0
+
+
+@pytest.mark.parametrize(
+    ("name", "speed"),
+    [
+        ("terminal", lambda g, e: g["b"] * e ** g["p"]),
+        ("nonsingular_terminal", lambda g, e: (g["B"] * e) ** (1 / g["p"])),
+        ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
+    ],
+)
+def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_too(name, speed):
+    """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k g > |f| alone."""
+    e, f, g = 1.5, 1.0, 3.0
+    rule = law(name)
+    start = (e, -speed(rule.gains, e))
+    slid = surface(name)
+    eq = call(slid, measured(*start), np.zeros(slid.memory))[1]
+    needed = (abs(f) + (g - 1.0) * abs(eq)) / g
+    for share, stays in ((1.1, True), (0.9, False)):
+        assert share * needed * g > abs(f)
+        run = plant_b(law(name, k=share * needed), x=start, f=math.copysign(f, eq), g=g, duration=0.1)
+        assert (np.diff(np.sign(run.sigma[2:50])) != 0.0).any() == stays, share
 
 
 @pytest.mark.parametrize("name", ["twisting", "suboptimal", "terminal", "nonsingular_terminal", "continuous_twisting"])
@@ -300,6 +365,31 @@ def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
     given = plant_b(law(name), HUM, duration=3.0, f=-9.81, g=4.0, model=1.0)
     np.testing.assert_allclose(given.s, bare.s, atol=1e-3)
     assert plant_b(law(name), HUM, duration=3.0, f=-9.81, g=1.0).residual() > 0.05
+
+
+def test_twisting_is_siconos_explicit_one():
+    """An independent implementation, x'' = 19 x - 2 x' + u, u held over 50 ms: the published (x, x')."""
+    plant = smc.plant("duffing", M=1.0, delta=2.0, alpha=-19.0, beta=0.0)
+    scenario = smc.Scenario(
+        plant=plant,
+        law=law("twisting", r1=300.0, r2=60.0),
+        x0=-15.0,
+        v0=20.0,
+        control_period=0.05,
+        physics_step=1e-3,
+        u_max=math.inf,
+        duration=1.5,
+        integrator="RK4",
+    )
+    trace = smc.run(scenario)
+    published = {
+        0.05: (-14.09545908221278, 16.38486565996921),
+        0.85: (2.395615641163373, 52.44596952716989),
+        1.5: (-3.460806002951802, 6.786006803216882),
+    }
+    for t, state in published.items():
+        k = round(t / 0.05)
+        np.testing.assert_allclose((trace.x[k, 0], trace.v[k, 0]), state, rtol=0, atol=1e-8)
 
 
 # relative degree 3

@@ -85,6 +85,20 @@ def test_defaults_hold_for_the_input_gains_of_the_plants(name, g):
     assert run.residual() < 2e-3
 
 
+def test_the_extended_state_law_s_observer_has_all_its_poles_where_it_says():
+    """Without input its error moves by a matrix whose characteristic polynomial is (z - exp(-w h))^3."""
+    for w, h in 10.0 ** np.random.default_rng(3).uniform((0, -4), (3, -1), (200, 2)):
+        law = smc.law("extended_state", w=w)
+        moved = np.empty((3, 3))
+        for column in range(3):
+            memory = np.zeros(law.memory)
+            memory[0], memory[1 + column] = 1.0, h**-column  # so that the columns are of one size
+            called(law, measured(dt=h, limit=0.0), memory)
+            moved[:, column] = memory[1:4] * (1.0, h, h * h)
+        pole = math.exp(-w * h)
+        np.testing.assert_allclose(np.poly(moved), np.poly([pole] * 3), rtol=0, atol=1e-11)
+
+
 def test_the_extended_state_observer_s_loop_rings_above_nine_times_its_input_gain():
     """(g / b - 1) w^3 / (p + w)^3 has the gain margin 8; sampled at w h = 0.04 a little less."""
     law = smc.law("extended_state", k=0.0, c=0.0, b=1.0)

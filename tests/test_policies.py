@@ -12,13 +12,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from episodes import columns, driven_by_dm, run_of
+from episodes import columns, dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
-from smc_mujoco import identity, policies, suite
+from smc_mujoco import identity, policies
 from smc_mujoco.law import Measurement
 
 pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.run.PlainLoopWarning")
+
+
+Y = Measurement(t=0.0, dt=0.001, x=0.5, v=0.0, e=0.5, de=0.0, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
 
 
 def flat(timestep):
@@ -39,14 +42,14 @@ def briefly(law, **fields):
 
 
 def test_a_policy_as_a_law_gives_the_episode_that_it_has_as_an_agent():
-    environment = suite.load("duffing", changes={"duration": 0.2, "x0": 0.7})
+    environment = dm_control_suite().load("duffing", changes={"duration": 0.2, "x0": 0.7})
     states = driven_by_dm(environment, lambda timestep: proportional(flat(timestep)))
     trace = smc.run(run_of(environment.task.setting, smc.policy(proportional)))
     assert np.abs(states - columns(trace)).max() < 1e-9
 
 
 def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
-    environment = suite.load("cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]})
+    environment = dm_control_suite().load("cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]})
 
     def act(observation):
         return np.array([observation @ np.arange(0.1, 0.8, 0.1)])
@@ -243,6 +246,56 @@ def test_a_torch_module_is_asked_in_evaluation_and_in_its_own_type(dtype, torch)
     assert briefly(law).u[0, 0] == pytest.approx(-1.5, rel=1e-6)
 
 
+# what predicts, as stable-baselines3 has it
+
+
+class Predicts:
+    """A stand-in for a model that gives its action, and what it remembers, when asked for the deterministic one."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.shape == (2,)
+        return np.array([-0.5 * observation[0] if deterministic else 1.0], np.float32), state
+
+
+class Alone(Predicts):
+    """One that gives its action alone."""
+
+    def predict(self, observation, deterministic=False):
+        return super().predict(observation, deterministic=deterministic)[0]
+
+
+@pytest.mark.parametrize("kind", [Predicts, Alone])
+def test_what_predicts_is_asked_for_its_deterministic_action(kind):
+    law = smc.policy(kind())
+    assert law.name == kind.__name__
+    assert briefly(law).u[0, 0] == -1.5
+
+
+def test_a_callable_that_predicts_too_is_called():
+    class Both(Predicts):
+        def __call__(self, observation):
+            return [0.25]
+
+    assert briefly(smc.policy(Both())).u[0, 0] == 1.5
+
+
+class Head(Module):
+    """A stand-in for the policy of a model of stable-baselines3: a torch module that predicts."""
+
+    def predict(self, observation, deterministic=False):
+        assert deterministic
+        assert not self.training
+        return self.gain * observation[:1], None
+
+
+def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
+    model = types.SimpleNamespace(predict=lambda *_, **__: pytest.fail("the model is trained on"), policy=Head())
+    law = smc.policy(model)
+    model.policy.gain = 7.0
+    assert briefly(law).u[0, 0] == pytest.approx(-1.5, rel=1e-6)
+    assert briefly(smc.policy(model.policy)).u[0, 0] == 6.0  # itself, as it is now
+
+
 # errors
 
 
@@ -320,3 +373,24 @@ def test_torch_s_weights_alone_are_no_policy(network, tmp_path):
     torch.save(module.state_dict(), tmp_path / "weights.pt")
     with pytest.raises(smc.ScenarioError, match="give TorchScript"):
         smc.policy(tmp_path / "weights.pt")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_models_of_stable_baselines3_learn_here_and_are_laws():
+    library = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
+    gymnasium = pytest.importorskip("gymnasium")
+    from stable_baselines3.common.env_checker import check_env
+
+    changes = {"duration": 0.2, "control_period": 0.01, "u_max": 6.0}
+    environment = gymnasium.make("smc_mujoco:Duffing-v0", changes=changes)
+    check_env(environment.unwrapped)
+    model = library.PPO("MlpPolicy", environment, n_steps=32, batch_size=16, device="cpu", seed=0).learn(64)
+    law = smc.policy(model)
+    expected = 6.0 * float(model.predict(np.array([0.5, 0.0]), deterministic=True)[0][0])
+    assert law.name == "PPO"
+    assert pickle.loads(pickle.dumps(law.function))(Y, None, np.zeros(1))[0] == pytest.approx(expected, rel=1e-6)
+    model.learn(64)
+    assert briefly(law).u[0, 0] == pytest.approx(expected, rel=1e-6)
+    assert identity.key(smc.Scenario(plant="duffing", law=law)) != identity.key(
+        smc.Scenario(plant="duffing", law=smc.policy(model))
+    )

@@ -205,7 +205,19 @@ def test_what_is_borne_puts_the_plant_where_it_may_just_be(plant):
     law, most = own(plant), 0.02
     level = theory.borne(plant, law, most)
     assert level is not None
-    assert theory.rest_error(plant, law, level) == pytest.approx(most, rel=0.01)
+    assert theory.rest_error(plant, law, level) == pytest.approx(most, rel=1e-4)
+
+
+@settings(max_examples=15, deadline=None)
+@given(plant=st.sampled_from(PLANTS), k1=st.floats(1.0, 10.0), most=st.floats(1e-3, 0.5))
+def test_what_is_borne_is_the_largest_force_up_to_there(plant, k1, most):
+    """Of the law's pull less the plant's own, on a grid that ends at `most`."""
+    law = smc.law("observer_free", lam=5.0, k1=k1)
+    force = linear.holding(plant, law)
+    assert force is not None
+    rises = force(np.linspace(0.0, most, 2_001)[1:])
+    first = int(np.argmax(np.r_[np.diff(rises) < 0.0, True]))
+    assert theory.borne(plant, law, most) == pytest.approx(max(rises[first], 0.0), rel=1e-6, abs=1e-9)
 
 
 def test_the_actuators_bound_counts_where_it_is_below_lambda():

@@ -25,8 +25,8 @@ def claims(
     """Audit the paper's claims: each measured against the threshold that was fixed for it before any run.
 
     A claim is supported where all its sentences hold, refuted where none does, partly supported between; under each
-    set of gains, and where the verdict depends on the set it says so. A universal claim is refuted by one counter-example.
-    A few claims are shown in full, with every check; all of them take minutes.
+    set of gains, and where the verdict depends on the set it says so. One counter-example refutes a universal claim. A
+    few claims are shown in full, with every check; all of them take minutes.
 
     Example: smc-mujoco claims 3 18 --gains tuned
     """

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from smc_mujoco import gl
+from smc_mujoco import gl, optional
 from smc_mujoco.draw import arrows, state, style
 from smc_mujoco.draw.caption import Caption
 from smc_mujoco.draw.charts import Charts
@@ -72,6 +72,11 @@ def film(
     return path
 
 
+def missing() -> str | None:
+    """None when a film can be written, else one sentence that says why not and what to do."""
+    return gl.missing() or optional.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
+
+
 @contextlib.contextmanager
 def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[np.ndarray], None]]:
     """A function that adds a picture (height, width, 3) to the film at `path`.
@@ -79,10 +84,12 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable
     Ctrl-C comes out as KeyboardInterrupt: the terminal sends it to ffmpeg too, which must not end first.
 
     Raises:
-      ScenarioError: ffmpeg cannot write.
+      MissingPackageError: there is no ffmpeg.
+      ScenarioError: it cannot write.
     """
-    import imageio_ffmpeg
-    import mediapy
+    with optional.extra("film", "a film"):
+        import imageio_ffmpeg
+        import mediapy
 
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}

@@ -6,9 +6,10 @@ Exact after finite time where |d^(n+1) x / dt^(n+1)| <= L; sampled, the error of
 |eta| <= eps O(L^(i/(n+1)) eps^((n+1-i)/(n+1))): the best order possible. m of n = 1: 1.5, 1.1; 2: 2, 2.12, 1.1;
 3: 3, 4.16, 3.06, 1.1, those of the recursive form with 1.1, 1.5, 2, 3. Explicit Euler steps, with the Taylor terms
 h^j z_(i+j) / j! without which n >= 2 loses its orders. What is given is the z of the sample's time, from the samples
-before. The default L was chosen by the study's runs at 1 ms: less loses the pendulums when they are let go, more costs
-noise, and at a control period of 20 ms its O(L h^2) is several units: take less there. Where the acceleration is used,
-L should be little above the largest jerk: behind an actuator's lag tau about g U / tau, 120 for 1 kg and 6 N at 50 ms.
+before. The default L follows a rule that looks at no run: the largest jerk of an actuator with the lag tau that turns
+from -U to U, 2 g U / tau, with U = 6, g = 8 of the study's lightest plants and tau = 20 ms, the lag of its realistic
+conditions. Less loses what is rougher, more costs noise. At a control period of 20 ms its O(L h^2) is several units:
+take less there. Where the acceleration is used, L should be little above the plant's own largest jerk.
 Starts from the first reading, at rest; with n = 1 the acceleration given is 0.
 Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (n = 1);
 A. Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control 76(9):924, 2003;
@@ -31,7 +32,7 @@ def correction(a, p, m, L, share):
 
 
 @estimator_function(
-    gains={"L": 3000.0, "order": 2.0},
+    gains={"L": 4800.0, "order": 2.0},
     memory=5,
     positive=("L", "order"),
     conditions={"an order of 1, 2 or 3, else the nearest": lambda g: g.order in (1.0, 2.0, 3.0)},

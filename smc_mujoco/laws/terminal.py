@@ -1,7 +1,8 @@
 """Terminal: u = eq - k sgn(s), s = de + b [e]^p, eq = -b p |e|^(p-1) de bounded by `bound`, 1/2 < p < 1.
 
-s = 0 in finite time for e'' = g u + d, |d| <= D, k g > D, and from there e = 0 in |e|^(1-p) / (b (1-p)). eq is
-singular at e = 0 off the surface, on it of order |e|^(2p-1): the bound changes nothing there.
+s = 0 in finite time for e'' = u + d, |d| <= D < k, and from there e = 0 in |e|^(1-p) / (b (1-p)). eq is singular at
+e = 0 off the surface, on it b^2 p |e|^(2p-1): the bound changes nothing there.
+Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|.
 Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
 Control 115(3):554, 1993 (law); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
 systems", Automatica 49(6):1715, 2013 (bound).

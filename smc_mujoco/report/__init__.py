@@ -36,13 +36,17 @@ def report(
 
     Raises:
       ScenarioError: a number of seeds or threads that cannot be, or a folder that cannot be written.
+      MissingPackageError: jinja2 or plotly is not installed.
     """
+    from smc_mujoco import optional
     from smc_mujoco.errors import whole
     from smc_mujoco.files import replacing
     from smc_mujoco.report import page, stages
     from smc_mujoco.report.bars import Bars
     from smc_mujoco.report.plan import FULL, QUICK
 
+    if why := optional.missing("report", "a report", "jinja2", "plotly"):
+        raise optional.MissingPackageError(why)
     plan = plan or (QUICK if quick else FULL)
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smc_mujoco import gl
+from smc_mujoco import gl, optional
 from smc_mujoco.draw import envelope, video
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
@@ -53,7 +53,8 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda frames: No
     Raises:
       ScenarioError: nothing renders here, or ffmpeg cannot write.
     """
-    import imageio_ffmpeg
+    with optional.extra("report", "a film"):
+        import imageio_ffmpeg
 
     if why := gl.missing():
         raise ScenarioError(why)
@@ -76,6 +77,11 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda frames: No
         finally:
             writer.close()
         return path.read_bytes(), poster
+
+
+def missing() -> str | None:
+    """None when a film can be made, else one sentence that says why not and what to do."""
+    return gl.missing() or optional.missing("report", "no film: it", "imageio_ffmpeg")
 
 
 def jpeg(picture: np.ndarray) -> bytes:

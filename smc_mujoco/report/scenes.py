@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from smc_mujoco import gl, paper
+from smc_mujoco import paper
 from smc_mujoco.report import films, words
 from smc_mujoco.report.bars import Report
 from smc_mujoco.report.findings import Scene
@@ -37,7 +37,7 @@ def _scene(
     traces = run(list(runs.values()), work.threads)
     first = traces[0].scenario
     film = poster = None
-    if filmed and gl.missing() is None:
+    if filmed and films.missing() is None:
         film, poster = _film(work, traces, plant, condition, report)
     return Scene(
         plant=plant,

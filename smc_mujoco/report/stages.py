@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco import gains as sets
-from smc_mujoco import gl, tuned
+from smc_mujoco import tuned
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.files import replacing
 from smc_mujoco.grids import grid as make_grid
 from smc_mujoco.plant import plant as find_plant
-from smc_mujoco.report import about, scores
+from smc_mujoco.report import about, films, scores
 from smc_mujoco.report.bars import Bars
 from smc_mujoco.report.findings import Field, Findings, Front
 from smc_mujoco.report.kept import kept
@@ -53,7 +53,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
 
 
 def _no_film(plan: Plan) -> str | None:
-    why = gl.missing() if plan.filmed else None
+    why = films.missing() if plan.filmed else None
     return why and why.removeprefix("no film: ")
 
 

@@ -83,8 +83,9 @@ STATISTICS = (
         "verdict",
         "verdict",
         "A claim consists of sentences, each with checks. Under one set of gains it is supported where every sentence "
-        "holds, refuted where none does, partly supported between. Over the sets: what they have in common, else partly "
-        "supported, and marked as depending on the gains; a universal claim is refuted by one counter-example. Thresholds were fixed before any run.",
+        "holds, refuted where none does, partly supported between. Over the sets: what they share, else partly "
+        "supported, and marked as depending on the gains; one counter-example refutes a universal claim. Thresholds "
+        "were fixed before any run.",
     ),
     Term(
         "lyapunov",

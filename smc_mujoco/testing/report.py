@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from smc_mujoco import gl
 from smc_mujoco.scene import slug
 from smc_mujoco.testing.response import StepResponse
 from smc_mujoco.trace import Trace
@@ -28,7 +27,7 @@ def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bo
         title = test.rpartition("::")[2]
         files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
         if video:
-            files.append(gl.missing() or _shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
+            files.append(_no_film() or _shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
     return "\n\n".join([*parts, "\n".join(dict.fromkeys(files))])
 
 
@@ -44,6 +43,12 @@ def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
     from smc_mujoco.draw.figure import figure
 
     return next(file for file in figure(traces, path, title=title) if file.suffix == ".png")
+
+
+def _no_film() -> str | None:
+    from smc_mujoco.draw.video import missing
+
+    return missing()
 
 
 def _film(traces: Sequence[Trace], path: Path) -> Path:
