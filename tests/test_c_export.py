@@ -309,6 +309,7 @@ def test_the_file_says_formula_source_gains_and_sizes(capsys):
         assert words in head
     assert re.search(r"code     [1-9]\d\d bytes, and \d+ of constants", head)
     assert 'const char smc_law_gains[] = "k1=5.0,k2=4.4,c=1.5,w_max=inf";' in rest
+    assert head.count("licence  use without restriction, without warranty\n") == 1
     assert "malloc" not in rest
     assert build.HEADER.read_text() in rest
     assert max(map(len, text.splitlines())) <= 123
