@@ -23,7 +23,7 @@ from smc_mujoco import errors
 from smc_mujoco.c import build, child, said, trial
 from smc_mujoco.compiled import AtAddress, Function, call_int, pointer
 from smc_mujoco.component import Template, template
-from smc_mujoco.errors import ScenarioError, shown, whole
+from smc_mujoco.errors import ScenarioError, whole
 
 
 class CLaw(AtAddress):
