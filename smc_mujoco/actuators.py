@@ -17,6 +17,7 @@ from smc_mujoco.plant import LARGEST, Field
 # Where a dcmotor's numbers lie in the compiled model:
 RESISTANCE, CONSTANT = 0, 1  # of actuator_gainprm: ohm, and N m/A at the joint
 SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
+LEAST_RESISTANCE = 1e-9  # ohm: with less, a command is hardly a voltage that a number can hold
 LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COGGING, POLES = 0, 1  # of actuator_biasprm: N m at the joint, and periods a radian of it
@@ -113,7 +114,7 @@ class DCMotor(Drive):
     Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is a model of its own.
 
     Attributes:
-      resistance: ohm, greater than 0.
+      resistance: ohm, 1e-9 or more.
       inductance: H, 0 (current at once) or more.
       torque_constant: k, N m/A, which is V s/rad; greater than 0.
       gear: turns of the motor a turn of the joint, rad/m on a slide; greater than 0.
@@ -135,7 +136,8 @@ class DCMotor(Drive):
     current: float = 30.0
 
     def __post_init__(self) -> None:
-        for name in ("resistance", "torque_constant", "gear"):
+        _check(self, "resistance", above=0.0, least=LEAST_RESISTANCE)
+        for name in ("torque_constant", "gear"):
             _check(self, name, above=0.0)
         for name in ("inductance", "rotor_inertia", "cogging", "poles"):
             _check(self, name, least=0.0)

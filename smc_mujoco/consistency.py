@@ -52,8 +52,10 @@ def check_clock(s: "Scenario") -> None:
 def check_signals(s: "Scenario") -> None:
     """Signals are of the kind that their place asks for, and no shorter than a step."""
     for d in s.disturbance:
-        if isinstance(d, OrnsteinUhlenbeck) and s.duration / d.dt > MOST_STEPS:
-            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more")
+        most = max(MOST_STEPS, s.work)  # knots in all channels
+        if isinstance(d, OrnsteinUhlenbeck) and s.plant.n * s.duration / d.dt > most:
+            least = s.plant.n * s.duration / most
+            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {least:.3g} s or more")
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):

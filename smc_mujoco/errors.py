@@ -53,6 +53,12 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
 
 
+def one_line(text: str, most: int = 200) -> str:
+    """Text on one line: a ? for each character that cannot be printed, cut where it is longer than `most`."""
+    text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * most].split()))
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:
     """known[name], or the error that says what is known."""
     if not isinstance(name, str) or name not in known:

@@ -545,7 +545,7 @@ def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
     subprocess.run(line, check=True)
     for source in (silent, tmp_path / "a.so"):
         trace = smc.run(scenario(smc.law_from_c(source)))
-        assert (trace.failure or "").endswith("returned u = 0.0, s = nan in channel 0, at t = 0 s")
+        assert (trace.failure or "").endswith("returned u = 0, s = nan in channel 0, at t = 0 s")
 
 
 def test_names_of_the_law_may_be_those_of_headers_that_it_does_not_include(file):
