@@ -109,7 +109,8 @@ class DCMotor(Drive):
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
-    slide gear is in rad/m: a pinion of 82 mm. The gearbox loses nothing: give a friction.
+    slide gear is in rad/m: a pinion of 82 mm. The gearbox loses nothing: give a friction. A scenario warns of a motor
+    whose torque at rest, `stall`, is less than a joint needs to stand where it starts.
 
     Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is a model of its own.
 
@@ -158,6 +159,11 @@ class DCMotor(Drive):
     def scale(self) -> float:
         """V per N m (V/N) of stall torque."""
         return self.resistance / self.constant
+
+    @property
+    def stall(self) -> float:
+        """The most torque that voltage and current allow at rest, N m (N)."""
+        return min(self.voltage / self.scale, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec):

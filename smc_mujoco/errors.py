@@ -18,6 +18,10 @@ class ScenarioError(ValueError):
     """Bad input. The message is one sentence: the thing, its value, the cure."""
 
 
+class ScenarioWarning(UserWarning):
+    """A scenario that can be run, and is hardly what its author means. The message is one sentence, as an error's."""
+
+
 def shown(value: object) -> str:
     """A value on one line, cut where it is long; its class in <> where its repr fails."""
     try:
