@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from smc_mujoco.draw.video import film as film
     from smc_mujoco.draw.video import still as still
     from smc_mujoco.errors import ScenarioError as ScenarioError
+    from smc_mujoco.errors import ScenarioWarning as ScenarioWarning
     from smc_mujoco.estimators import estimator as estimator
     from smc_mujoco.estimators import estimator_function as estimator_function
     from smc_mujoco.estimators import estimators as estimators
@@ -110,7 +111,7 @@ _HOMES = {
     "design": ("lqr",),
     "draw.figure": ("figure",),
     "draw.video": ("clip", "film", "still"),
-    "errors": ("ScenarioError",),
+    "errors": ("ScenarioError", "ScenarioWarning"),
     "estimators": ("estimator", "estimator_function", "estimators"),
     "friction": ("Coulomb", "LuGre", "Viscous"),
     "grids": ("grid",),

@@ -17,6 +17,7 @@ from smc_mujoco.plant import LARGEST, Field
 # Where a dcmotor's numbers lie in the compiled model:
 RESISTANCE, CONSTANT = 0, 1  # of actuator_gainprm: ohm, and N m/A at the joint
 SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
+LEAST_RESISTANCE = 1e-9  # ohm: with less, a command is hardly a voltage that a number can hold
 LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COGGING, POLES = 0, 1  # of actuator_biasprm: N m at the joint, and periods a radian of it
@@ -108,12 +109,13 @@ class DCMotor(Drive):
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
-    slide gear is in rad/m: a pinion of 82 mm. The gearbox loses nothing: give a friction.
+    slide gear is in rad/m: a pinion of 82 mm. The gearbox loses nothing: give a friction. A scenario warns of a motor
+    whose torque at rest, `stall`, is less than a joint needs to stand where it starts.
 
     Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is a model of its own.
 
     Attributes:
-      resistance: ohm, greater than 0.
+      resistance: ohm, 1e-9 or more.
       inductance: H, 0 (current at once) or more.
       torque_constant: k, N m/A, which is V s/rad; greater than 0.
       gear: turns of the motor a turn of the joint, rad/m on a slide; greater than 0.
@@ -135,7 +137,8 @@ class DCMotor(Drive):
     current: float = 30.0
 
     def __post_init__(self) -> None:
-        for name in ("resistance", "torque_constant", "gear"):
+        _check(self, "resistance", above=0.0, least=LEAST_RESISTANCE)
+        for name in ("torque_constant", "gear"):
             _check(self, name, above=0.0)
         for name in ("inductance", "rotor_inertia", "cogging", "poles"):
             _check(self, name, least=0.0)
@@ -156,6 +159,11 @@ class DCMotor(Drive):
     def scale(self) -> float:
         """V per N m (V/N) of stall torque."""
         return self.resistance / self.constant
+
+    @property
+    def stall(self) -> float:
+        """The most torque that voltage and current allow at rest, N m (N)."""
+        return min(self.voltage / self.scale, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec):

@@ -9,10 +9,9 @@ import numpy as np
 
 from smc_mujoco.errors import number
 from smc_mujoco.hook import compiled
-from smc_mujoco.part import ROTOR, Actuator, driven, driven_ids, drives
+from smc_mujoco.part import PLAY, ROTOR, Actuator, driven, driven_ids, drives
 from smc_mujoco.plant import LARGEST, Field
 
-PLAY = "play:"  # the tendon of length rotor - joint
 SOLREF = (1e-9, 1.0)  # of its limit, s and damping ratio: less than two steps means two steps, MuJoCo's hardest
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # as hard, at all depths
 BRASS = (0.80, 0.62, 0.28, 1.0)

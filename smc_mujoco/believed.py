@@ -19,15 +19,14 @@ import dataclasses
 import functools
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numba import carray
 
+from smc_mujoco import libmujoco
 from smc_mujoco.compiled import Function, integers, pointer
-from smc_mujoco.errors import ScenarioError
 from smc_mujoco.frozen import frozen
 from smc_mujoco.part import drive_ids, joint_ids
 from smc_mujoco.plant import Coupled, Field, Native, Values, ready, write
@@ -128,22 +127,13 @@ def prepared(
 
 
 @functools.cache
-def library() -> ctypes.CDLL:
-    """The MuJoCo that this process runs, for its C functions' addresses.
-
-    Raises:
-      ScenarioError: its file is not where the package has it.
-    """
-    folder = Path(mujoco.__file__).parent
-    names = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
-    if not names:
-        raise ScenarioError(f"no MuJoCo library in {folder}: reinstall mujoco")
-    found = ctypes.CDLL(str(names[0]))
-    for name in _FUNCTIONS:
-        function = getattr(found, name)
+def functions() -> tuple:
+    """MuJoCo's C functions that the nominal model calls, in the order of _FUNCTIONS."""
+    found = [getattr(libmujoco.library(), name) for name in _FUNCTIONS]
+    for name, function in zip(_FUNCTIONS, found, strict=True):
         function.restype = None
         function.argtypes = [ctypes.c_int64] * 2 if name != "mj_solveM" else [ctypes.c_int64] * 4 + [ctypes.c_int]
-    return found
+    return tuple(found)
 
 
 @functools.cache
@@ -161,7 +151,7 @@ def unknown() -> Function:
 @functools.cache
 def native() -> Function:
     """inputs: i, n, x, v, acceleration (unused) and u, (n,) each -> outputs: f and g of channel i."""
-    positions, velocities, actuation, accelerations, solve = (getattr(library(), name) for name in _FUNCTIONS)
+    positions, velocities, actuation, accelerations, solve = functions()
 
     def native(y, p, m, out):
         head, own = carray(pointer(y), (2,)), carray(pointer(p), (12,))

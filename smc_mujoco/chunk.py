@@ -9,6 +9,7 @@ import numpy as np
 from smc_mujoco import assembly, callback, harness, native, plain, row, sensors
 from smc_mujoco.channels import COLUMNS, channels
 from smc_mujoco.component import Component
+from smc_mujoco.guarded import retold
 from smc_mujoco.plant import Coupled, Plant, array
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.sensors import Encoder
@@ -91,7 +92,6 @@ class Chunk:
         self.errors: dict[int, str] = {}
         self.calls = 0  # of the callback that each simulation has had
         self.spare = mujoco.MjData(self.model)
-        self.retold = False  # whether a failure was run again for its words
         self.set_parameters(0, range(len(scenarios)))
         if self.model.nhistory:
             self.fill_histories()
@@ -177,8 +177,9 @@ class Chunk:
     def reason(self, i: int, failure: int) -> str:
         """What went wrong in simulation i."""
         scenario = self.scenarios[i]
-        if row.NOT_FINITE <= failure < row.INTERRUPTED and not self.retold:
-            self.retold = True  # Python knows what was raised, and where; it is slow, so one run a chunk tells for all
+        if row.NOT_FINITE <= failure < row.INTERRUPTED:
+            if told := retold(scenario, self.rows[i]):
+                return told
             if told := plain.run(scenario).failure:
                 return told.rpartition(", at t = ")[0]
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"

@@ -1,19 +1,27 @@
 """What several fields of a scenario must satisfy together; each failure is one sentence."""
 
 import dataclasses
+import math
+import warnings
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from smc_mujoco import given
-from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.actuators import DCMotor
+from smc_mujoco.errors import ScenarioError, ScenarioWarning, shown, users_frame
 from smc_mujoco.frozen import frozen
 from smc_mujoco.law import fits
 from smc_mujoco.own_channels import RECORDED, within
+from smc_mujoco.plant import EFFORT
 from smc_mujoco.signals import Impulse, OrnsteinUhlenbeck
 
 if TYPE_CHECKING:
     from smc_mujoco.scenario import Scenario
 
 MOST_STEPS = 100_000_000  # per run: minutes of computing
+MOST_TURNS = 3.0 * math.pi  # rad: chosen, as swing-ups overshoot within a turn and a half, and 10 may be degrees
+MOST_DEGREES = 720.0  # nobody means degrees beyond
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
 
@@ -25,6 +33,9 @@ def check(scenario: "Scenario") -> None:
     within(scenario.plant.name, scenario.plant.ranges, scenario.x0)
     check_names(scenario)
     check_mechanism(scenario)
+    if not RECORDED.get():
+        warn_of_degrees(scenario)
+        warn_of_weak_motors(scenario)
 
 
 def check_clock(s: "Scenario") -> None:
@@ -52,8 +63,10 @@ def check_clock(s: "Scenario") -> None:
 def check_signals(s: "Scenario") -> None:
     """Signals are of the kind that their place asks for, and no shorter than a step."""
     for d in s.disturbance:
-        if isinstance(d, OrnsteinUhlenbeck) and s.duration / d.dt > MOST_STEPS:
-            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give duration / 1e8 or more")
+        most = max(MOST_STEPS, s.work)  # knots in all channels
+        if isinstance(d, OrnsteinUhlenbeck) and s.plant.n * s.duration / d.dt > most:
+            least = s.plant.n * s.duration / most
+            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {least:.3g} s or more")
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
@@ -105,3 +118,36 @@ def check_mechanism(s: "Scenario") -> None:
     for step in (0, s.samples * s.steps):
         given.check_numbers(s.plant, s.mechanism, frozen(s.factors(step)))
         given.contact_fits(s.contact, s.plant, s.factors(step))
+
+
+def warn_of_degrees(s: "Scenario") -> None:
+    """Warn of a start, or of a reference's amplitude, of several turns: a ramp or a series may go on for as many."""
+    amplitude = s.reference.parameters().get("amplitude", 0.0)
+    for what, values in (("x0", s.x0), ("the reference's amplitude", (amplitude,) * s.plant.driven)):
+        for unit, value in zip(s.plant.units, values, strict=False):
+            if unit == "rad" and MOST_TURNS < abs(value) <= MOST_DEGREES:
+                warnings.warn(
+                    f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns: if it is {value:g} degrees, give "
+                    f"math.radians({value:g})",
+                    ScenarioWarning,
+                    users_frame(),
+                )
+                return
+
+
+def warn_of_weak_motors(s: "Scenario") -> None:
+    """Warn of a DC motor that cannot hold a joint where it starts, though a force within the law's bound could."""
+    p, still = s.plant.values({}), np.zeros(s.plant.n)
+    for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
+        for i, limit in enumerate(s.limits):
+            with np.errstate(all="ignore"):
+                f, g = s.plant.nominal(np.array(s.x0), still, i, p)
+            need = abs(f) / abs(g) if g else 0.0
+            if motor.stall < need <= limit:
+                warnings.warn(
+                    f"DCMotor gives at most {motor.stall:.3g} {EFFORT[s.plant.units[i]]} at rest, and channel {i} of "
+                    f"{s.plant.name} needs {need:.3g} to stand where it starts: give it more gear, voltage or current",
+                    ScenarioWarning,
+                    users_frame(),
+                )
+                return

@@ -18,6 +18,10 @@ class ScenarioError(ValueError):
     """Bad input. The message is one sentence: the thing, its value, the cure."""
 
 
+class ScenarioWarning(UserWarning):
+    """A scenario that can be run, and is hardly what its author means. The message is one sentence, as an error's."""
+
+
 def shown(value: object) -> str:
     """A value on one line, cut where it is long; its class in <> where its repr fails."""
     try:
@@ -51,6 +55,12 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     wanted = name.casefold()
     close = difflib.get_close_matches(wanted, list(plain), n=1)
     return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
+
+
+def one_line(text: str, most: int = 200) -> str:
+    """Text on one line: a ? for each character that cannot be printed, cut where it is longer than `most`."""
+    text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * most].split()))
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:

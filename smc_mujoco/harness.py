@@ -74,7 +74,7 @@ def _measure(base, row, table, sensors, k):
     for i in range(n):
         x, v = sensors[table[i, column.X_SENSOR]], sensors[table[i, column.V_SENSOR]]
         x, v = _read(row, i, x, v, j, table[i, column.TIP] >= 0)
-        row[given], row[given + 1], row[given + 2] = row[slot.PERIOD], x, v
+        row[at - 2], row[given], row[given + 1], row[given + 2] = i, row[slot.PERIOD], x, v
         memory = _at(base, row, slot.ESTIMATOR_MEMORY) + 8 * i * int(row[slot.ESTIMATOR_STRIDE])
         gains = _at(base, row, slot.ESTIMATOR_GAINS)
         if call(int(row[slot.ESTIMATOR]), base + 8 * given, gains, memory, base + 8 * out) != 0:

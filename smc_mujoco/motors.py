@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -25,36 +24,36 @@ class Motor(NamedTuple):
     replaced: tuple[int, ...]
 
 
-def motor_of(file: Path, model: mujoco.MjModel, joint: str, wanted: str | None, ideal: bool) -> Motor:
+def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, ideal: bool) -> Motor:
     """The motor that drives a joint.
 
     Raises:
       ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
     """
-    number, name = model.joint(joint).id, file.name
+    number = model.joint(joint).id
     held = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
     own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
     own = [i for i in own if model.actuator_trnid[i, 0] == number]
     if ideal:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
-        return Motor(_limit(f"joint {joint!r} of {name} takes", "widen its actuatorfrcrange", *held), tuple(own))
+        return Motor(_limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *held), tuple(own))
     if wanted is not None:
         every = {model.actuator(i).name: i for i in range(model.nactuator) if model.actuator(i).name}
-        chosen = pick(file, "actuator", wanted, every)
+        chosen = pick(label, "actuator", wanted, every)
         if chosen not in own:
-            raise ScenarioError(f"actuator {wanted!r} of {name} does not drive joint {joint!r} alone: {CURE}")
+            raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
         own = [chosen]
     if not own:
-        raise ScenarioError(f"no actuator of {name} drives joint {joint!r} alone: {CURE}")
+        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
     names = [model.actuator(i).name or f"number {i}" for i in own]
     if len(own) > 1:
         raise ScenarioError(
-            f"joint {joint!r} of {name} has the actuators {', '.join(names)}: name one with smc.Channel(actuator=...)"
+            f"joint {joint!r} of {label} has the actuators {', '.join(names)}: name one with smc.Channel(actuator=...)"
         )
     if why := _no_motor(model, own[0]):
         raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
-    gives = f"actuator {names[0]!r} gives joint {joint!r} of {name}"
+    gives = f"actuator {names[0]!r} gives joint {joint!r} of {label}"
     return Motor(_limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
 
 
@@ -102,7 +101,7 @@ def put(spec: mujoco.MjSpec, motors: Sequence[tuple[str, Motor]]) -> None:
         if i in replaced:
             spec.delete(actuator)
         else:
-            actuator.name = f"{PASSIVE}idle:{actuator.name or i}"
+            actuator.name = f"{PASSIVE}smc:{i}"  # no joint is called so
     for joint, motor in motors:  # named by joints, as actuators' names may be anything
         made = spec.add_actuator(name=f"u:{joint}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         made.set_to_motor()

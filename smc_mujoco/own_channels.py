@@ -5,13 +5,11 @@ import contextvars
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 
 import mujoco
 
 from smc_mujoco.errors import ScenarioError, find, number, shown
 from smc_mujoco.mjcf import pick
-from smc_mujoco.part import ROTOR
 
 BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
@@ -70,25 +68,23 @@ def channel(joint: object, value: object) -> Channel:
     return dataclasses.replace(made, **starts)
 
 
-def check(file: Path, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
+def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
     """Raise ScenarioError for joints that are not there or cannot be channels, and for flags that forbid control."""
     joints = [*(joint for joint, _ in asked), *partners]
     there = {model.joint(i).name: i for i in range(model.njnt) if model.joint(i).name}
     for joint in joints:
-        kind = mujoco.mjtJoint(model.jnt_type[pick(file, "joint", joint, there)])
+        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, there)])
         if kind not in SIMPLE:
             raise ScenarioError(
-                f"joint {joint!r} of {file.name} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
+                f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
             )
-        if joint.startswith(ROTOR):
-            raise ScenarioError(f"joint {joint!r} of {file.name} is named as a drive's rotor: give it another name")
         if joints.count(joint) > 1:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
     if partners and len(partners) < len(asked):
         bare = next(joint for joint, channel in asked if channel.partner is None)
         raise ScenarioError(f"channel {bare!r} has no partner and others have: give each one, or none")
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION.value:
-        raise ScenarioError(f'{file.name} has <flag actuation="disable"/>, so that nothing drives it: take it out')
+        raise ScenarioError(f'{label} has <flag actuation="disable"/>, so that nothing drives it: take it out')
 
 
 def starts(

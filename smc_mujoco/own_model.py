@@ -11,12 +11,14 @@ the scenario's. Disturbances act on the joints themselves. Parameters are m, kg,
 scales all masses and inertias, and grav, m/s^2.
 """
 
+import base64
 import dataclasses
+import functools
 import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,11 +26,17 @@ import numpy as np
 from smc_mujoco import errors, mjcf
 from smc_mujoco.believed import Believed
 from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.mjcf import Source
+from smc_mujoco.model_check import check_model
 from smc_mujoco.motors import MOTOR, Motor, motor_of, put
-from smc_mujoco.own_channels import SIMPLE, Channel, check, given, ranges, starts
+from smc_mujoco.own_channels import RECORDED, SIMPLE, Channel, check, given, ranges, starts
 from smc_mujoco.part import ROTOR, START
 from smc_mujoco.plant import DIRECTLY, Field, Plant, catalogue
 
+if TYPE_CHECKING:
+    from dm_control.mjcf import RootElement
+
+LONGEST = 86_400.0  # s, of a timeout
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT = "give a law without a model"
 CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
@@ -46,8 +54,7 @@ class Drive(NamedTuple):
 class OwnModel:
     """What builds the mechanism: n is not looked at, as the channels say it."""
 
-    path: str
-    sha256: str
+    source: Source
     keyframe: str | None
     channels: tuple[tuple[str, Channel], ...]
     drives: tuple[Drive, ...]
@@ -58,11 +65,9 @@ class OwnModel:
         Raises:
           ScenarioError: the file is gone, or another than it was.
         """
-        spec = mjcf.read(Path(self.path))
-        if mjcf.digest(Path(self.path)) != self.sha256:
-            raise ScenarioError(f"{self.path}, or a file that it names, has changed: call smc.plant_from again")
-        for sensor in list(spec.sensors):
-            spec.delete(sensor)
+        spec = self.source.read()
+        for named in [*spec.sensors, *spec.tuples]:  # tuples may name sensors and motors that go
+            spec.delete(named)
         put(spec, [(drive.joint, drive.motor) for drive in self.drives])
         partners = [drive.partner for drive in self.drives if drive.partner]
         for joint in [*(drive.joint for drive in self.drives), *partners]:
@@ -80,7 +85,15 @@ class OwnModel:
     def about(self) -> dict:
         """All that plant_from needs to make it again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
-        return {"path": self.path, "sha256": self.sha256, "keyframe": self.keyframe, "channels": channels}
+        data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
+        return data if self.source.path else data | _inside(self.source)
+
+
+@functools.lru_cache(maxsize=32)
+def _inside(source: Source) -> dict:
+    """A model's text and the files that it names, as JSON holds them."""
+    assets = {name: base64.b64encode(content).decode() for name, content in source.assets}
+    return {"text": source.text, "assets": assets}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,46 +113,51 @@ class OwnFields:
 
 
 def plant_from(
-    path: str | os.PathLike,
+    path: "str | os.PathLike | mujoco.MjSpec | RootElement",
     channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
     name: str | None = None,
     keyframe: str | None = None,
+    assets: Mapping[str, bytes] | None = None,
+    timeout: float = 20.0,
 ) -> Plant:
-    """The MJCF file at `path` as a plant.
+    """An MJCF model as a plant.
 
     Args:
+      path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
       channels: joint -> Channel, or a dict of its fields, or None for what is found; or joints' names alone. Their
         order is that of the plant's channels.
-      name: of the plant; default: the file's.
+      name: of the plant; default: the file's, or the model's.
       keyframe: one of the model's, by name, at whose positions runs start, at rest but for the scenario's v0; default:
         the model's initial positions.
+      assets: name -> content of the files that a text names.
+      timeout: s that MuJoCo may take to compile the model, which is tried in a process of its own first.
 
     Raises:
-      ScenarioError: a file that cannot be read, a joint, actuator or keyframe that is not there or does not serve, or
-        a start that is asked for and outside its joint's range.
+      ScenarioError: a model that cannot be read, that ends MuJoCo or takes more than its time or 4 GiB; numbers in it
+        that are NaN, infinite or beyond 1e15; a joint, actuator or keyframe that is not there or does not serve; or a
+        start that is asked for and outside its joint's range.
 
     Laws may have model="nominal" where all joints that move with the channels are channels or partners, and no equality
     constraint holds any; `plant.unmodelled` says why not. Films show the model plainly, in its own colours.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise ScenarioError(f"path is {shown(path)}: give the path of an MJCF file (.xml)")
-    if str(path).lstrip().startswith("<"):
-        raise ScenarioError(f"path is the text of a model, {shown(path)}: write it into a file and give its path")
-    file = Path(os.path.abspath(path))
-    model = mjcf.compiled(file, mjcf.read(file))
+    source = mjcf.source(path, assets)
+    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
+    label, model = source.label, source.compiled(source.read())
+    if not RECORDED.get():
+        check_model(label, model)
     asked = given(channels)
     partners = [channel.partner for _, channel in asked if channel.partner is not None]
-    check(file, model, asked, partners)
+    check(label, model, asked, partners)
     if keyframe is not None:
-        mjcf.pick(file, "keyframe", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name})
-    drives = tuple(Drive(joint, motor_of(file, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
-    build = OwnModel(str(file), mjcf.digest(file), keyframe, asked, drives)
+        mjcf.pick(label, "keyframe", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name})
+    drives = tuple(Drive(joint, motor_of(label, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
+    build = OwnModel(source, keyframe, asked, drives)
     joints = [*(joint for joint, _ in asked), *partners]
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = OwnFields(mass, gravity), tuple(drive.motor.limit for drive in drives)
     units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not, called = missing(model, joints, drives), named(name, file)
+    why_not, called = missing(model, joints, drives), named(name, label)
     return Plant(
         name=called,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -162,10 +180,13 @@ def plant_from(
     )
 
 
-def named(name: str | None, file: Path) -> str:
+def named(name: str | None, label: str) -> str:
     """The plant's name; none of the library's, as laws, gains and conditions go by them."""
     if name is None:
-        return file.stem if file.stem not in catalogue() else file.name
+        name = label.removesuffix(".xml")
+        name = name if name not in catalogue() else label
+    if RECORDED.get():
+        return name
     if errors.name("name", name) in catalogue():
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     return name
@@ -233,9 +254,15 @@ def restored(data: Mapping, name: str) -> Plant:
     Raises:
       ScenarioError: the file is gone, or another than it was.
     """
-    path = Path(data["path"])
-    if not path.is_file():
-        raise ScenarioError(f"its model {path} is not there: put it back")
-    if mjcf.digest(path) != data["sha256"]:
-        raise ScenarioError(f"its model {path}, or a file that it names, is another than in the run: put that one back")
-    return plant_from(path, data["channels"], name=name, keyframe=data["keyframe"])
+    if "text" in data:
+        model = data["text"]
+        assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
+    else:
+        model, assets = Path(data["path"]), None
+        if not model.is_file():
+            raise ScenarioError(f"its model {model} is not there: put it back")
+        if mjcf.digest(model) != data["sha256"]:
+            raise ScenarioError(
+                f"its model {model}, or a file that it names, is another than in the run: put that one back"
+            )
+    return plant_from(model, data["channels"], name=name, keyframe=data["keyframe"], assets=assets)

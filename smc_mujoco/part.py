@@ -18,6 +18,7 @@ import numpy as np
 from smc_mujoco.plant import Field
 
 PASSIVE, ROTOR = "passive:", "rotor:"
+PLAY = "play:"  # the tendon of length rotor - joint
 START = "smc:start"  # a keyframe in which the joints without a channel start
 
 

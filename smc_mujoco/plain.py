@@ -6,7 +6,6 @@ microseconds.
 """
 
 import math
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,7 +14,7 @@ from smc_mujoco import assembly, noise, sensors
 from smc_mujoco import channels as column
 from smc_mujoco.callback import installed
 from smc_mujoco.estimators import Reading
-from smc_mujoco.guarded import Failure, estimated, guarded, named, numbers, signalled, surfaced
+from smc_mujoco.guarded import Failure, as_written, estimated, guarded, named, nominal, numbers, signalled, surfaced
 from smc_mujoco.harness import HUGE, LEFT, WORLD
 from smc_mujoco.law import Measurement
 from smc_mujoco.plant import Coupled, Values
@@ -42,11 +41,6 @@ def run(scenario: Scenario) -> Trace:
             if loop.failure:
                 break
     return from_log(scenario, loop.log, loop.failed_step, loop.failure)
-
-
-def as_written(function: Any) -> Any:
-    """What `remade` makes of compiled functions here: what they were."""
-    return function
 
 
 class Loop:
@@ -195,19 +189,13 @@ class Loop:
             self.latest[i] = np.clip(u[i], -limits[i], limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < HUGE):
-                raise Failure(f"law {law.name!r} returned u = {u[i]}, s = {s[i]} in channel {i}")
+                raise Failure(f"law {law.name!r} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
             u[i] = self.latest[i]
         return u, s
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int) -> tuple[float, float]:
         """Nominal f and g of channel i."""
-        plant = self.scenario.plant
-        try:
-            if isinstance(plant.nominal, Coupled):
-                return plant.nominal(x, v, i, self.nominal, self.latest)
-            return plant.nominal(x, v, i, self.nominal)
-        except Exception as error:
-            raise Failure(f"the nominal model of {plant.name} raised {type(error).__name__} ({error})") from error
+        return nominal(self.scenario.plant, x, v, i, self.nominal, self.latest)
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Put the disturbances of time t on the bodies; their generalised forces, (n,)."""

@@ -67,6 +67,10 @@ class Scenario:
 
     Raises:
       ScenarioError: for anything out of its range, in one sentence.
+
+    Warns:
+      ScenarioWarning: a hinge's start or reference of more than one and a half turns, up to 720 rad, which may be meant
+        in degrees; a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
     """
 
     plant: Plant

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco import record
-from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.errors import ScenarioError, find, one_line, shown
 from smc_mujoco.files import replacing
 from smc_mujoco.plant import EFFORT
 from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
 
 ARRAYS = ("t", *LOGGED)
+LONGEST_FAILURE = 500  # characters; chosen
 NEWER = ("force", "reaction")  # which the oldest files lack: they hold ideal runs
 
 
@@ -160,13 +161,21 @@ def _trace(fields: dict) -> Trace:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """The Trace of a log (LOGS, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure."""
+    """The Trace of a log (LOGS, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure.
+
+    What it holds before its end is finite: a sample that is not is a failure, and the end.
+    """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
+    end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
+    if not (finite := np.isfinite(log[:, :end]).all(2)).all():
+        k = int(np.argmin(finite.all(0)))
+        name = LOGGED[int(np.argmin(finite[:, k]))]
+        failed_step, failure = k * scenario.steps, f"{name} became NaN or inf"
     if failure is not None:
         log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
         diverged_at = failed_step * scenario.physics_step
-        failure = f"{failure}, at t = {diverged_at:.6g} s"
+        failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
     arrays = dict(zip(LOGGED, log, strict=True))
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 

@@ -18,7 +18,8 @@ CATALOGUES = ("laws", "surfaces", "plants", "estimators")
 
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
-    {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook"},
+    {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook", "mjcf_trial"},
+    {"libmujoco"},
     {"files", "layout", "mjcf", "compiled", "component", "conditions", "optional"},
     {"estimators", "signals", "plant"},
     {"law", "series", "references", "part", "mechanism"},
@@ -30,6 +31,7 @@ CORE = (
         "believed",
         "motors",
         "own_channels",
+        "model_check",
         "friction",
         "actuators",
         "backlash",

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 
 import smc_mujoco as smc
 
-pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.GainWarning")  # gains are meant to be wild
+pytestmark = [  # gains, starts and motors are meant to be wild
+    pytest.mark.filterwarnings("ignore::smc_mujoco.GainWarning"),
+    pytest.mark.filterwarnings("ignore::smc_mujoco.ScenarioWarning"),
+]
 
 MOST = 400  # physics steps times channels of a run that is played
 EXAMPLES = int(os.environ.get("FUZZ", "0"))  # FUZZ=5000 pytest tests/test_fuzz.py: as many, new ones each time

@@ -15,6 +15,7 @@ from episodes import dm_control_suite, driven_by_dm, run_of
 import smc_mujoco as smc
 from smc_mujoco import assembly, consistency, design, identity, linear, own_channels, paper, plain, setting, tasks
 from smc_mujoco.believed import Believed, prepared
+from smc_mujoco.c import build
 from smc_mujoco.frozen import frozen
 from smc_mujoco.own_model import OwnModel
 from smc_mujoco.scene import slug
@@ -109,7 +110,7 @@ def joints_of(plant: smc.Plant, raw: mujoco.MjModel) -> list:
 def read(plant: smc.Plant) -> mujoco.MjModel:
     """The model as its file has it."""
     assert isinstance(plant.build, OwnModel)
-    return mujoco.MjModel.from_xml_path(plant.build.path)
+    return mujoco.MjModel.from_xml_path(plant.build.source.path)
 
 
 # it moves as in MuJoCo
@@ -753,7 +754,7 @@ WRONG = {
             "channels": {"rotor:a": smc.Channel(motor=True)},
             "bodies": '<body><joint name="rotor:a"/><geom size=".1 .1" mass="1"/></body>',
         },
-        "joint 'rotor:a' of arm.xml is named as a drive's rotor: give it another name",
+        "arm.xml has a joint 'rotor:a', and names that begin with 'rotor:' are smc_mujoco's own: give it another",
     ),
     "no keyframe": ({"keyframe": "home"}, "unknown keyframe of arm.xml 'home': none has a name there, so give it one"),
     "no actuator": (
@@ -813,10 +814,6 @@ def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
     for path in ("a\0.xml", "a" * 5000, tmp_path):
         with pytest.raises(smc.ScenarioError, match=r"no model at .*: give the path of an MJCF file"):
             smc.plant_from(path, ["elbow"])
-    with pytest.raises(
-        smc.ScenarioError, match=r"path is the text of a model, '\\n<mujoco>.{,60}: write it into a file"
-    ):
-        smc.plant_from(LINKS, ["elbow"])
     (tmp_path / "bare.xml").write_text("<mujoco/>")
     with pytest.raises(
         smc.ScenarioError, match=r"unknown joint of bare.xml 'elbow': none has a name there, so give it"
@@ -904,6 +901,180 @@ def test_part_of_a_file_name_is_short_and_no_path(name):
     assert Path(part).name == part
     assert not part.startswith(".")
     assert len({slug(name), slug(name + "a"), slug(name + "b")}) == 3
+
+
+# models that harm
+
+HARM = {  # what the model has, and words of the sentence
+    "attaches itself": (
+        '<asset><model name="m" file="arm.xml"/></asset>'
+        '<worldbody><attach model="m" body="upper" prefix="x"/></worldbody>',
+        "arm.xml ends MuJoCo with SIG.*attaches itself: mend the model",
+    ),
+    "slow": (
+        '<size nkey="2000000000"/>',
+        "arm.xml takes MuJoCo more than (3 s to compile|4 GiB of memory): make it sm",
+    ),
+    "large": (
+        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+        "arm.xml .*more than 4 GiB of memory: m",
+    ),
+    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
+    "nan": (
+        '<default><joint damping="nan"/></default>',
+        r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): mend the file",
+    ),
+    "mass": (
+        '<default><geom density="1e300"/></default>'
+        '<worldbody><body name="b"><joint/><geom size=".1 .1"/></body></worldbody>',
+        r"body_inertia of arm.xml is \S*e.29\d at body 'b': give finite numbers of at most 1e.15 in its MJCF",
+    ),
+    "stiffness": ('<default><joint stiffness="1e20"/></default>', "jnt_stiffness of arm.xml is 1e.20 at joint 'shoul"),
+    "text": (
+        '<custom><text name="smc:direct" data="x"/></custom>',
+        "arm.xml has a text 'smc:direct', and names that b",
+    ),
+    "body": ('<worldbody><body name="rotor:elbow"/></worldbody>', "a body 'rotor:elbow', and names that begin with"),
+    "tendon": (
+        '<tendon><fixed name="play:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
+        "arm.xml has a tendon 'play:elbow', and names that begin with 'play:' are smc_mujoco's own: give it another",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    rest, words = HARM[name]
+    with pytest.raises(smc.ScenarioError, match=words) as caught:
+        arm(rest=ACTUATED + rest, timeout=3.0 if name == "slow" else 20.0)
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["arm.xml"]  # and no log of MuJoCo's
+
+
+def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
+    ran, timed = [], build.timed
+    monkeypatch.setattr(build, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k))
+    body = f'<body name="{ran!r}tried"/>'
+    first = arm(bodies=body)
+    assert (arm(bodies=body), len(ran)) == (first, 1)
+    arm(bodies=BALL + body)
+    assert len(ran) == 2
+
+
+def test_numbers_that_may_be_infinite_are_ranges_alone(arm):
+    rest = '<actuator><motor joint="shoulder" ctrlrange="-inf inf" ctrllimited="true"/></actuator>'
+    assert arm(["shoulder"], rest).limits == ()
+
+
+def test_names_that_refer_to_motors_and_sensors_do_no_harm(arm):
+    named = '<motor name="passive:elbow" joint="shoulder"/><motor joint="shoulder"/><motor name="1" joint="shoulder"/>'
+    rest = f"""<actuator>{named}<motor name="b" joint="elbow"/></actuator>
+      <sensor><jointpos name="x:elbow" joint="shoulder"/></sensor>
+      <custom><tuple name="t"><element objtype="actuator" objname="b"/><element objtype="sensor" objname="x:elbow"/>
+      </tuple></custom>"""
+    parts = {"friction": smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.05), "actuator": smc.Backlash(0.01)}
+    trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest), law="none", duration=0.05, **parts))
+    assert trace.failure is None
+
+
+# models that are no files
+
+CORNERS = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
+FACES = [f"f {a}" for a in ("1 2 3", "2 3 4", "5 6 7", "6 7 8", "1 2 5", "2 5 6", "3 4 7", "4 7 8", "1 3 5", "2 4 6")]
+MESHED = """
+<mujoco model="meshed">
+  <compiler meshdir="meshes"/>
+  <asset><mesh name="c" file="c.obj"/></asset>
+  <worldbody>
+    <body name="b" pos="0.33333333333333331 0 1">
+      <joint name="j" axis="0 1 0" damping="0.12345678901234567"/><geom type="mesh" mesh="c" density="432.10987654321"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="m" joint="j" gear="7.1234567890123"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def meshed(tmp_path):
+    """The file of a model with a mesh, and the mesh's content."""
+    (tmp_path / "meshes").mkdir()
+    content = "\n".join([*CORNERS, *FACES]).encode()
+    (tmp_path / "meshes" / "c.obj").write_bytes(content)
+    (tmp_path / "meshed.xml").write_text(MESHED)
+    return tmp_path / "meshed.xml", content
+
+
+def of_pymjcf(path, content):
+    return pytest.importorskip("dm_control.mjcf").from_path(str(path)), None
+
+
+FORMS = {  # of one model
+    "text": lambda path, content: (MESHED, {"c.obj": content}),
+    "spec": lambda path, content: (mujoco.MjSpec.from_file(str(path)), None),
+    "spec with assets": lambda path, content: (mujoco.MjSpec.from_string(MESHED, assets={"c.obj": content}), None),
+    "pymjcf": of_pymjcf,
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run(meshed, tmp_path, form):
+    path, content = meshed
+    model, assets = FORMS[form](path, content)
+    channels = {"j": smc.Channel(x0=0.3)}
+    plant, from_file = smc.plant_from(model, channels, assets=assets), smc.plant_from(path, channels)
+    assert plant.name == "meshed"
+    assert pickle.loads(pickle.dumps(plant)) == plant
+    fields = {"law": "super_twisting", "duration": 0.2, "actuator": smc.Backlash(0.01), "model": "nominal"}
+    scenario = smc.Scenario(plant=plant, **fields)
+    trace, same = smc.run(scenario), smc.run(smc.Scenario(plant=from_file, **fields))
+    np.testing.assert_allclose(trace.x, same.x, atol=1e-9)
+    assert np.ptp(trace.x) > 0.01
+    path.unlink()
+    (path.parent / "meshes" / "c.obj").unlink()
+    again = smc.load(trace.save(tmp_path / "run.npz"))
+    assert again.scenario == trace.scenario
+    assert identity.key(again.scenario) == identity.key(scenario)
+    np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
+    other = MESHED.replace("7.1234567890123", "7.1234567890124")
+    changed = smc.plant_from(other, channels, assets={"c.obj": content})
+    assert identity.key(dataclasses.replace(scenario, plant=changed)) != identity.key(scenario)
+
+
+def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
+    spec = mujoco.MjSpec.from_file(str(meshed[0]))
+    plant = smc.plant_from(spec, ["j"])
+    spec.joint("j").damping = [9.0, 0.0, 0.0]
+    assert plant.load().dof_damping[0] == 0.12345678901234567
+    assert plant.limits == smc.plant_from(meshed[0], ["j"]).limits
+    assert smc.plant_from(spec, ["j"]).load().dof_damping[0] == 9.0
+    assert "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()  # for others MuJoCo writes as it did
+
+
+def test_a_text_with_includes_is_read_with_them(tmp_path):
+    text = LINKS.format(rest='<include file="motors.xml"/>', bodies="")
+    plant = smc.plant_from(text, ["elbow"], assets={"motors.xml": f"<mujoco>{ACTUATED}</mujoco>".encode()})
+    assert (plant.name, plant.driven) == ("model", 1)
+    assert smc.run(smc.Scenario(plant=plant, law="none", duration=0.01)).failure is None
+
+
+LOST = {
+    "no file": ((MESHED, None), r"the model names the file 'c.obj', and its text lies in no folder: give assets="),
+    "no bytes": ((MESHED, {"c.obj": "text"}), r"assets is {'c.obj': 'text'}: give names of files with their contents"),
+    "assets of a file": (("arm.xml", {}), "assets is {}, and the model is no text: leave them out"),
+    "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): mend the file"),
+    "unnamed": (("<mujoco/>", None), "unknown joint of model.xml 'j': none has a name there"),
+    "empty spec": ((mujoco.MjSpec(), None), "unknown joint of .*xml 'j': none has a name there"),
+    "number": ((3, None), r"path is 3: give the path of an MJCF file \(.xml\), its text, an MjSpec or a mjcf.Root"),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_what_a_model_lacks_that_is_no_file_is_one_sentence(name):
+    (model, assets), words = LOST[name]
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.plant_from(model, ["j"], assets=assets)
 
 
 # kept

@@ -22,6 +22,7 @@ runner = importlib.import_module("smc_mujoco.run")  # smc.run is the function
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
 LUGRE = smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.ScenarioWarning")  # motors of any strength
 MOTOR = smc.DCMotor()
 
 

@@ -418,23 +418,160 @@ def sour_law(y, gains, memory):
     return 0.0, y.f
 
 
-@pytest.mark.parametrize("chunks", [1, 4])
-def test_of_many_failing_runs_one_a_chunk_is_run_again(chunks, monkeypatch):
-    many = [scenario(made(sour_law), seed=seed) for seed in range(8)]
-    told = []
+def none_law(y, gains, memory):
+    """Returns NaN, from 0/0 that compiled code does not raise."""
+    return math.nan if y.t > 0.0045 else 0.0, y.f
 
-    def counted(one):
-        told.append(one.seed)
-        return again(one)
 
-    again = plain.run
-    monkeypatch.setattr(plain, "run", counted)
-    monkeypatch.setattr(RUN, "CHUNK_BYTES", 8 * RUN._bytes(many[0]) // chunks)
-    traces = smc.run(many, threads=1)
-    assert len(told) == chunks
-    assert {trace.diverged_at for trace in traces} == {0.005}
-    assert all("law 'sour_law' raised" in trace.failure for trace in traces)
-    assert sum("ValueError (sour)" in trace.failure for trace in traces) >= chunks
+def square_root(y, gains, memory):
+    """Leaves a function's domain, which only Python minds."""
+    return math.sqrt(0.0045 - y.t), y.f
+
+
+def exits(y, gains, memory):
+    """Ends the process, if it could."""
+    if y.t > 0.0045:
+        raise SystemExit(3)
+    return 0.0, 0.0
+
+
+class Speechless(Exception):
+    """Has no text."""
+
+    def __str__(self):
+        raise RuntimeError("none")
+
+
+def speechless(y, gains, memory):
+    """Raises what cannot be shown."""
+    if y.t > 0.0045:
+        raise Speechless
+    return 0.0, 0.0
+
+
+def unprintable(y, gains, memory):
+    """Raises what spoils a terminal and a table."""
+    if y.t > 0.0045:
+        raise ValueError("\x1b[31m\x00\ud800" + "long " * 200_000)
+    return 0.0, 0.0
+
+
+def third_call(y, gains, memory):
+    """Changes its memory before it raises."""
+    memory[0] += 1.0
+    if memory[0] == 6.0:
+        raise ValueError("sixth")
+    return 0.0, 0.0
+
+
+SAYS = {
+    sour_law: "law 'sour_law' raised ValueError (sour) in channel 0, at t = 0.005 s",
+    none_law: "law 'none_law' returned u = nan, s = {s} in channel 0, at t = 0.005 s",
+    square_root: "law 'square_root' raised ValueError (math domain error) in channel 0, at t = 0.005 s",
+    exits: "law 'exits' raised SystemExit (3) in channel 0, at t = 0.005 s",
+    speechless: "law 'speechless' raised Speechless (its text cannot be shown) in channel 0, at t = 0.005 s",
+    unprintable: f"law 'unprintable' raised ValueError (?[31m??{('long ' * 99)[:190]}...) in channel 0, at t = 0.005 s",
+    third_call: "law 'third_call' raised ValueError (sixth) in channel 0, at t = 0.005 s",
+}
+
+
+@pytest.mark.parametrize("function", SAYS, ids=lambda function: function.__name__)
+def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
+    many = [scenario(made(function), seed=seed, noise=smc.Noise(0.1)) for seed in range(3)]
+    beside = plainly([scenario(), *many, scenario()])
+    said = [trace.failure for trace in beside[1:-1]]
+    assert said == [plainly(one).failure for one in many] == [plain.run(one).failure for one in many]
+    assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
+    assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
+
+
+def test_a_law_of_python_that_exits_fails_its_own_run_alone():
+    def leaves(y, gains, memory):
+        json.dumps(y.t)  # not for numba
+        raise SystemExit(3)
+
+    first, second = plainly([scenario(made(leaves)), scenario()])
+    assert first.failure == "law 'leaves' raised SystemExit (3) in channel 0, at t = 0 s"
+    assert second.failure is None
+
+
+def sour_estimator(y, gains, memory):
+    """Raises in one channel."""
+    if y.x > 2.5:
+        raise ValueError("sour")
+    return y.v
+
+
+def sour_surface(y, gains, memory):
+    """Raises in one channel."""
+    if y.e > 2.5:
+        raise ValueError("sour")
+    return y.de, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class SourNoise(smc.Signal):
+    """A disturbance of each channel that raises in one."""
+
+    start: float = 0.0095
+    memory = 1
+    random = True
+
+    @staticmethod
+    def value(t, p, memory, seed, channel, stream):
+        """Raises, having counted nothing."""
+        if t > p.start and channel == 1:
+            raise ValueError("sour")
+        memory[0] = t
+        return 0.0, 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"velocity": smc.estimator_function(sour_estimator)()}, "estimator 'sour_estimator' raised ValueError (sour)"),
+        ({"surface": smc.surface_function(sour_surface)()}, "surface 'sour_surface' raised ValueError (sour)"),
+        ({"reference": Sour()}, "Sour raised ValueError (sour)"),
+        ({"disturbance": [smc.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
+    ],
+    ids=["estimator", "surface", "reference", "disturbance"],
+)
+def test_every_part_that_raises_is_named_without_a_second_run(fields, words, monkeypatch):
+    one = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
+    again = plain.run(one).failure
+    monkeypatch.setattr(plain, "run", None)
+    trace = smc.run([scenario(plant=THREE), one])[1]
+    assert trace.failure.startswith(words)
+    assert trace.failure == again
+
+
+@pytest.mark.parametrize("run", [smc.run, plain.run])
+def test_a_trace_is_finite_up_to_its_end_in_all_its_signals(run):
+    @dataclasses.dataclass(frozen=True)
+    class Unbounded(smc.Signal):
+        @staticmethod
+        def value(t, p):
+            return math.inf if t > 0.0095 else 0.0, 0.0, 0.0
+
+    trace = run(scenario("none", reference=Unbounded()))
+    assert trace.failure == "r became NaN or inf, at t = 0.01 s"
+    assert trace.diverged_at == pytest.approx(0.01)
+    for name in (*ARRAYS[1:], "force", "reaction"):
+        assert np.isfinite(getattr(trace, name)[:10]).all()
+        assert np.isnan(getattr(trace, name)[10:]).all()
+
+
+def test_a_motor_of_next_to_no_resistance_is_refused():
+    with pytest.raises(smc.ScenarioError, match=r"resistance is 4\.94066e-324: give at least 1e-09"):
+        smc.DCMotor(resistance=5e-324, inductance=0, torque_constant=1.0)
+
+
+def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused():
+    plant = smc.plant("pendulum_network", n=1000)
+    with pytest.raises(smc.ScenarioError, match="dt 5e-10 s makes too many knots: give 2e-07 s or more"):
+        scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10))
+    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
+    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1)
 
 
 def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():

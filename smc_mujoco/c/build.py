@@ -26,8 +26,13 @@ PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_re
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 # Calls of its own functions, and its own data, whatever else in the process has the name: C's remove, y0, timezone.
 OWN = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
+# For a trial: what writes or reads beyond arrays, or does what C leaves undefined, ends the process with a report.
+SANITIZERS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 WRONG = ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")  # are errors, not warnings
 ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<said>.*)$", re.MULTILINE)
+# Lines of `nm -f sysv`; what a compiler adds to names of variables in functions is left out.
+FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
+DATA = re.compile(r"^(\S+?)(?:\.\d+)? *\|([0-9a-f]+)\| +[bBdDuV] +\| +OBJECT\|([0-9a-f]+)\|", re.MULTILINE)
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 
 
@@ -128,6 +133,30 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     if done.returncode or not target.exists():
         raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
     return target, WARNING.findall(done.stderr)
+
+
+@functools.cache
+def replayer(command: tuple[str, ...]) -> Path | None:
+    """The program of `replay.c` with a compiler's sanitizers, or None where it has none that work."""
+    target = fresh(".exe")
+    line = [*command, *SANITIZERS, f"-DSMC_INPUTS={INPUTS}", str(HERE / "replay.c"), "-o", str(target), "-ldl"]
+    try:
+        if timed(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
+            return None
+    except (Late, OSError):
+        return None
+    return target
+
+
+def data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, int]]]:
+    """Address of a law in its library; and name, address and size of what the library may change, as nm tells them."""
+    try:
+        table = timed(["nm", "-f", "sysv", str(library)], 60.0).stdout
+    except (Late, OSError):
+        return 0, []
+    functions = {name: int(at, 16) for name, at in FUNCTION.findall(table)}
+    found = [(name, int(at, 16), int(size, 16)) for name, at, size in DATA.findall(table)]
+    return functions.get("smc_mujoco_entry", functions.get(symbol, 0)), found
 
 
 def undefined(source: str, symbol: str) -> str:

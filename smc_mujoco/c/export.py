@@ -129,6 +129,7 @@ def _head(law: Component, numbers: str, slots: int, size: str) -> str:
         "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
         "state": f"{slots * size_of} bytes a channel, memory[{slots}]; no static data but constants, no malloc",
         "code": size,
+        "licence": "use without restriction, without warranty",
         "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",
     }
     for name, fact in facts.items():

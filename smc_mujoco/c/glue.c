@@ -12,7 +12,16 @@ int smc_mujoco_gains = 0, smc_mujoco_memory = 0;
 /* a struct of other fields than smc_law.h's is an error here */
 typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
 
-long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
+/* How this thread rounds, flushes and traps, where we can ask and restore it: after the law it is as it was before. */
+#if defined(__SSE__) && defined(__GNUC__)
+#define SMC_ARITHMETIC() (__builtin_ia32_stmxcsr() & ~0x3fu) /* without the marks of what has happened */
+#define SMC_RESTORE(smc_was) __builtin_ia32_ldmxcsr(smc_was)
+#else
+#define SMC_ARITHMETIC() 0u
+#define SMC_RESTORE(smc_was) ((void)0)
+#endif
+
+static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
     int (*const smc_called)(const smc_measurement *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;
     int smc_i;
@@ -43,4 +52,13 @@ long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double
         }
         return smc_code;
     }
+}
+
+long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
+{
+    const unsigned smc_was = SMC_ARITHMETIC();
+    const long long smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
+    if (SMC_ARITHMETIC() == smc_was) return smc_code;
+    SMC_RESTORE(smc_was);
+    return SMC_BEYOND + 2;
 }

@@ -12,8 +12,7 @@ import functools
 import hashlib
 import math
 import re
-import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +23,7 @@ from smc_mujoco import errors
 from smc_mujoco.c import build, child, said, trial
 from smc_mujoco.compiled import AtAddress, Function, call_int, pointer
 from smc_mujoco.component import Template, template
-from smc_mujoco.errors import ScenarioError, number, shown, whole
-
-LIBRARIES = (".so", ".dylib")
-LONGEST = 86_400.0  # s, of a timeout
+from smc_mujoco.errors import ScenarioError, whole
 
 
 class CLaw(AtAddress):
@@ -38,7 +34,6 @@ class CLaw(AtAddress):
 
     def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
         self.path, self.symbol, self.file = path, symbol, file
-        self.warnings: list[str] = []
         self.code = file.read_bytes()
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
         self._function, self.library = trial.entry(str(file), symbol)
@@ -54,11 +49,8 @@ class CLaw(AtAddress):
         """u and s; ArithmeticError where the C function returns anything but 0."""
         out, doubles = trial.doubles([math.nan] * 2), ctypes.POINTER(ctypes.c_double)
         code = self._function(trial.doubles(y), trial.doubles(gains), memory.ctypes.data_as(doubles), out)
-        if code in (trial.BEYOND, trial.BEYOND + 1):
-            own = f"the {self.sizes[1]} numbers of its memory" if code == trial.BEYOND else "the two numbers of out"
-            raise ArithmeticError(f"{self.symbol} writes beyond {own}")
         if code != 0:
-            raise ArithmeticError(f"{self.symbol} returned {code}")
+            raise ArithmeticError(f"{self.symbol} {trial.wrong(code, self.sizes[1]) or f'returned {code}'}")
         return out[0], out[1]
 
     def sized(self, gains: int, memory: int) -> None:
@@ -130,45 +122,16 @@ def law_from_c(
     changes a neighbour's numbers; one that does not return hangs it. Try what is new with isolate=True, or with
     `smc-mujoco check-c my_law.c`.
     """
-    if not isinstance(source, str | Path):
-        raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
-    path = Path(source)
-    timeout = number("timeout", timeout, above=0.0, most=LONGEST)
-    if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
-        raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
-    if not isinstance(gains, Mapping | None):
-        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):
-        raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
     if name is not None:
         errors.name("name", name)
-    law = _loaded(str(path), symbol, tuple(flags), timeout)
-    defaults, size = said.gains(law.library, path.name, gains), said.memory(law.library, memory)
-    degree = whole("degree", (said.number(law.library, "smc_law_degree") or 1) if degree is None else degree, 1, 3)
-    modelled = bool(said.number(law.library, "smc_law_modelled")) if modelled is None else modelled
-    law.sized(len(defaults), size)
-    if isolate:
-        child.attempt(law.file, path, symbol, timeout, values=list(defaults.values()), memory=size, modelled=modelled)
+    tried = child.tried(source, symbol, flags, timeout, gains, memory, modelled, isolate)
+    degree = whole("degree", tried.facts.get("smc_law_degree") or 1 if degree is None else degree, 1, 3)
+    path = tried.library.path
+    law = CLaw(path, symbol, tried.library.file, said.comment(path))
+    _set_up(law)
+    law.sized(len(tried.gains), tried.memory)
     law.__name__ = name or law.__name__
-    return template("law", defaults, size, positive, nonnegative, degree, None, plants, modelled)(law)
-
-
-def checked(
-    source: str | Path,
-    gains: Mapping[str, float] | None,
-    memory: int | None,
-    symbol: str,
-    flags: Sequence[str],
-    timeout: float,
-) -> Iterator[str]:
-    """Lines on a law that passes its trial: what the compiler warns of, and what it is called with; errors as there."""
-    path = Path(source)
-    more = ("-Wall", "-Wextra", *flags) if path.suffix == ".c" else ()
-    made = law_from_c(path, gains=gains, memory=memory, symbol=symbol, flags=more, isolate=True, timeout=timeout)
-    assert isinstance(made.function, CLaw)
-    yield from made.function.warnings
-    named = ", ".join(f"{name} = {value:g}" for name, value in made.defaults.items()) or "none"
-    yield f"{path.name}: {symbol} passes; gains {named}; memory {made.memory}"
+    return template("law", tried.gains, tried.memory, positive, nonnegative, degree, None, plants, tried.modelled)(law)
 
 
 @functools.cache
@@ -192,30 +155,6 @@ def _again(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: st
 def _set_up(law: CLaw) -> None:
     if code := trial.set_up(law.library):
         raise ScenarioError(f"{law.path.name}: smc_setup returned {code}: mend it")
-
-
-def _loaded(source: str, symbol: str, flags: tuple[str, ...], timeout: float) -> CLaw:
-    """The law in a file, compiled where it is not, and set up."""
-    path = Path(source)
-    if path.suffix not in (".c", *LIBRARIES):
-        raise ScenarioError(f"cannot take a law from {shown(source)}: give a .c file, or a shared library, .so")
-    if not path.is_file():
-        raise ScenarioError(f"there is no file {source}: give the path of a .c file or of a .so")
-    warned: list[str] = []
-    if path.suffix == ".c":
-        file, warned = build.library(path, symbol, flags, timeout)
-    else:
-        try:
-            file = Path(shutil.copy(path, build.fresh(path.suffix)))  # so that one built again is loaded again
-        except OSError as error:
-            raise ScenarioError(f"{source} cannot be read ({error.strerror}): give one that can") from None
-    child.attempt(file, path, symbol, timeout)
-    law = CLaw(path, symbol, file, said.comment(path))
-    law.warnings = warned
-    if said.number(law.library, "smc_law_real") not in (None, 8) and not hasattr(law.library, "smc_mujoco_entry"):
-        raise ScenarioError(f"{path.name} is a library of single precision: give its .c file, or build it of doubles")
-    _set_up(law)
-    return law
 
 
 def _trampoline(address: int) -> Function:

@@ -1,19 +1,19 @@
 """What a file in C says of its law: names and defaults of gains, size of memory, and what it is, in a comment."""
 
-import ctypes
 import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.errors import ScenarioError, shown, unknown, whole
 
 DEFAULT_MEMORY = 8
 
 
-def gains(library: ctypes.CDLL, file: str, given: Mapping[str, float] | None) -> dict[str, float]:
+def gains(facts: Mapping[str, Any], file: str, given: Mapping[str, float] | None) -> dict[str, float]:
     """Names and defaults: the file's, changed by what is given; or what is given."""
-    text = _text(library, "smc_law_gains")
+    text = facts.get("smc_law_gains")
     if text is None:
         return dict(given or {})
     said = parsed(text, f"{file}'s smc_law_gains")
@@ -39,22 +39,10 @@ def parsed(text: str, what: str) -> dict[str, float]:
     return found
 
 
-def memory(library: ctypes.CDLL, given: int | None) -> int:
+def memory(facts: Mapping[str, Any], given: int | None) -> int:
     """How many numbers of state a channel has: those given, those that the file says, or DEFAULT_MEMORY."""
-    said = number(library, "smc_law_memory")
+    said = facts.get("smc_law_memory")
     return whole("memory", given if given is not None else DEFAULT_MEMORY if said is None else max(said, 1), 1, 10_000)
-
-
-def number(library: ctypes.CDLL, name: str) -> int | None:
-    """A whole number that the file says, or None."""
-    return ctypes.c_int.in_dll(library, name).value if hasattr(library, name) else None
-
-
-def _text(library: ctypes.CDLL, name: str) -> str | None:
-    if not hasattr(library, name):
-        return None
-    at = ctypes.addressof(ctypes.c_char.in_dll(library, name))
-    return ctypes.string_at(at).decode(errors="replace")
 
 
 def comment(path: Path) -> str | None:

@@ -1,9 +1,10 @@
-"""A law's library tried in a process of its own, which it may take down: loaded, set up, called.
+"""A law's library tried in a process of its own, which it may take down: loaded, set up, called, unloaded.
 
 It runs as a script and imports nothing but Python's own. It tells how far it came by lines in a file: the last one
 names what was going on when the process died, or what was found.
 """
 
+import contextlib
 import ctypes
 import json
 import math
@@ -11,15 +12,23 @@ import os
 import random
 import struct
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
-STEPS = 500  # samples of 1 ms in each of the runs
+STEPS, LONG = 500, 10_000  # samples of 1 ms in each of the runs, and in the longest
+LATER, GROWTH = 200, 1.06  # samples after those, and the ratio of the times of two in a row: to 15 hours
+STOP = 3.0  # where a stop holds the double integrator, which a law need not stabilise
 BEYOND = 2**40  # what the glue returns where a law of floats wrote beyond its memory; one more: beyond out
+ALTERED = BEYOND + 2  # what the glue returns where a law changed the arithmetic of its thread
 GUARD, PLAY = -7.25, 512  # a value that no law writes by chance; how many of them lie on either side of its numbers
 MORE = 16  # gains beyond those that have names, given to see whether it reads them
-PAGE = 4096  # bytes to which addresses of segments are rounded, or a multiple
+ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
+CURES = {
+    BEYOND: "say more in smc_law_memory, or give memory=",
+    BEYOND + 1: "write out[0] and out[1] alone",
+    ALTERED: "let it restore that, and leave out -Ofast and -ffast-math",
+}
 SHARED = "which all channels and simulations share, on several threads"
+NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 Array = ctypes.Array  # of doubles
 
@@ -37,6 +46,15 @@ def entry(path: str, symbol: str):
     return function, library
 
 
+def facts(library) -> dict[str, str | int]:
+    """What a file says of its law, by the names in smc_law.h, and whether the glue is in it."""
+    found: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
+    if hasattr(library, "smc_law_gains"):
+        text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "smc_law_gains")))
+        found["smc_law_gains"] = text.decode(errors="replace")
+    return found | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
+
+
 def set_up(library) -> int:
     """Call smc_setup where there is one; its code."""
     return int(library.smc_setup()) if hasattr(library, "smc_setup") else 0
@@ -49,29 +67,29 @@ def sized(library, gains: int, memory: int) -> None:
         ctypes.c_int.in_dll(library, "smc_mujoco_memory").value = memory
 
 
-def writable(path: str) -> list[tuple[int, int]]:
-    """Address and size of what a loaded library may change, static variables among it; on 64-bit Linux, else none."""
-    real = os.path.realpath(path)
-    try:
-        maps = [line for line in Path("/proc/self/maps").read_text().splitlines() if line.endswith(f" {real}")]
-        image = Path(path).read_bytes()
-    except OSError:
-        return []
-    if not maps or image[:6] != b"\x7fELF\x02\x01":
-        return []
-    found = list(segments(image))
-    base = min(int(line.partition("-")[0], 16) for line in maps) - min(at for at, _, _ in found) // PAGE * PAGE
-    return [(base + at, size) for at, size, flags in found if flags & 2]  # PF_W
+def wrong(code: int, memory: int) -> str | None:
+    """What a code of the glue says of a law with so many numbers of memory; None for the law's own codes."""
+    return {
+        BEYOND: f"writes beyond the {memory} numbers of its memory",
+        BEYOND + 1: "writes beyond the two numbers of out",
+        ALTERED: ALTERS,
+    }.get(code)
 
 
-def segments(image: bytes) -> Iterator[tuple[int, int, int]]:
-    """Address, size and flags of what an ELF file of 64 bits loads (elf(5): Elf64_Ehdr, Elf64_Phdr)."""
-    (table,) = struct.unpack_from("<Q", image, 32)
-    width, count = struct.unpack_from("<HH", image, 54)
-    for i in range(count):
-        kind, flags, _, at, _, _, size = struct.unpack_from("<IIQQQQQ", image, table + width * i)
-        if kind == 1:  # PT_LOAD
-            yield at, size, flags
+def arithmetic() -> bytes:
+    """The bits of results that another rounding or flush-to-zero changes; a trap that is enabled ends the process."""
+    one, half, big, inf, nought, ulp, normal, tiny = 1.0, 0.5, 1e308, math.inf, 0.0, 2.0**-52, 2.0**-1022, 2.0**-1074
+    with contextlib.suppress(ValueError):
+        math.pow(nought, -one)  # divides by zero
+    return struct.pack("6d", big * big, inf - inf, one + 0.3 * ulp, one + 0.7 * ulp, normal * half, tiny + tiny)
+
+
+STANDARD = arithmetic()
+
+
+def altered() -> int:
+    """ALTERED where the arithmetic of this thread is another than it was, else 0."""
+    return ALTERED if arithmetic() != STANDARD else 0
 
 
 def doubles(values) -> Array:
@@ -99,41 +117,48 @@ class Fenced:
 
 
 class Trial:
-    """Runs of a law on a double integrator x'' = u, and calls far away from it."""
+    """Runs of a law on a double integrator x'' = u, and calls far away from it.
 
-    def __init__(self, law, library, gains: list[float], memory: int):
-        self.law, self.library, self.size = law, library, memory
-        self.writable = writable(library._name)
+    Args:
+      law, library: as of `entry`.
+      gains: their values.
+      memory: how many numbers of state it has.
+      data: name, address and size of its static data, as far as known.
+      calls: a file for the gains and for the measurement of each call, for `replay.c`.
+    """
+
+    def __init__(self, law, library, gains, memory: int, data, calls):
+        self.law, self.library, self.size, self.data, self.calls = law, library, memory, data, calls
         self.static = self.statics()
+        self.y, self.out = Fenced([0.0] * 21), Fenced([0.0] * 2)
         self.gains = Fenced(gains, math.nan)  # what it reads of more gains than it has ends in u
         self.held = bytes(self.gains.whole)
+        calls.write(bytes(self.gains.own))
         self.random = random.Random(0)
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
         """The law's code, u and s; Found where it writes where nothing is its own."""
-        given, out = Fenced(y), Fenced([math.nan, math.nan])
-        before = bytes(given.whole)
-        code = self.law(given.own, self.gains.own, memory.own, out.own)
-        if code == BEYOND or memory.passed():
-            raise Found(
-                f"writes beyond the {self.size} numbers of its memory: say more in smc_law_memory, or give memory="
-            )
-        if code == BEYOND + 1 or out.passed():
-            raise Found("writes beyond the two numbers of out, u and s: write out[0] and out[1] alone")
-        if bytes(self.gains.whole) != self.held or bytes(given.whole) != before:
+        self.y.own[:], self.out.own[:] = y, [math.nan, math.nan]
+        given = bytes(self.y.whole)
+        code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
+        code = BEYOND if memory.passed() else BEYOND + 1 if self.out.passed() else altered() or code
+        if code in CURES:
+            raise Found(f"{wrong(code, self.size)}: {CURES[code]}")
+        if bytes(self.gains.whole) != self.held or bytes(self.y.whole) != given:
             raise Found("changes its gains or its measurement: keep what changes in memory")
-        return code, out.own[0], out.own[1]
+        return code, self.out.own[0], self.out.own[1]
 
-    def run(self, model: float, surfaced: float, x: float) -> None:
-        """A run with measurement noise and a sine for reference."""
+    def run(self, model: float, surfaced: float, x: float, steps: int) -> None:
+        """A run with measurement noise and a sine for reference; after its steps the time goes on in leaps."""
         v, dt, memory = 0.0, 1e-3, Fenced([0.0] * self.size)
-        for k in range(STEPS):
-            t = k * dt
+        for k in range(steps + LATER):
+            t = dt * (k if k < steps else steps * GROWTH ** (k - steps))
             r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
             e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
             slid = [1.0, de + 2.0 * e, -2.0 * de] if surfaced else [0.0] * 3
             y = [t, dt, e + r, de + dr, e, de, r, dr, ddr, 0.0, 1.0, ddr, 6.0, model, *slid, 0.1 * e, 0.0, 0.0, 1.0]
-            before = Fenced(memory.own[:])
+            self.calls.write(struct.pack("21d", *y))
+            before = bytes(memory.own)
             code, u, s = self.call(y, memory)
             if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
                 self.starved(y, before)
@@ -141,25 +166,35 @@ class Trial:
                 raise Found(f"returned {said} at t = {t:g}, e = {e:g}, de = {de:g}: mend it, or the gains")
             if k % 50 == 0:
                 self.alone()
-                if repr(self.call(y, before)) != repr((code, u, s)):
+                if repr(self.call(y, self.state(before))) != repr((code, u, s)):
                     raise Found(f"gave two answers to one measurement, as from state {SHARED}: keep it in memory")
             v += dt * min(max(u, -6.0), 6.0)
             x += dt * v
+            if abs(x) > STOP:
+                x, v = math.copysign(STOP, x), 0.0
 
-    def statics(self) -> list[bytes]:
+    def state(self, kept: bytes) -> Fenced:
+        """Memory as it was."""
+        return Fenced(struct.unpack(f"{self.size}d", kept))
+
+    def statics(self) -> dict[str, bytes]:
         """The static data of now."""
-        return [ctypes.string_at(at, size) for at, size in self.writable]
+        return {name: ctypes.string_at(at, size) for name, at, size in self.data}
 
     def alone(self) -> None:
         """Found where it has changed what other simulations see."""
-        if self.statics() != self.static:
-            raise Found(f"changes static data, {SHARED}: keep state in memory, and fill tables in smc_setup")
+        changed = [name for name, now in self.statics().items() if now != self.static[name]]
+        if changed:
+            raise Found(
+                f"changes static data ({changed[0]}), {SHARED}: keep state in memory, and fill tables in smc_setup"
+            )
 
-    def starved(self, y: list[float], memory: Fenced) -> None:
+    def starved(self, y: list[float], before: bytes) -> None:
         """Found where u is a number once there are more gains than were named."""
         count, out = self.gains.count, Fenced([math.nan, math.nan])
         sized(self.library, count + MORE, self.size)
-        code = self.law(Fenced(y).own, Fenced([*self.gains.own, *[1.0] * MORE]).own, memory.own, out.own)
+        more = Fenced([*self.gains.own, *[1.0] * MORE])
+        code = self.law(Fenced(y).own, more.own, self.state(before).own, out.own)
         sized(self.library, count, self.size)
         if code == 0 and all(map(math.isfinite, out.own)):
             raise Found(
@@ -168,34 +203,50 @@ class Trial:
 
     def all(self, modelled: bool) -> None:
         """Every kind of run; and states at the end of the finite world, where it may give up."""
+        steps = LONG
         for model in (1.0,) if modelled else (0.0, 1.0):
             for surfaced in (0.0, 1.0):
-                self.run(model, surfaced, 1.0 - 2.0 * surfaced)
+                self.run(model, surfaced, 1.0 - 2.0 * surfaced, steps)
+                steps = STEPS
         for e in (-1e6, -1e3, 0.0, 1e3, 1e6):
             for de in (-1e6, 0.0, 1e6):
                 y = [0.0, 1e-3, e, de, e, de, *[0.0] * 4, 1.0, 0.0, 6.0, 1.0, *[0.0] * 7]
+                self.calls.write(struct.pack("21d", *y))
                 self.call(y, Fenced([0.0] * self.size))
         self.alone()
 
 
+def attempt(order, told) -> None:
+    """Load, set up and where asked call a law; how far it came, and what its file says of it, go to `told`."""
+    print("loading", file=told)
+    law, library = entry(order["library"], order["symbol"])
+    if altered():
+        raise Found(f"loading it {ALTERS}: {CURES[ALTERED]}")
+    print("smc_setup", file=told)
+    if code := set_up(library):
+        raise Found(f"smc_setup returned {code}: mend it")
+    if altered():
+        raise Found(f"smc_setup {ALTERS}: {CURES[ALTERED]}")
+    if trial := order["trial"]:
+        print(order["symbol"], file=told)
+        sized(library, len(trial["gains"]), trial["memory"])
+        base = ctypes.cast(law, ctypes.c_void_p).value - trial["anchor"]
+        data = [(name, base + at, size) for name, at, size in trial["data"]]
+        with Path(trial["calls"]).open("wb") as calls:
+            try:
+                Trial(law, library, trial["gains"], trial["memory"], data, calls).all(trial["modelled"])
+            except Found as found:
+                raise Found(f"{order['symbol']} {found}") from None
+    print(json.dumps(facts(library)), file=told)
+    print("unloading", file=told)
+
+
 def main(asked: str) -> None:
-    """Do what a JSON text asks: library, symbol, gains, memory, whether to call the law, and the file to tell."""
-    order = json.loads(asked)
+    """Do what a JSON file asks."""
+    order = json.loads(Path(asked).read_text())
     with Path(order["told"]).open("w", buffering=1) as told:
-        print("loading", file=told)
         try:
-            law, library = entry(order["library"], order["symbol"])
-            print("smc_setup", file=told)
-            if code := set_up(library):
-                raise Found(f"smc_setup returned {code}: mend it")
-            if order["call"]:
-                print(order["symbol"], file=told)
-                sized(library, len(order["gains"]), order["memory"])
-                try:
-                    Trial(law, library, order["gains"], order["memory"]).all(order["modelled"])
-                except Found as found:
-                    raise Found(f"{order['symbol']} {found}") from None
-            print("fine", file=told)
+            attempt(order, told)
         except (Found, OSError, AttributeError) as error:
             print(f"{type(error).__name__} {error}", file=told)
 

@@ -1,4 +1,4 @@
-"""smc-mujoco check-c FILE: a law of your own in C, tried where it can do no harm."""
+"""smc-mujoco check-c FILE: a law of your own in C, tried in a process of its own."""
 
 import re
 from pathlib import Path
@@ -24,16 +24,19 @@ def check_c(
 ) -> None:
     """Compile a control law in C and try it in a process of its own: says what is wrong with it in one sentence.
 
-    It is run on a double integrator under noise, with and without model and surface, and called at states far away. A
-    crash, an endless loop, NaN, gains without a name, a write beyond its memory, and state kept outside of it (static
-    data, above all), end in exit code 2. The signature is told in smc_law.h, which stands at the top of every file that
-    `export-c` writes.
+    It is run on a double integrator under noise, with and without model and surface, for 10 s and at later times, and
+    called at states far away. A crash, an endless loop, NaN, gains without a name, a write beyond its memory, state
+    kept outside of it (static data, above all), and changed rounding or flush-to-zero end in exit code 2. A .c file is
+    then run with the compiler's address and undefined-behaviour sanitizers. The signature is told in smc_law.h, which
+    stands at the top of every file that `export-c` writes.
+
+    The process is no sandbox: the law may open files and connections as any program of yours.
 
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
     with mendable():
         with loading():
-            from smc_mujoco.c.load import checked
+            from smc_mujoco.c.child import checked
             from smc_mujoco.c.said import parsed
 
         given = parsed(gains, "--gains") if gains else None
