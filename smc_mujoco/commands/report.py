@@ -12,7 +12,7 @@ def report(
     quick: Annotated[bool, typer.Option("--quick", help="A look in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 6 decide nothing.")
+        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 name no winner.")
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:

@@ -7,7 +7,7 @@ the first plant, map, film or list of claims that is missing.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,8 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
     table = grid(work)
     judged = claims(work, table)
-    margins, basins, scenes = all_margins(work), all_basins(work), all_scenes(work)
+    margins = all_margins(work)
+    compared, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     with bars.stage("statistics"):
         return Findings(
             scores=scores.scores(table),
@@ -46,6 +47,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
             fields=fields(plan),
             fronts=fronts(plan),
             margins=margins,
+            by_set=compared,
             basins=basins,
             scenes=scenes,
             about=about.about(plan, table, bars.spent, _no_film(plan)),
@@ -102,23 +104,51 @@ def _numbers(value: Any) -> Any:
 
 def all_margins(work: Work) -> tuple[Any, ...]:
     """Every law's margins, plant by plant."""
+    plan = work.plan
+    plants = plan.plants if plan.kinds else ()
+    return _margins(work, "margins", GAINS, [(plant, plan.laws) for plant in plants], plan.kinds)
+
+
+def margins_by_set(work: Work, found: Sequence[Any]) -> dict[str, tuple[Any, ...]]:
+    """Set of gains -> margins of the kinds that are compared, of the laws that it has gains for."""
+    plan = work.plan
+    if not plan.compared:
+        return {}
+    by_set = {GAINS: tuple(margin for margin in found if margin.kind in plan.compared)}
+    for name in (name for name in sets.SETS if name != GAINS):
+        laws = [(plant, tuple(law for law in plan.laws if _has(plant, law, name))) for plant in plan.plants]
+        by_set[name] = _margins(work, f"margins-{name}", name, [one for one in laws if one[1]], plan.compared)
+    return by_set
+
+
+def _has(plant: str, law: str, gains: str) -> bool:
+    try:
+        sets.law(plant, law, gains)
+    except ScenarioError:
+        return False
+    return True
+
+
+def _margins(
+    work: Work, stage: str, gains: str, laws: Sequence[tuple[str, Sequence[str]]], kinds: Sequence[str]
+) -> tuple[Any, ...]:
+    """Margins of kinds under a set of gains, of each plant's laws."""
     from smc_mujoco.margins import load, margins, save
 
     plan, found = work.plan, []
-    plants = plan.plants if plan.kinds else ()
-    with work.bars.stage("margins", f"{len(plants)} plants") as report:
-        for k, plant in enumerate(plants):
-            told = part(report, k, len(plants))
+    with work.bars.stage(stage, f"{len(laws)} plants") as report:
+        for k, (plant, names) in enumerate(laws):
+            told = part(report, k, len(laws))
             found += kept(
-                work.folder / f"margins-{plant}.json",
-                [plan.laws, plan.kinds, plan.quick, GAINS],
-                lambda plant=plant, told=told: margins(
-                    [plant], plan.laws, plan.kinds, gains=GAINS, quick=plan.quick, threads=work.threads, report=told
+                work.folder / f"{stage}-{plant}.json",
+                [names, kinds, plan.quick, gains],
+                lambda plant=plant, names=names, told=told: margins(
+                    [plant], names, kinds, gains=gains, quick=plan.quick, threads=work.threads, report=told
                 ),
                 save,
                 load,
             )
-            report(k + 1, len(plants))
+            report(k + 1, len(laws))
     return tuple(found)
 
 
