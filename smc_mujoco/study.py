@@ -12,6 +12,8 @@ import dataclasses
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -122,7 +124,7 @@ def study(
     scenarios: Iterable[Scenario],
     out: str | os.PathLike,
     resume: bool = True,
-    executor: str = "local",
+    executor: str | Executor = "local",
     threads: int | None = None,
     progress: bool = False,
     traces: str = "none",
@@ -135,14 +137,16 @@ def study(
     Args:
       out: the folder; it may hold the parts of other studies.
       resume: False forgets what the folder holds.
-      executor: "local", or "dask://HOST:PORT" for the workers of that scheduler.
+      executor: "local", "dask://HOST:PORT" for the workers of that scheduler, or any concurrent.futures.Executor, whose
+        workers run a simulation each; it stays open.
       threads: simulations at once, if local; None for one per available core.
       progress: whether to show a progress bar.
       traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": a run that
         failed, else one that never settles, else any, with the largest ultimate bound.
 
     Raises:
-      ScenarioError: what cannot be run, a folder that cannot be written, no scheduler; what was finished stays.
+      ScenarioError: what cannot be run, a folder that cannot be written, workers that are not there or die; what was
+        finished stays.
     """
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
@@ -190,15 +194,16 @@ def _compute(scenarios: list[Scenario], store: Store, threads: int, counts: Coun
     executors.local(executors.batches(scenarios, threads), threads, finish, counts.stepped)
 
 
-def _send(scenarios: list[Scenario], store: Store, address: str, counts: Counter) -> None:
-    """Have a cluster run scenarios."""
+def _send(scenarios: list[Scenario], store: Store, where: str | Executor, counts: Counter) -> None:
+    """Have others run scenarios."""
 
     def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
         store.add([_row(s, outcome) for s, outcome in zip(batch, outcomes, strict=True)])
         counts.stepped(sum(s.work for s in batch))
         counts.finished(len(batch))
 
-    cluster.remote(executors.batches(scenarios, 1), address, finish)
+    with cluster.connected(where) if isinstance(where, str) else nullcontext(where) as pool:
+        executors.remote(executors.batches(scenarios, 1), pool, finish)
 
 
 def _row(scenario: Scenario, outcome: Outcome) -> dict:

@@ -179,7 +179,6 @@ OPTIONAL = (
     "jinja2",
     "plotly",
     "distributed",
-    "joblib",
     "gymnasium",
 )
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
