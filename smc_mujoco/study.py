@@ -21,7 +21,7 @@ import numpy as np
 from smc_mujoco import cluster, identity, keep, paper
 from smc_mujoco import executor as executors
 from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, find, shown, whole
+from smc_mujoco.errors import ScenarioError, find, printable, shown, whole
 from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
 from smc_mujoco.law import Law
@@ -158,7 +158,7 @@ def study(
     store.open(resume)
     missing = [scenario for name, scenario in named.items() if name not in store.where]
     if progress and len(missing) < len(named):
-        print(f"{len(named) - len(missing)} of {len(named)} runs are in {store.parts}", file=sys.stderr)
+        print(f"{len(named) - len(missing)} of {len(named)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
         if where == "local":
             folder = keep.folder(out) if traces == "all" else None

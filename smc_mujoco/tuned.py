@@ -1,7 +1,6 @@
 """What a tuning found, with all that it depends on: saved as JSON, and compared only with its like."""
 
 import dataclasses
-import json
 import math
 import os
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from smc_mujoco import __version__, gains, record
 from smc_mujoco.bounds import DECADES, Box, at_bound
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, shown
-from smc_mujoco.files import replacing
+from smc_mujoco.files import read_json, reading, write_json
 from smc_mujoco.objective import FAILED, Objective
 from smc_mujoco.plant import Plant
 
@@ -118,9 +117,7 @@ class Tuned:
             "scenario": record.describe(scenario),
             "history": [dataclasses.astuple(e) for e in self.history],
         }
-        with replacing(path) as file:
-            file.write_text(json.dumps(data, indent=1) + "\n")
-        return path
+        return write_json(path, data)
 
 
 def checked(path: str | os.PathLike) -> Path:
@@ -137,8 +134,8 @@ def load(path: str | os.PathLike) -> Tuned:
     Raises:
       ScenarioError: no such file, or no tuning.
     """
-    try:
-        data = json.loads(Path(path).read_text())
+    with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
+        data = read_json(file)
         scenario = record.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
@@ -149,11 +146,6 @@ def load(path: str | os.PathLike) -> Tuned:
             definition=Objective(**data["definition"]),
             history=tuple(_evaluation(*entry) for entry in data["history"]),
         )
-    except FileNotFoundError:
-        raise ScenarioError(f"no tuning at {path}: give the path of a .json file that Tuned.save wrote") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        why = f"{type(error).__name__}, {error}"
-        raise ScenarioError(f"{path} is no tuning ({why}): give a .json file that Tuned.save wrote") from None
 
 
 def shipped(plant: str, law: str, objective: str = "balanced") -> Tuned:

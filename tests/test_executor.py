@@ -240,7 +240,7 @@ def start(*arguments: str, log: Path) -> subprocess.Popen[str]:
 
 
 def wait(there: Callable[[], object]) -> None:
-    end = time.monotonic() + 120
+    end = time.monotonic() + 300
     while not there():
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -266,20 +266,24 @@ def dask(tmp_path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
 
 
 @pytest.fixture
-def half_done(dask, tmp_path) -> subprocess.Popen[str]:
+def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
     """A study whose first parts the cluster has written."""
     client = start("-c", CLIENT, str(tmp_path), dask[0], "60", log=tmp_path / "client.log")
     parts = tmp_path / "remote" / "parts"
-    wait(lambda: client.poll() is not None or len(list(parts.glob("*.parquet"))) >= 3)
-    assert client.poll() is None, (tmp_path / "client.log").read_text()
-    assert not (tmp_path / "remote" / "results.parquet").exists()  # there is work left
-    return client
+    try:
+        wait(lambda: client.poll() is not None or len(list(parts.glob("*.parquet"))) >= 3)
+        assert client.poll() is None, (tmp_path / "client.log").read_text()
+        assert not (tmp_path / "remote" / "results.parquet").exists()  # there is work left
+        yield client
+    finally:
+        client.kill()
+        client.communicate()
 
 
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
     _, (_, *workers) = dask
     workers[0].send_signal(signal.SIGKILL)
-    said, _ = half_done.communicate(timeout=120)
+    said, _ = half_done.communicate(timeout=300)
     assert (said, half_done.returncode) == ("True\n", 0), (tmp_path / "client.log").read_text()
     assert (workers[0].poll(), workers[1].poll()) == (-signal.SIGKILL, None)
 
@@ -287,7 +291,7 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp
 def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
     _, (scheduler, *_) = dask
     scheduler.send_signal(signal.SIGKILL)
-    half_done.communicate(timeout=120)
+    half_done.communicate(timeout=300)
     log = (tmp_path / "client.log").read_text()
     assert half_done.returncode == 1, log
     assert "Traceback" not in log
@@ -297,7 +301,7 @@ def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs
 
 def test_without_a_scheduler_there_the_sentence_says_so(tmp_path):
     client = start("-c", CLIENT, str(tmp_path), "dask://127.0.0.1:9", "0.5", log=tmp_path / "client.log")
-    client.communicate(timeout=120)
+    client.communicate(timeout=300)
     said = (tmp_path / "client.log").read_text().splitlines()[-1]
     assert said.startswith("no dask at dask://127.0.0.1:9")
     assert said.endswith("start `dask scheduler` and `dask worker` there")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.terminal import Clock, loading, mendable
+from smc_mujoco.terminal import Clock, loading, mendable, wrote
 
 
 def basin(
@@ -53,4 +53,4 @@ def basin(
         written = [found.save(json)] if json else []
         written += [region.draw([found], out)] if out else []
         for path in written:
-            console.print(f"wrote {path}", soft_wrap=True, highlight=False)
+            wrote(console, path)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.terminal import Clock, loading, mendable
+from smc_mujoco.terminal import Clock, loading, mendable, wrote
 
 
 def bench(
@@ -67,7 +67,7 @@ def bench(
         failed = len(table) - table.data["failure"].null_count
         said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
         console.print(said, soft_wrap=True, highlight=False)
-        console.print(f"wrote {out / 'results.parquet'}", soft_wrap=True, highlight=False)
+        wrote(console, out / "results.parquet")
 
 
 def _names(text: str | None, default: Sequence[str]) -> Sequence[str]:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.errors import printable
 from smc_mujoco.terminal import loading, mendable
 
 
@@ -29,4 +30,4 @@ def report(
             from smc_mujoco.report import report as make
 
         path = make(out, quick, seeds, threads, progress=True)
-        print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
+        print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -6,15 +6,15 @@ Killed and called again, nothing that was finished is computed again: the grid g
 the first plant, map, film or list of claims that is missing.
 """
 
-import json
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco import gains as sets
 from smc_mujoco import tuned
 from smc_mujoco.errors import ScenarioError
-from smc_mujoco.files import replacing
+from smc_mujoco.files import read_json, write_json
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.report import about, films, scores
 from smc_mujoco.report.bars import Bars
@@ -28,7 +28,6 @@ from smc_mujoco.study import study
 from smc_mujoco.table import Table
 
 PAPER = "observer_free"
-WORDS = {"Infinity": float("inf"), "-Infinity": float("-inf"), "NaN": float("nan")}
 FIELD_POINTS = 121  # of a map of V', along each axis
 
 
@@ -85,21 +84,9 @@ def claims(work: Work, table: Table) -> tuple[Any, ...]:
             work.folder / "claims.json",
             [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
             lambda: tuple(judge(table, plan.claims, None, plan.quick, None, work.threads, told)),
-            lambda found, path: _write(path, [claim.plain() for claim in found]),
-            lambda path: tuple(Claim(**_numbers(entry)) for entry in json.loads(path.read_text())),
+            lambda found, path: write_json(path, [dataclasses.asdict(claim) for claim in found]),
+            lambda path: tuple(Claim(**entry) for entry in read_json(path)),
         )
-
-
-def _write(path: Path, data: object) -> None:
-    with replacing(path) as part:
-        part.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n")
-
-
-def _numbers(value: Any) -> Any:
-    """The numbers that `Claim.plain` wrote as words."""
-    if isinstance(value, Mapping):
-        return {name: _numbers(each) for name, each in value.items()}
-    return WORDS.get(value, value) if isinstance(value, str) else value
 
 
 def all_margins(work: Work) -> tuple[Any, ...]:
