@@ -22,20 +22,18 @@ fiftieth of a cell.
 """
 
 import dataclasses
-import json
 import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from smc_mujoco import paper
 from smc_mujoco.component import Template
 from smc_mujoco.errors import ScenarioError, shown, whole
-from smc_mujoco.files import ended, replacing
+from smc_mujoco.files import ended, read_json, reading, write_json
 from smc_mujoco.grids import case
 from smc_mujoco.law import Law
 from smc_mujoco.linear import ASIDE
@@ -88,10 +86,9 @@ class Basin:
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads back."""
-        path = ended(path, ".json")
-        with replacing(path) as file:
-            file.write_text(json.dumps(to_json(self)) + "\n")
-        return path
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        data = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+        return write_json(ended(path, ".json"), data, indent=None)
 
 
 def basin(
@@ -219,30 +216,15 @@ def holdable(plant: Plant, u_max: float) -> float:
     return math.inf
 
 
-def to_json(found: Basin) -> dict[str, Any]:
-    """A map as JSON has it."""
-    fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
-
-
-def from_json(entry: dict[str, Any]) -> Basin:
-    """The map that `to_json` wrote."""
-    kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
-    fields: dict[str, Any] = {k: np.array(v, kinds[k]) if k in kinds else v for k, v in entry.items()}
-    return Basin(**fields)
-
-
 def load(path: str | os.PathLike) -> Basin:
     """The map that `Basin.save` wrote.
 
     Raises:
       ScenarioError: no such file, or no map.
     """
-    try:
-        return from_json(json.loads(Path(path).read_text()))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        why = f"{type(error).__name__}, {error}"
-        raise ScenarioError(f"{path} holds no map ({why}): give a .json file that Basin.save wrote") from None
+    kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
+    with reading(path, "map", "give a .json file that Basin.save wrote") as file:
+        return Basin(**{k: np.array(v, kinds[k]) if k in kinds else v for k, v in read_json(file).items()})
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:

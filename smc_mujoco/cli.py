@@ -1,5 +1,6 @@
 """The command line: smc-mujoco, whose commands are those of `commands`."""
 
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from smc_mujoco.commands import (
     tune,
     view,
 )
+from smc_mujoco.errors import printable
 
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
@@ -32,9 +34,14 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; what the user can mend ends in one sentence and exit code 2."""
+    for name in ("stdin", "stdout", "stderr"):  # in this order, so that each gets the descriptor that was closed
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
-    warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {message}", file=sys.stderr)
+    if not os.environ.get("COLUMNS", "80").strip("0"):
+        del os.environ["COLUMNS"]  # 0 is what a terminal without a width says
+    warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
 
 

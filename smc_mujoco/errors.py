@@ -22,6 +22,11 @@ class ScenarioWarning(UserWarning):
     """A scenario that can be run, and is hardly what its author means. The message is one sentence, as an error's."""
 
 
+def printable(text: str) -> str:
+    """The text on one line: characters that a terminal would act on, such as a newline in a file's name, escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 def shown(value: object) -> str:
     """A value on one line, cut where it is long; its class in <> where its repr fails."""
     try:
@@ -29,7 +34,7 @@ def shown(value: object) -> str:
     except Exception:  # of a user's class, in a list too; RecursionError where lists nest deep
         text = f"<{type(value).__name__}>"
     text = text if len(text) <= 60 else f"{text[:57]}..."
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return printable(text)
 
 
 def _brief(value: object) -> str:

@@ -14,13 +14,13 @@ The files of `tuned_gains/` hold each tuning whole, with history and versions; `
 
 import dataclasses
 import functools
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 from smc_mujoco import bounds
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.files import read_json
 from smc_mujoco.law import law as find_law
 from smc_mujoco.plant import catalogue
 
@@ -143,4 +143,4 @@ def _read(path: Path, plant: str, name: str, gains: str) -> Mapping[str, float]:
     if not path.is_file():
         cure = f"give the law with gains of its own (smc-mujoco tune {plant} {name} finds them), or take default ones"
         raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant}: {cure} (--gains default)")
-    return json.loads(path.read_text())["scenario"]["law"]["gains"]
+    return read_json(path)["scenario"]["law"]["gains"]

@@ -7,6 +7,7 @@ from typing import Any
 
 from smc_mujoco import fingerprint, paper, record, source
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.files import to_json
 from smc_mujoco.named_conditions import NAMED
 from smc_mujoco.own_channels import recorded
 from smc_mujoco.plant import Plant
@@ -41,12 +42,12 @@ def row(scenario: Scenario) -> dict[str, Any]:
         "hash": _key(scenario, data),
         "plant": scenario.plant.name,
         "law": scenario.law.name,
-        "gains": json.dumps(dict(scenario.law.gains)),
+        "gains": to_json(dict(scenario.law.gains)),
         "condition": _condition(scenario, data),
         "seed": scenario.seed,
         "duration": scenario.duration,
-        "versions": json.dumps(data["versions"]),
-        "scenario": json.dumps(data),
+        "versions": to_json(data["versions"]),
+        "scenario": to_json(data),
     }
 
 
@@ -61,7 +62,7 @@ def condition(scenario: Scenario) -> str:
 def _key(scenario: Scenario, data: dict[str, Any]) -> str:
     if scenario.condition in NAMED:  # which the fields tell
         data = data | {"condition": None}
-    text = json.dumps([data, _codes(scenario), source.code(*TELL)], sort_keys=True)
+    text = to_json([data, _codes(scenario), source.code(*TELL)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
@@ -91,7 +92,7 @@ def _condition(scenario: Scenario, data: dict[str, Any]) -> str:
 
 
 def _compared(data: dict[str, Any]) -> str:
-    return json.dumps({name: value for name, value in data.items() if name not in NO_CONDITION})
+    return to_json({name: value for name, value in data.items() if name not in NO_CONDITION})
 
 
 @functools.lru_cache(maxsize=256)

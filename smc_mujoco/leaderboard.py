@@ -143,15 +143,20 @@ class Board:
 
     @property
     def why(self) -> str:
-        """Why there can be no winner, "" if there can be."""
+        """Why there is no winner, "" if there is one, or if several laws are the best."""
         if len(self.entries) == 1:
             return "one law"
+        return self.too_few or ("" if self.best else "each loses to another")
+
+    @property
+    def too_few(self) -> str:
+        """The size of the sample in words, if no block has enough runs for a winner; else ""."""
         most = max(self.blocks, key=lambda block: block.runs)
         if most.runs < SEEDS:
             return most.sample + ", too few" * (most.runs == most.seeds)
         if 2.0 ** (1 - most.runs) * self.pairs > 1 - self.level:  # the least p-value of the sign test
             return f"{most.sample}, too few for {self.pairs} comparisons"
-        return "" if self.best else "each loses to another"
+        return ""
 
 
 def _listed(names: Sequence[str]) -> str:

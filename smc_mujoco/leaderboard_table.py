@@ -16,7 +16,8 @@ from smc_mujoco.tables import number
 KEY = (
     "median, #place, {level:.3g} % interval over seeds; * none is better; a winner is better than every other law: its "
     "median is lower by more than 3 %, and the seeds bear it out; over several conditions: median of their medians, "
-    "place by mean rank, and a winner wins under each; x, u of driven joints, in rad or m, N m or N"
+    "place by mean rank, won and lost under how many, and a winner wins under each; x, u of driven joints, in rad or "
+    "m, N m or N"
 )
 
 
@@ -75,7 +76,7 @@ def _block_cell(board: Board | None, block: Block | None) -> Text:
     if board.metric == SETTLES:
         medians = {law: 1 - share for law, share in medians.items()}
     if block.winner is None:
-        return Text("too few" if board.why else f"{len(block.best)} level", "dim")
+        return Text("too few" if board.too_few else f"{len(block.best)} level", "dim")
     first, second = sorted(block.medians, key=block.medians.__getitem__)[:2]
     told = (">" if board.metric == SETTLES else "<").join(
         _number(medians[law], board.metric, digits=2) for law in (first, second)
@@ -118,6 +119,6 @@ def _winner(board: Board | None) -> Text:
         return text.append(board.why or f"{len(board.best)} of {len(board.entries)}*")
     for law, (wins, losses) in counts.items():
         if wins:
-            text.append(f"{_folded(law, 12)}\n", style.law_colour(law)).append(f"wins {wins}, loses {losses}\n")
+            text.append(f"{_folded(law, 12)}\n", style.law_colour(law)).append(f"{wins} won {losses} lost\n")
     text.right_crop(1)
     return text

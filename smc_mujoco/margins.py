@@ -16,7 +16,6 @@ All pairs and kinds advance together, a batch of runs a round.
 """
 
 import dataclasses
-import json
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -28,7 +27,7 @@ from smc_mujoco import paper
 from smc_mujoco.bearing import SPECS, bears
 from smc_mujoco.component import Template
 from smc_mujoco.errors import ScenarioError, find
-from smc_mujoco.files import ended, replacing
+from smc_mujoco.files import ended, read_json, reading, write_json
 from smc_mujoco.grids import case, listed
 from smc_mujoco.initial_states import Starts
 from smc_mujoco.law import Law
@@ -232,11 +231,8 @@ class _Work:
 
 
 def save(found: Sequence[Margin], path: str | os.PathLike) -> Path:
-    """Write margins to a .json file that `load` reads back; NaN is null there, infinity "inf"."""
-    path = ended(path, ".json")
-    with replacing(path) as file:
-        file.write_text(json.dumps([to_json(margin) for margin in found], indent=1, allow_nan=False) + "\n")
-    return path
+    """Write margins to a .json file that `load` reads back; NaN and infinity are words there, see `files.plain`."""
+    return write_json(ended(path, ".json"), [dataclasses.asdict(margin) for margin in found])
 
 
 def load(path: str | os.PathLike) -> list[Margin]:
@@ -245,23 +241,11 @@ def load(path: str | os.PathLike) -> list[Margin]:
     Raises:
       ScenarioError: no such file, or not of margins.
     """
-    try:
-        return [from_json(entry) for entry in json.loads(Path(path).read_text())]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        why = f"{type(error).__name__}, {error}"
-        raise ScenarioError(f"{path} holds no margins ({why}): give a .json file that margins.save wrote") from None
+    with reading(path, "file of margins", "give a .json file that margins.save wrote") as file:
+        return [_margin(entry) for entry in read_json(file)]
 
 
-def to_json(margin: Margin) -> dict[str, Any]:
-    """A margin as JSON has it."""
-    return {
-        name: ("inf" if value == math.inf else None if isinstance(value, float) and math.isnan(value) else value)
-        for name, value in dataclasses.asdict(margin).items()
-    }
-
-
-def from_json(entry: dict[str, Any]) -> Margin:
-    """The margin that `to_json` wrote."""
+def _margin(entry: dict[str, Any]) -> Margin:
+    """The margin in a file. Those of version 0.1 have null for NaN, and "inf"."""
     fields: dict[str, Any] = {name: math.inf if value == "inf" else value for name, value in entry.items()}
-    fields["value"] = math.nan if fields["value"] is None else fields["value"]
-    return Margin(**fields)
+    return Margin(**fields | ({"value": math.nan} if fields["value"] is None else {}))

@@ -123,6 +123,7 @@ class Network:
     def __reduce__(self) -> tuple:
         """For pickle, and for what tells runs apart: its bytes, the classes it is made of, and torch's version."""
         torch, held = sys.modules["torch"], io.BytesIO()
+        _settle(self.module)
         torch.save(self.module, held)
         kinds = {type(part) for part in self.module.modules()}
         ordered = sorted(kinds, key=lambda kind: (kind.__module__, kind.__qualname__))
@@ -175,6 +176,7 @@ def _callable(act: Any) -> tuple[Act, str]:
     if torch is None or not isinstance(act, torch.nn.Module):
         return (act if callable(act) else functools.partial(_predicted, act)), getattr(act, "__name__", name)
     try:
+        _settle(act)
         module: Any = copy.deepcopy(act)
         return Network(module.to("cpu").eval(), predicts), name
     except Exception as error:
@@ -219,6 +221,16 @@ def _predicted(model: Any, observation: np.ndarray) -> Any:
     """The action that a model gives: `predict` returns it alone, or first of a pair with what it remembers."""
     found = model.predict(observation, deterministic=True)
     return found[0] if isinstance(found, tuple) else found
+
+
+def _settle(module: Any) -> None:
+    """Ask a policy of stable-baselines3 for an action at 0: of its last question it keeps the distribution.
+
+    After training that has a graph, which cannot be copied, and after a run it differs from run to run.
+    """
+    space = getattr(module, "observation_space", None)
+    if space is not None and hasattr(module, "predict"):
+        _predicted(module, np.zeros(space.shape, space.dtype))
 
 
 def _asked(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndarray:

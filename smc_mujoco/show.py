@@ -11,7 +11,7 @@ from rich.console import Console
 from smc_mujoco import gl, paper, scene, tables
 from smc_mujoco.chunk import contents
 from smc_mujoco.compiled import NotCompilable
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, printable
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.plant import catalogue as plants
@@ -60,7 +60,7 @@ def perform(
             written += film(scene, traces, out, console)
     console.print("wrote", style="dim")
     for file in written:
-        console.print(f"  {file}", soft_wrap=True, highlight=False, markup=False)
+        console.print(f"  {printable(str(file))}", soft_wrap=True, highlight=False, markup=False)
 
 
 def tell(scene: Scene, traces: Traces, console: Console) -> None:
@@ -175,7 +175,7 @@ def catalogues(console: Console) -> None:
     """Everything there is to choose from, with a line about each."""
 
     def first(doc: str | None) -> str:
-        return (doc or "").strip().partition("\n")[0]
+        return (doc or "").strip().partition("\n")[0].rstrip(":")  # before a formula
 
     known = {
         "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),

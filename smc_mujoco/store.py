@@ -15,7 +15,7 @@ import functools
 import hashlib
 import re
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ import numpy as np
 
 from smc_mujoco import fingerprint, table
 from smc_mujoco.errors import ScenarioError
-from smc_mujoco.files import replacing
+from smc_mujoco.files import reading
 from smc_mujoco.metrics import metrics
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Store:
 
         hashes = [row["hash"] for row in rows]
         path = self.parts / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
-        self._write(path, [pa.Table.from_pylist(list(rows), schema=self.schema)])
+        table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
     def collect(self, hashes: Sequence[str]) -> None:
@@ -103,19 +103,7 @@ class Store:
             return pa.concat_tables(found).take(order).combine_chunks()
 
         groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
-        self._write(self.results, map(rows, groups))
-
-    def _write(self, path: Path, groups: "Iterable[pa.Table]") -> None:
-        """A parquet file, a row group a table."""
-        import pyarrow.parquet as pq
-
-        with (
-            replacing(path) as file,
-            file.open("wb") as sink,
-            pq.ParquetWriter(sink, self.schema, compression="zstd", write_page_checksum=True) as writer,
-        ):
-            for rows in groups:
-                writer.write_table(rows)
+        table.write(self.results, self.schema, map(rows, groups))
 
     def _enter(self, path: Path) -> None:
         part = self._read(path)
@@ -125,14 +113,10 @@ class Store:
 
     def _read(self, path: Path) -> "pa.Table | None":
         """A part, or None where it is none, or not whole."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         try:
-            with pq.ParquetFile(path, page_checksum_verification=True) as file:
-                if not file.schema_arrow.equals(self.schema, check_metadata=True):
-                    return None
-                part = file.read()
-        except (OSError, pa.ArrowException):
+            with reading(path, "part", "start the study once more") as file:
+                part = table.read(file, sealed=True)
+        except ScenarioError:
             return None
-        return None if part["hash"].null_count else part
+        own = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
+        return part if own else None

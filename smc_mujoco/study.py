@@ -12,11 +12,13 @@ import dataclasses
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from pathlib import Path
 
 from smc_mujoco import cluster, identity, keep, paper
 from smc_mujoco import executor as executors
-from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.errors import ScenarioError, find, printable, shown
 from smc_mujoco.executor import Batch, Outcome
 from smc_mujoco.gains import LAWS
 from smc_mujoco.grids import listed
@@ -45,14 +47,19 @@ class Extent:
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
-QUICK = Extent(conditions=("nominal", "noise", "delay_10ms", "coulomb"), seeds=6, duration=5.0)
+QUICK = Extent(
+    plants=("inverted_pendulum", "van_der_pol", "duffing"),
+    conditions=("nominal", "noise", "coulomb"),
+    seeds=16,
+    duration=3.0,
+)  # the fewest seeds with which a winner is named, see `ranking`; half a minute on 2 cores
 
 
 def study(
     scenarios: Iterable[Scenario],
     out: str | os.PathLike,
     resume: bool = True,
-    executor: str = "local",
+    executor: str | Executor = "local",
     threads: int | None = None,
     progress: bool = False,
     traces: str = "none",
@@ -65,14 +72,16 @@ def study(
     Args:
       out: the folder; it may hold the parts of other studies.
       resume: False forgets what the folder holds.
-      executor: "local", or "dask://HOST:PORT" for the workers of that scheduler.
+      executor: "local", "dask://HOST:PORT" for the workers of that scheduler, or any concurrent.futures.Executor, whose
+        workers run a simulation each; it stays open.
       threads: simulations at once, if local; None for one per available core.
       progress: whether to show a progress bar.
       traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": a run that
         failed, else one that never settles, else any, with the largest ultimate bound.
 
     Raises:
-      ScenarioError: what cannot be run, a folder that cannot be written, no scheduler; what was finished stays.
+      ScenarioError: what cannot be run, a folder that cannot be written, workers that are not there or die; what was
+        finished stays.
     """
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
@@ -84,7 +93,7 @@ def study(
     store.open(resume)
     missing = [scenario for name, scenario in named.items() if name not in store.where]
     if progress and len(missing) < len(named):
-        print(f"{len(named) - len(missing)} of {len(named)} runs are in {store.parts}", file=sys.stderr)
+        print(f"{len(named) - len(missing)} of {len(named)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
         if where == "local":
             folder = keep.folder(out) if traces == "all" else None
@@ -120,15 +129,16 @@ def _compute(scenarios: list[Scenario], store: Store, threads: int, counts: Coun
     executors.local(executors.batches(scenarios, threads), threads, finish, counts.stepped)
 
 
-def _send(scenarios: list[Scenario], store: Store, address: str, counts: Counter) -> None:
-    """Have a cluster run scenarios."""
+def _send(scenarios: list[Scenario], store: Store, where: str | Executor, counts: Counter) -> None:
+    """Have others run scenarios."""
 
     def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
         store.add([_row(s, outcome) for s, outcome in zip(batch, outcomes, strict=True)])
         counts.stepped(sum(s.work for s in batch))
         counts.finished(len(batch))
 
-    cluster.remote(executors.batches(scenarios, 1), address, finish)
+    with cluster.connected(where) if isinstance(where, str) else nullcontext(where) as pool:
+        executors.remote(executors.batches(scenarios, 1), pool, finish)
 
 
 def _row(scenario: Scenario, outcome: Outcome) -> dict:

@@ -10,6 +10,7 @@ failed if it did (`diverged_at` in s, `failure`), and from what to make it again
 """
 
 import dataclasses
+import hashlib
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,6 +21,7 @@ import numpy as np
 
 from smc_mujoco import record
 from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.files import from_json, reading, replacing, to_json
 from smc_mujoco.frozen import frozen
 from smc_mujoco.metrics import metrics
 from smc_mujoco.run import run
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
 BEFORE |= {"seed": "int64", "duration": "float64"}
 AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
+DIGEST = b"digest"  # in a file's metadata
 FEW: Mapping[str, Scenario] = frozen({})
 
 
@@ -46,6 +49,66 @@ def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
 
     kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
     return pa.schema([(name, kinds[kind]) for name, kind in columns().items()], metadata=dict(metadata or {}))
+
+
+def content(rows: "pa.Table") -> bytes:
+    """All that rows say, as bytes: names and values, with null apart from NaN."""
+    from pyarrow import types
+
+    parts = [to_json([rows.column_names, len(rows)]).encode()]
+    for column in rows.columns:
+        if types.is_floating(column.type) or types.is_integer(column.type):
+            parts += [column.is_null().to_numpy().tobytes(), column.to_numpy().tobytes()]
+        else:
+            parts.append(json.dumps(column.to_pylist()).encode())
+    return b"".join(parts)
+
+
+def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
+    """A parquet file, a row group a table, with a digest of all rows in its metadata.
+
+    Checksums of parquet cover pages, but neither their headers nor the footer.
+
+    Raises:
+      ScenarioError: the folder cannot be written.
+    """
+    import pyarrow.parquet as pq
+
+    digest = hashlib.sha256()
+    with (
+        replacing(path) as file,
+        file.open("wb") as sink,
+        pq.ParquetWriter(sink, schema, compression="zstd", write_page_checksum=True) as writer,
+    ):
+        for rows in groups:
+            writer.write_table(rows)
+            digest.update(content(rows))
+        writer.add_key_value_metadata({DIGEST: digest.hexdigest()})
+
+
+def read(path: Path, sealed: bool = False) -> "pa.Table":
+    """The rows that `write` wrote.
+
+    Args:
+      sealed: whether to refuse a file without a digest, as version 0.1 wrote them.
+
+    Raises:
+      ScenarioError: the file holds something else. Other errors: it is no parquet file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
+        rows = pa.concat_tables(groups) if groups else file.read()
+        metadata = dict(file.metadata.metadata or {})
+    said, digest = metadata.pop(DIGEST, None), hashlib.sha256()
+    for group in groups:
+        digest.update(content(group))
+    if said != digest.hexdigest().encode() and (sealed or said is not None):
+        raise ScenarioError("it is damaged, or was changed, since it was written")
+    metadata.pop(b"ARROW:schema", None)
+    return rows.replace_schema_metadata(metadata)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,21 +128,14 @@ class Table:
         """The table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:
-          ScenarioError: no such file, or no table of a study.
+          ScenarioError: no such file, no table of a study, or one that does not hold what was written.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        path = Path(path)
-        path = path / "results.parquet" if path.is_dir() else path
-        try:
-            data = pq.ParquetFile(path).read()
-        except FileNotFoundError:
-            raise ScenarioError(f"no table at {path}: give the results.parquet of a study that has ended") from None
-        except (OSError, pa.ArrowException):
-            raise ScenarioError(f"{path} is no parquet file: give the results.parquet of a study") from None
-        if missing := [name for name in (*BEFORE, *AFTER) if name not in data.column_names]:
-            raise ScenarioError(f"{path} has no column {missing[0]!r}: give the results.parquet of a study")
+        if isinstance(path, str | os.PathLike) and os.path.isdir(path):
+            path = Path(path) / "results.parquet"
+        with reading(path, "table", "give the results.parquet of a study that has ended") as file:
+            data = read(file)
+            if missing := [name for name in (*BEFORE, *AFTER) if name not in data.column_names]:
+                raise ScenarioError(f"it has no column {missing[0]!r}")
         return cls(data=data)
 
     def __len__(self) -> int:
@@ -123,7 +179,7 @@ class Table:
             raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
         row = self.data.slice(int(i) % len(self), 1)
         known = self.known.get(row["hash"][0].as_py())
-        return known or record.restore(json.loads(row["scenario"][0].as_py()))
+        return known or record.restore(from_json(row["scenario"][0].as_py()))
 
     def trace(self, i: int) -> Trace:
         """The trace of row i: the run once more, which with the same versions is the same to the last bit."""

@@ -1,12 +1,18 @@
 """What every command shares: errors as sentences, loading that Ctrl-C cannot break, and a clock."""
 
 import contextlib
+import os
 import signal
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 @contextlib.contextmanager
@@ -16,6 +22,9 @@ def mendable() -> Iterator[None]:
         yield
     except ScenarioError as error:
         _fail(str(error))
+    except BrokenPipeError:  # who read has had enough, as head does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
     except OSError as error:
         _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
     except KeyboardInterrupt:
@@ -23,8 +32,13 @@ def mendable() -> Iterator[None]:
 
 
 def _fail(sentence: str, code: int = 2) -> None:
-    print(f"smc-mujoco: {sentence}", file=sys.stderr)
+    print(f"smc-mujoco: {printable(sentence)}", file=sys.stderr)
     raise SystemExit(code)
+
+
+def wrote(console: "Console", path: Path) -> None:
+    """Say which file was written, on one line."""
+    console.print(f"wrote {printable(str(path))}", soft_wrap=True, highlight=False, markup=False)
 
 
 @contextlib.contextmanager

@@ -1,24 +1,24 @@
 """A trace: what one run did at its control samples, with the scenario that made it."""
 
 import dataclasses
-import json
 import math
 import os
 import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
+from numpy.lib import format as npy
 
 from smc_mujoco import record
-from smc_mujoco.errors import ScenarioError, find, one_line, shown
-from smc_mujoco.files import replacing
+from smc_mujoco.errors import ScenarioError, find, one_line
+from smc_mujoco.files import from_json, reading, replacing, to_json
 from smc_mujoco.plant import EFFORT
 from smc_mujoco.row import LOGGED
 from smc_mujoco.scenario import Scenario
 
 ARRAYS = ("t", *LOGGED)
 LONGEST_FAILURE = 500  # characters; chosen
+MOST_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
 NEWER = ("force", "reaction")  # which the oldest files lack: they hold ideal runs
 
 
@@ -71,7 +71,12 @@ class Trace:
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .npz file that `smc.load` reads back, making folders; an old file is replaced whole or not at all."""
         path = _suffixed(path, ".npz")
-        about = json.dumps(record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
+        about = to_json(record.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
+        if len(about) > MOST_TEXT:
+            raise ScenarioError(
+                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MOST_TEXT:,} "
+                "are not read back: give it shorter time series"
+            )
         arrays = {name: getattr(self, name) for name in ARRAYS}
         with replacing(path) as file:
             np.savez_compressed(file, about=np.array(about), **arrays)
@@ -123,7 +128,7 @@ def _write_csv(trace: Trace, file: Path) -> None:
 def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
-    about, units = json.dumps(record.describe(trace.scenario)), trace.units()
+    about, units = to_json(record.describe(trace.scenario)), trace.units()
     listed = {name: [units[c] for c in units if c.rstrip("0123456789") == name] for name in ARRAYS}
     alike = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in listed.items()}
     arrays = {name: getattr(trace, name) for name in ARRAYS}
@@ -134,7 +139,7 @@ def _write_parquet(trace: Trace, file: Path) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    about = json.dumps(record.describe(trace.scenario))
+    about = to_json(record.describe(trace.scenario))
     fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in trace.units().items()]
     with file.open("wb") as stream:  # whose errors say what is wrong as those of other files do
         parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
@@ -186,36 +191,48 @@ def load(path: str | os.PathLike) -> Trace:
     Raises:
       ScenarioError: no such file, or not a trace.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise ScenarioError(f"cannot load {shown(path)}: give the path of a .npz file that a run wrote")
-    path = Path(path)
-    if not path.exists() and path.with_name(f"{path.name}.npz").exists():
-        path = path.with_name(f"{path.name}.npz")
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
-            older = "mechanism" not in about
-            arrays = {name: file[name] for name in ARRAYS if not (older and name in NEWER)}
-    except FileNotFoundError:
-        raise ScenarioError(f"no trace at {path}: give the path of a .npz file that a run wrote") from None
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, NotImplementedError):
-        raise ScenarioError(f"{path} is no trace of smc_mujoco: give a .npz file that a run wrote") from None
-    try:
+    if isinstance(path, str | os.PathLike) and not os.path.exists(path) and os.path.exists(f"{os.fspath(path)}.npz"):
+        path = f"{os.fspath(path)}.npz"
+    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+        about = from_json(str(_member(archive, "about")))
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
+        older = "mechanism" not in about
+    try:
         scenario = record.restore(about)
     except ScenarioError as error:  # which names a cure of its own
         raise ScenarioError(f"the scenario of {path} cannot be brought back, {error}") from None
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except Exception as error:  # of JSON that is no scenario
         why = f"{type(error).__name__}, {error}"
         raise ScenarioError(
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
-    shape = (scenario.samples + 1, scenario.plant.n)
+    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+        names = [name for name in ARRAYS if not (older and name in NEWER)]
+        arrays = {name: _member(archive, name, scenario) for name in names}
     arrays.setdefault("force", arrays["applied"].copy())
     arrays.setdefault("reaction", np.where(np.isfinite(arrays["applied"]), 0.0, np.nan))
-    if any(a.shape != (shape[:1] if name == "t" else shape) or a.dtype != float for name, a in arrays.items()):
-        raise ScenarioError(f"{path} holds arrays that do not fit its scenario: give a file that a run wrote")
     return Trace(**arrays, scenario=scenario, **end)
+
+
+_KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
+
+
+def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
+    """An array out of a file: one that fits the scenario, or else a text. Its size is known before it is read."""
+    with archive.open(f"{name}.npy") as stream:
+        headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+        shape, _, dtype = headers[npy.read_magic(stream)](stream)
+    if scenario is None:
+        fits = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MOST_TEXT
+    else:
+        fits = dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
+    if not fits:
+        raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
+    with archive.open(f"{name}.npy") as stream:
+        found = npy.read_array(stream, allow_pickle=False)
+        if stream.read(1):  # at its end the checksum is compared
+            raise ScenarioError(f"its {name} is longer than it says")
+    return found
 
 
 def _suffixed(path: str | os.PathLike, suffix: str) -> Path:

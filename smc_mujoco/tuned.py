@@ -1,7 +1,6 @@
 """What a tuning found, with all that it depends on: saved as JSON, and compared only with its like."""
 
 import dataclasses
-import json
 import math
 import os
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from smc_mujoco import __version__, gains, record
 from smc_mujoco.bounds import Box, at_bound, box
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError, shown
-from smc_mujoco.files import replacing
+from smc_mujoco.files import read_json, reading, write_json
 from smc_mujoco.objective import FAILED, Objective, described
 from smc_mujoco.plant import Plant
 
@@ -123,9 +122,7 @@ class Tuned:
             "history": [dataclasses.astuple(e) for e in self.history],
             "finals": [dataclasses.astuple(e) for e in self.finals],
         }
-        with replacing(path) as file:
-            file.write_text(json.dumps(data) + "\n")
-        return path
+        return write_json(path, data)
 
 
 def checked(path: str | os.PathLike) -> Path:
@@ -142,8 +139,8 @@ def load(path: str | os.PathLike) -> Tuned:
     Raises:
       ScenarioError: no such file, or no tuning.
     """
-    try:
-        data = json.loads(Path(path).read_text())
+    with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
+        data = read_json(file)
         scenario = record.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
@@ -159,11 +156,6 @@ def load(path: str | os.PathLike) -> Tuned:
             plant=scenario.plant,
             definition=described(data["definition"]),
         )
-    except FileNotFoundError:
-        raise ScenarioError(f"no tuning at {path}: give the path of a .json file that Tuned.save wrote") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        why = f"{type(error).__name__}, {error}"
-        raise ScenarioError(f"{path} is no tuning ({why}): give a .json file that Tuned.save wrote") from None
 
 
 def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) -> Tuned:

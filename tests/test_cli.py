@@ -130,6 +130,30 @@ def test_list_names_everything_there_is(call):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_no_line_about_a_thing_ends_where_its_formula_would_begin(call, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "400")
+    _, out, _ = call("list")
+    assert "differentiator of order n = 1, 2, 3 (with n = 1 the super-twisting one)" in out
+    assert [line for line in out.splitlines() if line.rstrip().endswith((":", ","))] == []
+
+
+def test_a_terminal_without_a_width_has_80_columns(call, monkeypatch):
+    shown = call("list")
+    monkeypatch.setenv("COLUMNS", "0")
+    assert call("list") == shown
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+def test_with_its_output_closed_a_command_does_its_work(trace, folder):
+    code = "from smc_mujoco.cli import main; main()"
+    command = f'"{sys.executable}" -c "{code}" show one.npz --export csv <&- >&-'
+    done = subprocess.run(
+        ["sh", "-c", command], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (folder / "one.csv").read_text().startswith("t [s],")
+
+
 # run
 
 
@@ -378,6 +402,23 @@ def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace
     np.testing.assert_array_equal(table[position], smc.load(trace).x[:, 0])
     assert (folder / "drawn" / "one.svg").read_text().rstrip().endswith("</svg>")
     assert (folder / "drawn" / "one.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_show_exports_several_formats_beside_the_trace(call, trace, folder):
+    code, out, err = call("show", trace, "--export", "csv, mat")
+    assert (code, err) == (0, "")
+    assert re.findall(r"wrote (\S+)", out) == [str(folder / "one.csv"), str(folder / "one.mat")]
+    assert (folder / "one.csv").exists()
+    assert (folder / "one.mat").exists()
+    refused(call("show", trace, "--export", "csv,mta"), "did you mean 'mat'?")
+
+
+def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
+    path = folder / "a\n\x1b[31m[b].npz"
+    refused(call("show", path), r"a\n\x1b[31m[b].npz")
+    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05)).save(path)
+    _, out, _ = call("show", path, "--export", "csv")
+    assert [line for line in out.splitlines() if line.startswith("wrote")] == [rf"wrote {folder}/a\n\x1b[31m[b].csv"]
 
 
 def test_show_of_a_failed_run_says_why(call, folder):

@@ -13,7 +13,7 @@ import pytest
 from episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
-from smc_mujoco import assembly, consistency, design, identity, linear, own_channels, paper, plain, setting, tasks
+from smc_mujoco import assembly, consistency, design, identity, linear, mjcf, own_channels, paper, plain, setting, tasks
 from smc_mujoco.believed import Believed, prepared
 from smc_mujoco.c import build
 from smc_mujoco.frozen import frozen
@@ -960,6 +960,14 @@ def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
     assert (arm(bodies=body), len(ran)) == (first, 1)
     arm(bodies=BALL + body)
     assert len(ran) == 2
+
+
+def test_a_plugin_that_this_process_alone_may_have_is_left_to_it(arm, tmp_path):
+    rest = ACTUATED + '<extension><plugin plugin="no.such"/></extension>'
+    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): mend the file"):
+        arm(rest=rest)
+    path = tmp_path / "arm.xml"
+    mjcf.tried(mjcf.source(path), 20.0)  # says nothing of it
 
 
 def test_numbers_that_may_be_infinite_are_ranges_alone(arm):

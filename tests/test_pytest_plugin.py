@@ -372,7 +372,7 @@ def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
     session(GOLDEN.replace("PHI", "2.0"), "--smc-update", passed=1)
     held = json.loads((pytester.path / "test_my_laws.golden.json").read_text(), parse_constant=pytest.fail)
     assert list(held) == ["test_as_ever", "test_as_ever 2"]
-    assert held["test_as_ever"]["settling_time"] == {"value": "inf", "tolerance": 0.001, "unit": "s"}
+    assert held["test_as_ever"]["settling_time"] == {"value": "Infinity", "tolerance": 0.001, "unit": "s"}
     assert len(held["test_as_ever 2"]) > 10
     assert "stick_time" not in held["test_as_ever 2"]
     session(GOLDEN.replace("PHI", "2.0"), passed=1)  # "never" is as golden as a number

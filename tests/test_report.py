@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smc_mujoco import gl, paper, run
+from smc_mujoco import gains, gl, paper, run
 from smc_mujoco.report import answer, charts, films, kept, page, panels, report, stages, words
 from smc_mujoco.report import scores as scores_of
 from smc_mujoco.report.bars import Bars
@@ -34,6 +34,7 @@ TINY = dataclasses.replace(
     seeds=2,
     duration=0.3,
     kinds=("delay",),
+    compared=("delay",),
     basins=("duffing",),
     basin_laws=("observer_free", "classical"),
     points=(3, 2),
@@ -174,6 +175,64 @@ def test_margins_and_fronts_are_told_as_found(reader, findings):
     assert [float(cells[3][0]["data-v"]) for cells in rows] == [m.value for m in findings.margins]
     rows = [row[1] for row in reader.rows["fronts"] if row[1]]
     assert [float(cells[2][0]["data-v"]) for cells in rows] == [f.chosen[0] for f in findings.fronts]
+
+
+def test_margins_are_told_under_every_set_of_gains_side_by_side(text, reader, findings):
+    assert list(findings.by_set) == ["tuned", "study", "tracking"]
+    assert findings.by_set["tuned"] == findings.margins
+    rows = [row[1] for row in reader.rows["sets-table"] if row[1]]
+    for margins, column in zip(findings.by_set.values(), (3, 4, 5), strict=True):
+        assert [m.value for m in margins] == [float(cells[column][0]["data-v"]) for cells in rows]
+
+
+def test_the_gains_of_every_set_stand_beside_each_other(reader, findings):
+    rows = {its["data-law"]: cells for its, cells in reader.rows["gains-table"] if cells}
+    assert list(rows) == list(TINY.laws)
+    sets = list(dict.fromkeys(row.set for row in findings.about.gains))
+    for row in findings.about.gains:
+        assert row.gains in rows[row.law][2 + sets.index(row.set)][1]
+
+
+def test_a_law_that_a_set_has_no_gains_for_stands_there_without(findings):
+    few = {"tuned": findings.by_set["tuned"], "study": findings.by_set["study"][:1]}
+    rows = page.set_margins(dataclasses.replace(findings, by_set=few))
+    assert [[margin is not None for margin in row.by_set] for row in rows] == [
+        [True, True],
+        [True, False],
+        [True, False],
+    ]
+    text = page.page(dataclasses.replace(findings, by_set=few))
+    assert "The same under every set of gains" in text
+
+
+THIRTEEN = (
+    *("observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting"),
+    *("implicit_super_twisting", "twisting", "nonsingular_terminal", "fixed_time", "integral", "disturbance_observer"),
+    "pid",
+)
+
+
+def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
+    monkeypatch.setattr(gains, "LAWS", THIRTEEN)
+    words._colours.cache_clear()
+    assert len({words.colour(law) for law in THIRTEEN}) == 13
+    assert len({words.short(law) for law in THIRTEEN}) == 13
+    assert max(len(words.short(law)) for law in THIRTEEN) <= 3
+    assert words.colour("classical") == words.style.law_colour("classical")
+    assert words.law("pid") == "PID"
+    words._colours.cache_clear()
+
+
+def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
+    cell = [s for s in findings.scores if s.law == "classical"]
+    many = tuple(s._replace(law=law) for law in THIRTEEN for s in cell)
+    place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
+    shown = dataclasses.replace(findings, scores=many, places=place)
+    forest = page.overview(shown)["forest"]
+    here = page.overview(findings)["forest"]
+    per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.HEADLINE)
+    assert per_law >= 15  # px: a line of text
+    assert all(words.law(law) in page.page(shown) for law in THIRTEEN)
 
 
 def test_a_map_is_drawn_as_it_was_found(findings):

@@ -324,6 +324,9 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].verdict == (
         "winner: a, in all 2 conditions"
     )
+    text = " ".join(printed([board]).split())
+    assert "too few" not in text
+    assert text.count("1 won 2 lost") == 3
     level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
     assert level.verdict == "no winner in all 2 conditions: a wins under c1"
 

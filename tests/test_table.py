@@ -2,14 +2,19 @@
 
 import json
 import math
+import os
+from collections.abc import Iterator
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.grids import grid
+from smc_mujoco.store import Store
 from smc_mujoco.study import condition, key, study
-from smc_mujoco.table import Table
+from smc_mujoco.table import Table, content
 
 
 def small(seeds: int = 2) -> list[smc.Scenario]:
@@ -65,7 +70,77 @@ def test_what_is_no_table_is_one_sentence(tmp_path):
     with pytest.raises(smc.ScenarioError, match="no table at"):
         Table.read(tmp_path)
     (tmp_path / "results.parquet").write_text("nothing")
-    with pytest.raises(smc.ScenarioError, match="is no parquet file"):
+    with pytest.raises(smc.ScenarioError, match="is no table"):
+        Table.read(tmp_path)
+
+
+def flipped(data: bytes, bits: int) -> Iterator[bytes]:
+    """The data with one bit flipped, so many times, all over it."""
+    for i in range(bits):
+        bit = i * (8 * len(data)) // bits + i % 7
+        yield data[: bit // 8] + bytes([data[bit // 8] ^ 1 << bit % 8]) + data[bit // 8 + 1 :]
+
+
+def test_no_bit_that_flips_makes_a_table_of_other_rows(tmp_path):
+    right = repr(study(small(), tmp_path).rows())
+    path, refused = tmp_path / "results.parquet", 0
+    for damaged in flipped(path.read_bytes(), 300):
+        path.write_bytes(damaged)
+        try:
+            assert repr(Table.read(path).rows()) == right
+        except smc.ScenarioError:
+            refused += 1
+    assert refused > 100
+
+
+def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
+    right = repr(study(small(), tmp_path).rows())
+    (path,) = (tmp_path / "parts").glob("*.parquet")
+    lost = 0
+    for damaged in flipped(path.read_bytes(), 300):
+        path.write_bytes(damaged)
+        store = Store(tmp_path)
+        store.open(resume=True)
+        if not store.where:
+            lost += 1
+            continue
+        assert len(store.where) == len(small())
+        store.collect([key(s) for s in small()])
+        assert repr(Table.read(tmp_path).rows()) == right
+    assert lost > 100
+
+
+def test_a_table_without_a_digest_is_read_and_a_part_without_one_is_computed_again(tmp_path):
+    rows = study(small(), tmp_path).rows()
+    paths = [tmp_path / "results.parquet", *(tmp_path / "parts").glob("*.parquet")]
+    for path in paths:  # as version 0.1 wrote them
+        old = pq.read_table(path)
+        pq.write_table(old.replace_schema_metadata({"scores": old.schema.metadata[b"scores"]}), path)
+    assert Table.read(tmp_path).rows() == rows
+    store = Store(tmp_path)
+    store.open(resume=True)
+    assert not store.where
+
+
+def test_a_digest_of_other_rows_is_refused_and_a_copy_of_some_rows_is_a_table(tmp_path):
+    table = study(small(), tmp_path)
+    path = tmp_path / "results.parquet"
+    metadata = {"digest": pq.ParquetFile(path).metadata.metadata[b"digest"]}
+    pq.write_table(table.data.slice(1).replace_schema_metadata(metadata), path)
+    with pytest.raises(smc.ScenarioError, match="it is damaged, or was changed, since it was written"):
+        Table.read(path)
+    pq.write_table(table.data.slice(1), path)
+    assert Table.read(path).rows() == table.rows()[1:]
+
+
+def test_null_and_nan_are_not_the_same_content():
+    columns = ([1.0, None], [1.0, math.nan], [None, 1.0])
+    assert len({content(pa.table({"x": pa.array(column)})) for column in columns}) == 3
+
+
+def test_a_pipe_is_no_table(tmp_path):
+    os.mkfifo(tmp_path / "results.parquet")
+    with pytest.raises(smc.ScenarioError, match="it is no regular file"):
         Table.read(tmp_path)
 
 

@@ -12,6 +12,8 @@ import pickle
 import re
 import subprocess
 import sys
+import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -379,6 +381,83 @@ def test_arrays_of_the_wrong_shape_are_no_trace(array, trace, tmp_path):
     assert trace.x.shape == (11, 3)
     path = tampered(trace, tmp_path, x=array)
     refused(lambda: smc.load(path), "a.npz")
+
+
+def with_member(trace, folder, name: str, content: bytes) -> Path:
+    """The file of a trace, one member of which has other bytes."""
+    path = trace.save(folder / "a.npz")
+    with zipfile.ZipFile(path) as old:
+        held = {member: old.read(member) for member in old.namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        for member, data in (held | {f"{name}.npy": content}).items():
+            new.writestr(member, data)
+    return path
+
+
+def array(header: str, data: bytes = b"") -> bytes:
+    """A .npy file with such a header."""
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + data
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "kind"), [("x", (11, 3 * 10**6), "<f8"), ("t", (10**12,), "<f8"), ("about", (), "<U400000000")]
+)
+def test_an_array_too_large_is_refused_before_it_is_read(name, shape, kind, trace, tmp_path):
+    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}}}"
+    path = with_member(trace, tmp_path, name, array(header, bytes(10**8)))
+    tracemalloc.start()
+    try:
+        refused(lambda: smc.load(path), "a.npz", f"its {name} is")
+        assert tracemalloc.get_traced_memory()[1] < 10**7
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (11,"),  # TokenError
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (1e999,)}"),
+        array(f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**30},)}}"),  # OverflowError
+        array(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {'(' * 300 + ')' * 300}}}"),
+        array("{'descr': 5, 'fortran_order': False, 'shape': (11, 3)}"),
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (11, 3)}", bytes(11 * 3 * 8 + 1)),
+        b"\x93NUMPY\x09\x00" + bytes(20),
+    ],
+    ids=lambda content: repr(content[:60]),
+)
+def test_a_member_that_is_no_array_is_no_trace(content, trace, tmp_path):
+    path = with_member(trace, tmp_path, "x", content)
+    refused(lambda: smc.load(path), "a.npz")
+
+
+@pytest.mark.parametrize("about", ["[" * 10**5, "{", "NaN", "9" * 5000, '"\ud800"'], ids=lambda about: about[:9])
+def test_a_description_that_is_no_json_is_no_trace(about, trace, tmp_path):
+    text = np.array(about)
+    header = f"{{'descr': '{text.dtype.str}', 'fortran_order': False, 'shape': ()}}"
+    path = with_member(trace, tmp_path, "about", array(header, text.tobytes()))
+    refused(lambda: smc.load(path), "a.npz")
+
+
+def test_a_file_that_is_encrypted_or_packed_in_another_way_is_no_trace(trace, tmp_path):
+    path = trace.save(tmp_path / "a.npz")
+    good = path.read_bytes()
+    for offset, value in ((6, 1), (8, 99)):  # of a local header; 8 and 10 of the directory's
+        at = good.index(b"PK\1\2") + offset + 2
+        path.write_bytes(good[:at] + bytes([value]) + good[at + 1 :])
+        refused(lambda: smc.load(path), "a.npz")
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a"])
+def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path):
+    os.mkfifo(tmp_path / "a.npz")
+    refused(lambda: smc.load(tmp_path / name), "it is no regular file")
+
+
+def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch):
+    monkeypatch.setattr("smc_mujoco.trace.MOST_TEXT", 100)
+    refused(lambda: trace.save(tmp_path / "a.npz"), "give it shorter time series")
+    assert names(tmp_path) == []
 
 
 # disks

@@ -16,6 +16,7 @@ from smc_mujoco import paper
 from smc_mujoco.claims.checks import Beside, Check, check, ratio
 from smc_mujoco.component import Component
 from smc_mujoco.errors import ScenarioError
+from smc_mujoco.files import from_json
 from smc_mujoco.identity import key
 from smc_mujoco.metrics import metrics, score
 from smc_mujoco.run import stream
@@ -121,12 +122,10 @@ def scored(trace: Trace) -> Scores:
 
 def of_table(table: "Table") -> dict[str, Held]:
     """The runs that a study's table holds, by key."""
-    import json
-
     names = [m.name for m in metrics()]
     found = {}
     for row in table.rows():
         failed = row["failure"] is not None
         scores = {n: math.inf if failed else float(row[n]) for n in names if failed or row.get(n) is not None}
-        found[row["hash"]] = Held(row["law"], json.loads(row["gains"]), scores)
+        found[row["hash"]] = Held(row["law"], from_json(row["gains"]), scores)
     return found

@@ -1,6 +1,6 @@
 """How claims are shown: a table of verdicts, one claim in full, a JSON document."""
 
-import json
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from rich.text import Text
 from smc_mujoco import __version__
 from smc_mujoco.claims.checks import Check
 from smc_mujoco.claims.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, VERDICTS, Claim
-from smc_mujoco.files import replacing
+from smc_mujoco.files import replacing, to_json
 
 # Told by shape as well as by colour, of a palette for the colour-blind.
 MARKS = {SUPPORTED: "●", PARTLY: "◐", REFUTED: "○", NOT_TESTABLE: "–"}
@@ -116,7 +116,7 @@ def _mark(verdict: str) -> Text:
 
 def document(claims: Sequence[Claim]) -> str:
     """The claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
-    return json.dumps({"smc_mujoco": __version__, "claims": [claim.plain() for claim in claims]}, indent=1)
+    return to_json({"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}, indent=1)
 
 
 def write(text: str, path: Path) -> None:

@@ -10,10 +10,10 @@ An existential one is supported by an example under one set.
 """
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from smc_mujoco import files
 from smc_mujoco.claims.checks import Beside, Check
 from smc_mujoco.errors import ScenarioError
 
@@ -63,16 +63,7 @@ class Claim:
 
     def plain(self) -> dict[str, Any]:
         """As JSON without loss: numbers that JSON lacks become "Infinity", "-Infinity" and "NaN"."""
-        return _strict(dataclasses.asdict(self))
-
-
-def _strict(value: Any) -> Any:
-    """Dictionaries of numbers with words for those that are not finite."""
-    if isinstance(value, dict):
-        return {name: _strict(part) for name, part in value.items()}
-    if isinstance(value, float) and not math.isfinite(value):
-        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
-    return value
+        return files.plain(dataclasses.asdict(self))
 
 
 def verdict(found: Found, quantifier: str = NAMED) -> str:

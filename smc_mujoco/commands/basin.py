@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.commands import asked
-from smc_mujoco.terminal import Clock, loading, mendable
+from smc_mujoco.terminal import Clock, loading, mendable, wrote
 
 
 def basin(
@@ -62,4 +62,4 @@ def basin(
         written = [found.save(json)] if json else []
         written += [region.draw([found], out)] if out else []
         for path in written:
-            console.print(f"wrote {path}", soft_wrap=True, highlight=False)
+            wrote(console, path)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.errors import printable
 from smc_mujoco.terminal import Clock, loading, mendable
 
 
@@ -54,5 +55,6 @@ def claims(
             print(text)
         else:
             show.tell(found, console, full=bool(ids))
-            where = "; quick: coarser grids than the claims say" * quick + (f"; wrote {out}" if out else "")
+            written = f"; wrote {printable(str(out))}" if out else ""
+            where = "; quick: coarser grids than the claims say" * quick + written
             console.print(f"{clock.spent['in all']:.0f} s{where}", style="dim", soft_wrap=True, highlight=False)

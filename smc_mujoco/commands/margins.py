@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.commands import asked
-from smc_mujoco.terminal import Clock, loading, mendable
+from smc_mujoco.terminal import Clock, loading, mendable, wrote
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -72,7 +72,7 @@ def margins(
         said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"
         console.print(said, style="dim", soft_wrap=True, highlight=False)
         if json:
-            console.print(f"wrote {save(found, json)}", soft_wrap=True, highlight=False)
+            wrote(console, save(found, json))
 
 
 def table(kind: str, found: "list[Margin]") -> "Table":

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.errors import printable
 from smc_mujoco.terminal import loading, mendable
 
 
@@ -12,7 +13,7 @@ def report(
     quick: Annotated[bool, typer.Option("--quick", help="A look in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 6 decide nothing.")
+        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 name no winner.")
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
 ) -> None:
@@ -29,4 +30,4 @@ def report(
             from smc_mujoco.report import report as make
 
         path = make(out, quick, seeds, threads, progress=True)
-        print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
+        print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.commands import asked
-from smc_mujoco.terminal import Clock, loading, mendable
+from smc_mujoco.terminal import Clock, loading, mendable, wrote
 
 
 def tune(
@@ -71,9 +71,9 @@ def tune(
         if found.objective > found.before:
             console.print("no set of gains tried is better than the default ones: give a larger --budget")
         if path:
-            console.print(f"wrote {found.save(path)}", soft_wrap=True, highlight=False)
+            wrote(console, found.save(path))
         if front:
             from smc_mujoco.draw.pareto import pareto
 
             for drawn in pareto([found], front):
-                console.print(f"wrote {drawn}", soft_wrap=True, highlight=False)
+                wrote(console, drawn)

@@ -28,8 +28,8 @@ def report(
 
     Args:
       out: the folder; what it holds already is not computed again.
-      quick: a look in two minutes: fewer conditions, shorter runs, coarser maps, one set of gains for the claims.
-      seeds: of every cell of the grid; fewer than six can tell no law from another.
+      quick: a look in two minutes: less of everything, one set of gains for the claims.
+      seeds: of every cell of the grid; fewer than 16 name no winner.
       threads: simulations at once; None for one per available core.
       progress: whether to show a bar a stage.
       plan: how much of everything, instead of `quick`.

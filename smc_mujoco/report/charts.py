@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from smc_mujoco.margins import Margin
 
 # Of logarithmic axes; plotly writes powers a quarter larger than it is told.
+KEYS = 5  # laws in a line of a legend
 POWERS: dict[str, Any] = {"exponentformat": "power", "tickfont": AXIS["tickfont"] | {"size": 9}}
 
 
@@ -42,7 +43,9 @@ def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str
         y = {"categoryarray": [words.escape(words.law(law)) for law in reversed(laws)], "categoryorder": "array"}
         y |= {"dtick": 1, "showticklabels": k % len(plants) == 0, "tickfont": {"size": 11.5, "color": style.INK}}
         layout |= axes(panel, x, y | {"range": [-0.6, len(laws) - 0.4], "showgrid": False})
-    return figure(data, layout | {"margin": {"l": 172, "r": 14, "t": 58, "b": 34}}, 84 + 128 * len(metrics))
+    return figure(
+        data, layout | {"margin": {"l": 172, "r": 14, "t": 58, "b": 34}}, 84 + (32 + 16 * len(laws)) * len(metrics)
+    )
 
 
 def _range(ends: tuple[bool, float, float]) -> list[float]:
@@ -113,9 +116,10 @@ def fronts(found: Sequence[Front], plants: Sequence[str]) -> Figure:
             y["title"] = AXIS["title"] | {"text": "tracking, s²"}
         layout |= axes(panel, x, y | {"range": up})
     data += [_key(law) for law in laws]
-    layout |= {"margin": {"l": 60, "r": 12, "t": 104, "b": 54}}
-    layout |= {"legend": {"orientation": "h", "x": 0, "y": 1.2, "yanchor": "bottom", "font": {"size": 12}}}
-    return figure(data, layout, 422, legend=True)
+    key = 21 * math.ceil(len(laws) / KEYS)  # px that the legend takes above the panels
+    layout |= {"margin": {"l": 60, "r": 12, "t": 62 + key, "b": 54}}
+    layout |= {"legend": {"orientation": "h", "x": 0, "y": 1 + 52 / 264, "yanchor": "bottom", "font": {"size": 12}}}
+    return figure(data, layout, 380 + key, legend=True)
 
 
 def _span(values: Sequence[float], least: float | None) -> list[float]:

@@ -170,7 +170,7 @@ class About:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Everything a report tells."""
+    """Everything a report tells; `by_set`: set of gains -> the margins that are found under every set."""
 
     scores: tuple[Score, ...]
     places: tuple[Place, ...]
@@ -178,6 +178,7 @@ class Findings:
     fields: tuple[Field, ...]
     fronts: tuple[Front, ...]
     margins: "tuple[Margin, ...]"
+    by_set: "Mapping[str, tuple[Margin, ...]]"
     basins: "tuple[Basin, ...]"
     scenes: tuple[Scene, ...]
     about: About

@@ -6,6 +6,7 @@ A file's name ends in a hash of what it depends on: the arguments, the package's
 the packages below. What depends on anything else is computed anew.
 """
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Callable
@@ -29,9 +30,11 @@ def kept(
     """
     text = json.dumps([depends, source.code(), versions()], sort_keys=True, default=str)
     own = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
-    if not own.exists():
-        found = make()
-        for old in path.parent.glob(f"{path.stem}-{'?' * 12}.*"):
-            old.unlink()
-        save(found, own)
+    if own.exists():
+        with contextlib.suppress(Exception):  # whatever damaged bytes raise: it is computed again
+            return load(own)
+    found = make()
+    for old in path.parent.glob(f"{path.stem}-{'?' * 12}.*"):
+        old.unlink()
+    save(found, own)
     return load(own)

@@ -18,7 +18,7 @@ from typing import Any
 from smc_mujoco.metrics import metrics as catalogue_of_metrics
 from smc_mujoco.plant import catalogue
 from smc_mujoco.report import answer, charts, maps, terms, words
-from smc_mujoco.report.findings import Findings, Score
+from smc_mujoco.report.findings import Findings, Gains, Score
 
 TEMPLATES = Path(__file__).parent / "templates"
 SECTIONS = {
@@ -170,7 +170,20 @@ def margins(findings: Findings) -> dict[str, Any]:
             SimpleNamespace(name=kind, figure=figure, unit=" or ".join(u for u in units if u not in ("", "1")))
         )
     order = list(kinds)
-    return {"kinds": shown, "margin_rows": sorted(findings.margins, key=lambda m: order.index(m.kind))}
+    rows = sorted(findings.margins, key=lambda m: order.index(m.kind))
+    return {"kinds": shown, "margin_rows": rows, "set_margins": set_margins(findings)}
+
+
+def set_margins(findings: Findings) -> list[SimpleNamespace]:
+    """The margins under every set of gains: a row a kind, plant and law, with a Margin in each set, or None."""
+    known = {(m.kind, m.plant, m.law, name): m for name, own in findings.by_set.items() for m in own}
+    rows = dict.fromkeys(key[:3] for key in known)
+    return [
+        SimpleNamespace(
+            kind=kind, plant=plant, law=law, by_set=[known.get((kind, plant, law, n)) for n in findings.by_set]
+        )
+        for kind, plant, law in rows
+    ]
 
 
 def regions(findings: Findings) -> dict[str, Any]:
@@ -216,4 +229,14 @@ def method(findings: Findings) -> dict[str, Any]:
         "metrics": terms.definitions(),
         "gain_sets": list(dict.fromkeys(row.set for row in findings.about.gains)),
         "gain_laws": list(dict.fromkeys(row.law for row in findings.about.gains)),
+        "gain_rows": gain_rows(findings.about.gains),
     }
+
+
+def gain_rows(found: Sequence[Gains]) -> list[SimpleNamespace]:
+    """Every law's gains on every plant: a row each, with the Gains of each set, which may be none or several."""
+    sets = list(dict.fromkeys(row.set for row in found))
+    rows: dict[tuple[str, str], dict[str, list[Gains]]] = {}
+    for row in found:
+        rows.setdefault((row.plant, row.law), {name: [] for name in sets})[row.set].append(row)
+    return [SimpleNamespace(plant=plant, law=law, by_set=by_set) for (plant, law), by_set in rows.items()]

@@ -6,15 +6,15 @@ Killed and called again, nothing that was finished is computed again: the grid g
 the first plant, map, film or list of claims that is missing.
 """
 
-import json
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco import gains as sets
 from smc_mujoco import tuned
 from smc_mujoco.errors import ScenarioError
-from smc_mujoco.files import replacing
+from smc_mujoco.files import read_json, write_json
 from smc_mujoco.grids import grid as make_grid
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.report import about, films, scores
@@ -28,7 +28,6 @@ from smc_mujoco.study import study
 from smc_mujoco.table import Table
 
 PAPER = "observer_free"
-WORDS = {"Infinity": float("inf"), "-Infinity": float("-inf"), "NaN": float("nan")}
 FIELD_POINTS = 121  # of a map of V', along each axis
 
 
@@ -37,7 +36,8 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
     table = grid(work)
     judged = claims(work, table)
-    margins, basins, scenes = all_margins(work), all_basins(work), all_scenes(work)
+    margins = all_margins(work)
+    compared, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     with bars.stage("statistics"):
         return Findings(
             scores=scores.scores(table),
@@ -46,6 +46,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
             fields=fields(plan),
             fronts=fronts(plan),
             margins=margins,
+            by_set=compared,
             basins=basins,
             scenes=scenes,
             about=about.about(plan, table, bars.spent, _no_film(plan)),
@@ -83,42 +84,58 @@ def claims(work: Work, table: Table) -> tuple[Any, ...]:
             work.folder / "claims.json",
             [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
             lambda: tuple(judge(table, plan.claims, None, plan.quick, None, work.threads, told)),
-            lambda found, path: _write(path, [claim.plain() for claim in found]),
-            lambda path: tuple(Claim(**_numbers(entry)) for entry in json.loads(path.read_text())),
+            lambda found, path: write_json(path, [dataclasses.asdict(claim) for claim in found]),
+            lambda path: tuple(Claim(**entry) for entry in read_json(path)),
         )
-
-
-def _write(path: Path, data: object) -> None:
-    with replacing(path) as part:
-        part.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n")
-
-
-def _numbers(value: Any) -> Any:
-    """The numbers that `Claim.plain` wrote as words."""
-    if isinstance(value, Mapping):
-        return {name: _numbers(each) for name, each in value.items()}
-    return WORDS.get(value, value) if isinstance(value, str) else value
 
 
 def all_margins(work: Work) -> tuple[Any, ...]:
     """Every law's margins, plant by plant."""
+    plan = work.plan
+    plants = plan.plants if plan.kinds else ()
+    return _margins(work, "margins", GAINS, [(plant, plan.laws) for plant in plants], plan.kinds)
+
+
+def margins_by_set(work: Work, found: Sequence[Any]) -> dict[str, tuple[Any, ...]]:
+    """Set of gains -> margins of the kinds that are compared, of the laws that it has gains for."""
+    plan = work.plan
+    if not plan.compared:
+        return {}
+    by_set = {GAINS: tuple(margin for margin in found if margin.kind in plan.compared)}
+    for name in (name for name in sets.SETS if name != GAINS):
+        laws = [(plant, tuple(law for law in plan.laws if _has(plant, law, name))) for plant in plan.plants]
+        by_set[name] = _margins(work, f"margins-{name}", name, [one for one in laws if one[1]], plan.compared)
+    return by_set
+
+
+def _has(plant: str, law: str, gains: str) -> bool:
+    try:
+        sets.law(plant, law, gains)
+    except ScenarioError:
+        return False
+    return True
+
+
+def _margins(
+    work: Work, stage: str, gains: str, laws: Sequence[tuple[str, Sequence[str]]], kinds: Sequence[str]
+) -> tuple[Any, ...]:
+    """Margins of kinds under a set of gains, of each plant's laws."""
     from smc_mujoco.margins import load, margins, save
 
     plan, found = work.plan, []
-    plants = plan.plants if plan.kinds else ()
-    with work.bars.stage("margins", f"{len(plants)} plants") as report:
-        for k, plant in enumerate(plants):
-            told = part(report, k, len(plants))
+    with work.bars.stage(stage, f"{len(laws)} plants") as report:
+        for k, (plant, names) in enumerate(laws):
+            told = part(report, k, len(laws))
             found += kept(
-                work.folder / f"margins-{plant}.json",
-                [plan.laws, plan.kinds, plan.quick, GAINS],
-                lambda plant=plant, told=told: margins(
-                    [plant], plan.laws, plan.kinds, gains=GAINS, quick=plan.quick, threads=work.threads, report=told
+                work.folder / f"{stage}-{plant}.json",
+                [names, kinds, plan.quick, gains],
+                lambda plant=plant, names=names, told=told: margins(
+                    [plant], names, kinds, gains=gains, quick=plan.quick, threads=work.threads, report=told
                 ),
                 save,
                 load,
             )
-            report(k + 1, len(plants))
+            report(k + 1, len(laws))
     return tuple(found)
 
 

@@ -3,13 +3,14 @@
 Colours and names are those of `draw.style`; numbers those of the terminal's tables, three significant digits.
 """
 
+import functools
 import html
 import inspect
 import math
 import re
 
+from smc_mujoco import gains, tables
 from smc_mujoco import metrics as catalogue
-from smc_mujoco import tables
 from smc_mujoco.draw import style
 from smc_mujoco.plant import catalogue as plants
 
@@ -44,6 +45,7 @@ KINDS = {
     "noise": "position noise",
 }
 MARKS = {"supported": "●", "partly supported": "◐", "refuted": "○", "not testable": "–"}
+ABBREVIATIONS = {"pid": "PID", "lqr": "LQR"}
 PROPER = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
 
 __all__ = ["style"]
@@ -59,13 +61,18 @@ def law(name: str) -> str:
     from smc_mujoco.law import laws
 
     named = style.law_name(name)
-    plain = name.replace("_", " ")
+    plain = ABBREVIATIONS.get(name, name.replace("_", " "))
     return named if named != name or name not in laws() else plain[0].upper() + plain[1:]
 
 
 def colour(name: str) -> str:
-    """The colour that a law has in figures and films."""
-    return style.law_colour(name)
+    """The colour that a law has in figures and films; no two laws of the short list have the same."""
+    return _colours().get(name, style.law_colour(name))
+
+
+@functools.cache
+def _colours() -> dict[str, str]:
+    return dict(zip(gains.LAWS, style.law_colours(gains.LAWS), strict=True))
 
 
 def plant(name: str) -> str:
@@ -120,7 +127,11 @@ def short(law_name: str) -> str:
         "conditioned_super_twisting": "CS",
         "boundary_layer": "BL",
         "adaptive_leak": "AL",
-    }
+        "twisting": "TW",
+        "terminal": "TE",
+        "integral": "IN",
+        "dynamic": "DY",
+    } | ABBREVIATIONS
     return given.get(law_name, "".join(word[:1] for word in law_name.split("_")).upper()[:3] or "?")
 
 

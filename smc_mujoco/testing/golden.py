@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.errors import ScenarioError, number, shown
-from smc_mujoco.files import replacing
+from smc_mujoco.files import plain, read_json, replacing
 from smc_mujoco.testing.limits import Limit, answer, table, told
 from smc_mujoco.testing.response import StepResponse
 
@@ -39,12 +39,11 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
     for name in names:
         value = float(response.values[name])
         within = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
-        written = value if math.isfinite(value) else str(value)  # JSON has no infinity
-        entry[name] = {"value": written, "tolerance": within, "unit": response.unit(name)}
+        entry[name] = {"value": value, "tolerance": within, "unit": response.unit(name)}
     try:
         with locked(file.parent):
             known = (read(file) if file.exists() else {}) | {key: entry}
-            text = json.dumps(dict(sorted(known.items())), indent=2, ensure_ascii=False, allow_nan=False)
+            text = json.dumps(plain(dict(sorted(known.items()))), indent=2, ensure_ascii=False, allow_nan=False)
             with replacing(file) as part:
                 part.write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
@@ -132,7 +131,7 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
       ScenarioError: it is no golden file.
     """
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        found = read_json(file)
         if isinstance(found, dict) and all(isinstance(entry, dict) for entry in found.values()):
             return found
         why = "it is not test -> metric -> value"
