@@ -77,6 +77,10 @@ class Condition:
     name: str
     fields: Fields | Callable[[Plant, float], Fields]
 
+    def __post_init__(self):
+        if not callable(self.fields):
+            object.__setattr__(self, "fields", frozen({name: _frozen(value) for name, value in self.fields.items()}))
+
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
         """The Scenario fields on a plant, in runs of that duration; what happens once does so at half time.
 
@@ -115,7 +119,7 @@ def condition(name: str, **fields: Any) -> Condition:
             raise ScenarioError(f"condition {name!r} sets {field}, which the grid itself says: leave it out")
         if field not in FIELDS:
             raise unknown("field of a Scenario", field, FIELDS)
-    return Condition(name, frozen({field: _frozen(value) for field, value in fields.items()}))
+    return Condition(name, fields)
 
 
 def find_condition(value: Condition | str) -> Condition:

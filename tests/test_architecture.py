@@ -26,7 +26,6 @@ CORE = (
     {
         "surfaces",
         "native",
-        "guarded",
         "channels",
         "believed",
         "motors",
@@ -41,7 +40,7 @@ CORE = (
     {"given", "forces", "pendulum_chain", "cart", "own_model"},
     {"consistency", "pendulum_row"},
     {"scenario"},
-    {"harness", "record", "bounds", "assembly", "named_conditions", "initial_states"},
+    {"harness", "record", "bounds", "assembly", "guarded", "named_conditions", "initial_states"},
     {"gains"},
     {"callback", "trace", "paper"},
     {"plain", "groups"},
@@ -68,7 +67,7 @@ PUBLIC = {  # what type checkers see
 }
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
-MODULES = {path.stem: path for path in PACKAGE.glob("*.py") if path.stem != "__init__"}
+MODULES = {path.stem: path for path in PACKAGE.glob("*.py") if not path.stem.startswith("__")}
 MODULES |= {name: PACKAGE / name / "__init__.py" for name in CATALOGUES}
 SCENES = sorted((ROOT / "scenes").glob("*.py"))
 TEXTS = [
