@@ -94,12 +94,13 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
         given = signature.bind(*args, **named).arguments
     except TypeError:
         return _unbound(function, home, signature, args, named)
-    if home is not None and function.__name__ == "__init__":
-        return None  # its fields are made of more than their annotations say, and it checks them itself
-    hints = _hints(function)
+    kinds = {name: kind_of(hint) for name, hint in _hints(function).items()}
+    defaults = [(name, p.default) for name, p in signature.parameters.items() if name in kinds]
+    if not all(default is inspect.Parameter.empty or kinds[name].takes(default) for name, default in defaults):
+        return None  # a Scenario: its annotations say what fields hold, not what they are made from
     for name, value in given.items():
-        kind = kind_of(hints.get(name, Any))
-        if not kind.takes(value):
+        kind = kinds.get(name)
+        if kind and not kind.takes(value):
             broken = isinstance(value, str) and kind.takes("text")
             cure = "it without NUL and halves of surrogate pairs" if broken else kind.one
             return ScenarioError(f"{name} is {shown(value)}: give {cure}")
