@@ -449,13 +449,13 @@ def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int
                 stderr=errors,
             )
             hung = False
-            for line in lines(process):
-                hung = not line
-                if line and len(ended := json.loads(line)) > 1:
-                    yield tuple(ended)
-                    start = ended[0] + 1
-            process.kill()
-            process.wait()
+            with process:
+                for line in lines(process):
+                    hung = not line
+                    if line and (ended := json.loads(line)):
+                        yield tuple(ended)
+                        start = ended[0] + 1
+                process.kill()
             if start < end:
                 errors.seek(0)
                 told = [text.strip() for text in errors.read().decode(errors="replace").splitlines() if text.strip()]
