@@ -90,7 +90,7 @@ def test_values_that_the_function_does_not_check(trace):
     assert refused(smc.lqr, "duffing", q=3) == "q is 3: give 2 numbers"
     assert refused(smc.run, trace.scenario, progress=np.zeros(2)) == ("progress is array([0., 0.]): give True or False")
     assert refused(lambda: list(smc.stream([trace.scenario], report=3))) == "report is 3: give a function"  # type: ignore
-    assert refused(smc.leaderboard, 3) == "table is 3: give something that has column"
+    assert refused(smc.leaderboard, 3) == "table is 3: give something that has column and scenario"
 
 
 def test_a_method_of_what_a_function_returns(trace):

@@ -9,10 +9,6 @@ import wild
 
 import smc_mujoco as smc
 
-pytestmark = [  # gains, starts and motors are meant to be wild
-    pytest.mark.filterwarnings("ignore::smc_mujoco.GainWarning"),
-    pytest.mark.filterwarnings("ignore::smc_mujoco.ScenarioWarning"),
-]
 
 @pytest.mark.parametrize(("part", "cases"), [("scenarios", 150), ("batches", 10)])
 def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path, monkeypatch):
