@@ -94,7 +94,7 @@ def test_values_that_the_function_does_not_check(trace):
 
 
 def test_a_method_of_what_a_function_returns(trace):
-    assert refused(smc.load, trace) == f"cannot load {trace!r}: give the path of a .npz file that a run wrote"
+    assert refused(smc.load, trace) == f"cannot read {trace!r}: give the path of a .npz file that a run wrote"
     tuned = smc.tune("duffing", "classical", budget=8)
     assert refused(tuned.save, None) == "path is None: give a path"
 
