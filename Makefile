@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test check docs report gains gallery bench lock setup
+.PHONY: help demo test attack check docs report gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -18,6 +18,10 @@ demo: setup ## the inverted pendulum under the paper's four laws: scores, traces
 test: ## all tests
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest
+
+attack: ## random scenarios, calls and files by the thousand, for releases (10 minutes)
+	@./setup.sh requirements-test.lock
+	$(BIN)/python tests/attack.py
 
 check: ## lint, format and types
 	@./setup.sh requirements-test.lock

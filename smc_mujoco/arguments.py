@@ -47,8 +47,10 @@ def _open(kind: type) -> None:
     _KNOWN.add(kind)
     for name, held in list(vars(kind).items()):
         function = held.__func__ if isinstance(held, classmethod | staticmethod) else held
-        public = name == "__init__" or not name.startswith("_")
-        if public and isinstance(function, types.FunctionType) and len(function.__annotations__) > 1:
+        if not isinstance(function, types.FunctionType):
+            continue
+        asks = name == "__init__" or (not name.startswith("_") and len(function.__annotations__) > 1)
+        if asks:
             method = _explained(function, kind)
             setattr(kind, name, method if held is function else type(held)(method))
 
@@ -94,14 +96,15 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
         given = signature.bind(*args, **named).arguments
     except TypeError:
         return _unbound(function, home, signature, args, named)
-    if home is not None and function.__name__ == "__init__":
-        return None  # its fields are made of more than their annotations say, and it checks them itself
-    hints = _hints(function)
+    kinds = {name: kind_of(hint) for name, hint in _hints(function).items()}
+    defaults = {name: p.default for name, p in signature.parameters.items() if name in kinds}
+    if any(default is None and not kinds[name].takes(None) for name, default in defaults.items()):
+        return None  # a Scenario: its annotations say what fields hold, not what they are made from
     for name, value in given.items():
-        kind = kind_of(hints.get(name, Any))
-        if not kind.takes(value):
+        kind = kinds.get(name)
+        if kind and not kind.takes(value):
             broken = isinstance(value, str) and kind.takes("text")
-            cure = "it without NUL and halves of surrogate pairs" if broken else kind.one
+            cure = "shorter text, without NUL or halves of surrogate pairs" if broken else kind.one
             return ScenarioError(f"{name} is {shown(value)}: give {cure}")
     return None
 

@@ -12,10 +12,15 @@ import numpy as np
 
 T = TypeVar("T")
 LONGEST_NAME = 100  # characters: chosen, for tables and figures
+LONGEST = 1500  # characters of a message: a path may have any number
 
 
 class ScenarioError(ValueError):
-    """Bad input. The message is one sentence: the thing, its value, the cure."""
+    """Bad input. The message is one sentence on one line: the thing, its value, the cure."""
+
+    def __init__(self, message: str):
+        long = len(message) > LONGEST
+        super().__init__(printable(f"{message[: LONGEST - 503]}...{message[-500:]}" if long else message))
 
 
 class ScenarioWarning(UserWarning):

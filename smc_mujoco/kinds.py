@@ -4,15 +4,19 @@ kind_of(Sequence[float] | None).takes([1.0, "a"])        # False
 kind_of(Sequence[float] | None).one                      # "a list of numbers or None"
 """
 
+import math
 import os
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.errors import number, whole
+
+LONGEST = 255  # bytes of a file's name
 
 
 class Kind(NamedTuple):
@@ -39,14 +43,24 @@ def _text(value: Any) -> bool:
 
 
 def _path(value: Any) -> bool:
-    return not isinstance(value, str) and _text(os.fspath(value))
+    text = os.fspath(value)
+    return _text(text) and all(len(part.encode()) <= LONGEST for part in Path(text).parts)
+
+
+def _number(value: Any) -> bool:
+    plain = isinstance(value, float | np.floating) or math.isfinite(float(value))  # an int beyond floats is no number
+    return plain and not isinstance(value, np.ndarray) and number("", value, infinite=True) is not None
+
+
+def _whole(value: Any) -> bool:
+    return not isinstance(value, np.ndarray) and whole("", value, -(2**63), 2**63) is not None
 
 
 KINDS: dict[Any, Kind] = {
     Any: Kind(lambda value: True, "anything", "anything"),
     bool: Kind(_flag, "True or False", "flags"),
-    int: Kind(lambda value: whole("", value, -(2**63), 2**63) is not None, "a whole number", "whole numbers"),
-    float: Kind(lambda value: number("", value, infinite=True) is not None, "a number", "numbers"),
+    int: Kind(_whole, "a whole number", "whole numbers"),
+    float: Kind(_number, "a number", "numbers"),
     str: Kind(_text, "text", "texts"),
     os.PathLike: Kind(_path, "a path", "paths"),
     types.NoneType: Kind(lambda value: value is None, "None", "None"),
@@ -79,9 +93,9 @@ def kind_of(hint: Any) -> Kind:
 
 def _either(arms: Sequence[Kind]) -> Kind:
     """What fits one of the arms."""
-    paths = any(arm is KINDS[os.PathLike] for arm in arms)
-    named = [arm for arm in arms if not (paths and arm is KINDS[str])]
-    one, several = _joined([arm.one for arm in named]), _joined([arm.several for arm in named])
+    if KINDS[os.PathLike] in arms:  # which takes texts too, if they are paths
+        arms = [arm for arm in arms if arm is not KINDS[str]]
+    one, several = _joined([arm.one for arm in arms]), _joined([arm.several for arm in arms])
     return Kind(lambda value: any(arm.takes(value) for arm in arms), one, several)
 
 

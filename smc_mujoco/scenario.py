@@ -231,6 +231,10 @@ class Scenario:
 
     def stream(self, i: int) -> int:
         """The stream of random numbers of disturbance i, 0 for one that takes none."""
+        if not 0 <= i < len(self.disturbance):
+            raise ScenarioError(
+                f"there is no disturbance {shown(i)}: the scenario has {len(self.disturbance)}, from 0 on"
+            )
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 

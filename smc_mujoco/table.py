@@ -161,6 +161,7 @@ class Table:
         condition: str | Sequence[str] | None = None,
     ) -> "Table":
         """The rows with this plant, law and condition, each a name, several, or None for all."""
+        import pyarrow as pa
         import pyarrow.compute as pc
 
         data = self.data
@@ -170,7 +171,7 @@ class Table:
                 names = list(wanted) if isinstance(wanted, Iterable) and not isinstance(wanted, str) else [wanted]
                 for one in names:
                     find(f"{name} of this table", one, there)
-                data = data.filter(pc.field(name).isin(names))
+                data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))
         return dataclasses.replace(self, data=data)
 
     def scenario(self, i: int) -> Scenario:

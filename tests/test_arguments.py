@@ -4,9 +4,11 @@ import inspect
 import os
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 import smc_mujoco as smc
@@ -77,7 +79,7 @@ def test_arguments_that_lack_or_are_too_many(args, named, text):
         (None, "path is None: give a path"),
         (3, "path is 3: give a path"),
         (b"a.npz", "path is b'a.npz': give a path"),
-        ("\ud800.npz", "path is '\\ud800.npz': give it without NUL and halves of surrogate pairs"),
+        ("\ud800.npz", "path is '\\ud800.npz': give shorter text, without NUL or halves of surrogate pairs"),
     ],
 )
 def test_a_path_that_is_none(trace, path, text):
@@ -92,7 +94,7 @@ def test_values_that_the_function_does_not_check(trace):
 
 
 def test_a_method_of_what_a_function_returns(trace):
-    assert refused(smc.load, trace) == f"cannot load {trace!r}: give the path of a .npz file that a run wrote"
+    assert refused(smc.load, trace) == f"cannot read {trace!r}: give the path of a .npz file that a run wrote"
     tuned = smc.tune("duffing", "classical", budget=8)
     assert refused(tuned.save, None) == "path is None: give a path"
 
@@ -113,11 +115,11 @@ def test_a_sentence_of_the_functions_own_stays_as_it_is():
 @pytest.mark.parametrize(
     ("hint", "right", "wrong", "words"),
     [
-        (int, [1, 2.0, np.int64(3), np.array(4)], [1.5, True, "1", None, 2**80, np.timedelta64(1)], "a whole number"),
-        (float, [1, 0.5, np.float32(1), float("inf")], ["a", True, 1j, None, np.zeros(2)], "a number"),
+        (int, [1, 2.0, np.int64(3)], [1.5, True, "1", None, 2**80, np.timedelta64(1)], "a whole number"),
+        (float, [1, 0.5, np.float32(1), float("inf")], ["a", True, 1j, None, np.zeros(2), 10**400], "a number"),
         (bool, [True, 0, np.bool_(False)], [2, "yes", np.zeros(2), None], "True or False"),
         (str, ["", "a"], [b"a", 1, "\0", "\udc00"], "text"),
-        (str | os.PathLike, ["a", os.curdir], [b"a", 1, None], "a path"),
+        (str | os.PathLike, ["a", os.curdir, Path("a/b")], [b"a", 1, None, "x" * 256, "\0"], "a path"),
         (Sequence[str] | None, [None, ["a"], ("a",), []], ["a", 3, [3], {"a": 1}], "a list of texts or None"),
         (Iterable[float], [[1], iter("a"), np.zeros(3)], ["a", 3, [1, "a"], np.zeros((2, 2))], "a list of numbers"),
         (tuple[int, int], [(1, 2), [1, 2]], [(1,), (1, 2, 3), "ab", 3, (1, "a")], "2 whole numbers"),
@@ -171,6 +173,19 @@ def test_a_class_explains_itself_once():
 )
 def test_a_value_is_shown_whatever_its_repr_does(value, text):
     assert shown(value) == text
+
+
+def test_a_message_is_one_line_of_bounded_length():
+    text = str(smc.ScenarioError(f"cannot write {'x' * 10**6}\n\x1b[31m: choose another"))
+    assert len(text) < 2000
+    assert text.isprintable()
+    assert text.endswith("xx\\n\\x1b[31m: choose another")
+
+
+def test_a_table_selects_none_of_its_rows():
+    table = smc.Table(data=pa.table({"plant": ["duffing"]}))
+    assert len(table.select(plant=[])) == 0
+    assert len(table.select(plant=["duffing"])) == 1
 
 
 def test_control_characters_are_shown_as_escapes():

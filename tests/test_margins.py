@@ -235,7 +235,7 @@ def test_margins_survive_their_file(found, tmp_path):
     assert again == found
     assert math.isnan(rough.value)
     assert rough.theory == math.inf
-    assert "NaN" not in path.read_text()
+    json.loads(path.read_text(), parse_constant=pytest.fail)
 
 
 @pytest.mark.parametrize("text", ["", "3", '[{"plant": 1}]'])
@@ -267,7 +267,7 @@ def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
     command(["duffing"], "observer_free,classical", "disturbance", "study", quick=True, json=path)
     shown = capsys.readouterr().out
     assert "largest disturbance borne" in shown
-    assert "1.28" in shown
+    assert "1.29" in shown
     assert [entry["law"] for entry in json.loads(path.read_text())] == ["observer_free", "classical"]
 
 
