@@ -15,6 +15,7 @@ import types
 from typing import TYPE_CHECKING
 
 from smc_mujoco import gl, registration
+from smc_mujoco.interrupts import held_back
 
 if TYPE_CHECKING:
     from smc_mujoco import paper as paper
@@ -161,7 +162,8 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = importlib.import_module(f"{__name__}.{_HOME[name]}")
+    with held_back():
+        module = importlib.import_module(f"{__name__}.{_HOME[name]}")
     value = module if name == _HOME[name] == "paper" else getattr(module, name)
     value = globals()[name] = importlib.import_module(f"{__name__}.arguments").explained(value)
     return value

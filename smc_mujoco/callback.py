@@ -12,14 +12,14 @@ whose userdata hold no row of ours are left alone.
 import contextlib
 import functools
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from smc_mujoco import layout
-from smc_mujoco.compiled import integers, pointer
+from smc_mujoco.compiled import compiled, integers, pointer
 from smc_mujoco.harness import control as run_row
 from smc_mujoco.hook import held, uninstalled
 from smc_mujoco.row import HEADER, IS_ROW
@@ -63,7 +63,7 @@ def harness():
             carray(pointer(integers(data + applied)[0]), (1 << 40,)),
         )
 
-    return _compiled(types.void(types.intp, types.intp), control)
+    return compiled(types.void(types.intp, types.intp), control, cache=True)
 
 
 @functools.cache
@@ -73,14 +73,7 @@ def silence():
     def silent(message):
         return
 
-    return _compiled(types.void(types.intp), silent)
-
-
-def _compiled(signature, function: Callable):
-    try:
-        return cfunc(signature, error_model="numpy", cache=True)(function)
-    except RuntimeError:  # nowhere to write a cache
-        return cfunc(signature, error_model="numpy")(function)
+    return compiled(types.void(types.intp), silent, cache=True)
 
 
 @contextlib.contextmanager

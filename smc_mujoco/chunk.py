@@ -155,8 +155,10 @@ class Chunk:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
                 self.rows[i, row.FAILURE] = row.DIVERGED
                 self.rows[i, row.FAILED_STEP] = self.rows[i, row.CALLS] // self.rows[i, row.STAGES]
-        except (ValueError, mujoco.UnexpectedError):
-            pass  # someone's Python function took the callback's place; the count of calls tells
+        except (ValueError, mujoco.UnexpectedError) as error:
+            if "allocate memory" in str(error):
+                raise
+            # someone's Python function took the callback's place; the count of calls tells
         short = [i for i in alive if i not in self.errors and self.rows[i, row.CALLS] != self.calls]
         self.rows[short, row.FAILURE], self.rows[short, row.FAILED_STEP] = row.INTERRUPTED, before // self.first.stages
 

@@ -2,19 +2,38 @@
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
+import contextlib
 import functools
+import hashlib
+import io
+import os
 import re
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
 
 from llvmlite import ir
-from numba import cfunc, njit, types
+from numba import njit, types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.ccallback import CFunc
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import TypingError
+from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
+from smc_mujoco.interrupts import held_back
 from smc_mujoco.remade import remade
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
+DIGEST = hashlib.sha256().digest_size
+
+if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread that compiled in its parent
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )
 
 
 class NotCompilable(Exception):
@@ -99,12 +118,67 @@ def loader(kind: type) -> Callable:
     return load
 
 
+def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
+    """A C function of numba's, compiled; Ctrl-C is heard once that is done, as numba may lose it.
+
+    Args:
+      cache: whether to keep it on disk, where there is a place for it, and to take it from there.
+    """
+    made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
+    if cache:
+        with contextlib.suppress(RuntimeError):  # nowhere to write
+            made._cache = Cache(body)
+    with held_back():
+        made.compile()
+    return made
+
+
+class Cache(FunctionCache):
+    """numba's cache of a function, which can do without its files: a damaged one is written anew."""
+
+    def __init__(self, body: Callable):
+        super().__init__(body)
+        locator = self._impl.locator
+        self._cache_file = Sealed(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Write it, unless the disk is full or the files are somebody else's."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class Sealed(IndexDataCacheFile):
+    """The files of numba's cache, each with its hash at its end, which numba does not read."""
+
+    def _load_index(self) -> dict:
+        return super()._load_index() if _whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        return super()._load_data(name) if _whole(self._data_path(name)) else None
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:
+        written = io.BytesIO()
+        yield written
+        with super()._open_for_write(filepath) as file:
+            file.write(written.getvalue() + hashlib.sha256(written.getvalue()).digest())
+
+
+def _whole(path: str) -> bool:
+    """Whether a file of the cache is there and as it was written."""
+    try:
+        held = Path(path).read_bytes()
+    except OSError:
+        return False
+    return hashlib.sha256(held[:-DIGEST]).digest() == held[-DIGEST:]
+
+
 class Function:
     """A compiled C function, kept alive; `address` is where it lies."""
 
     def __init__(self, body: Callable):
         try:
-            self._cfunc = cfunc(SIGNATURE, error_model="numpy")(body)
+            self._cfunc = compiled(SIGNATURE, body)
         except Exception as error:  # numba raises many kinds; each means the same to the caller
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address

@@ -11,6 +11,7 @@ from smc_mujoco.component import Component, Template
 from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
 from smc_mujoco.estimators import catalogue as estimators
+from smc_mujoco.fingerprint import arithmetic
 from smc_mujoco.law import catalogue as laws
 from smc_mujoco.own_channels import recorded
 from smc_mujoco.own_model import OwnModel, restored
@@ -53,8 +54,9 @@ def describe(scenario: Scenario) -> dict:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """Of the packages that a trace depends on; reading them takes 5 ms."""
-    return {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
+    """Of what a trace depends on: the packages, and how the machine rounds; reading them takes 5 ms."""
+    packages = {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
+    return packages | {"arithmetic": arithmetic()}
 
 
 def restore(data: dict) -> Scenario:

@@ -6,10 +6,15 @@ does not compile takes the plain loop. The results do not depend on the number o
 else runs.
 """
 
+import contextlib
+import ctypes
 import os
+import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
+
+import mujoco
 
 from smc_mujoco import assembly, callback, plain
 from smc_mujoco.chunk import Chunk, Report, contents
@@ -23,6 +28,7 @@ from smc_mujoco.trace import Trace
 
 CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
+MANY = 64  # runs of a chunk that leave more memory than it takes time to give it back; chosen
 READING_BYTES = 67  # of a late sensor's history, measured: a channel and reading, in mjData and in the Batch
 
 
@@ -84,11 +90,15 @@ def stream(
         assembly.check_starts([scenarios[i] for i in indices])
     for indices in groups.values():
         for chunk in _chunks(scenarios, indices, threads):
-            with callback.installed():
+            with callback.installed(), memory_for([scenarios[i] for i in chunk]):
                 traces = Chunk([scenarios[i] for i in chunk], threads).run(report)
+            if len(chunk) >= MANY:
+                give_back()
             yield from zip(chunk, traces, strict=True)
     for index in slow:
-        yield index, plain.run(scenarios[index])
+        with memory_for([scenarios[index]]):
+            trace = plain.run(scenarios[index])
+        yield index, trace
         report(scenarios[index].work)
 
 
@@ -102,6 +112,30 @@ def _check(scenario: object) -> None:
     for signal in (scenario.reference, *scenario.disturbance):
         if isinstance(signal, Recorded):
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
+
+
+@contextlib.contextmanager
+def memory_for(scenarios: Sequence[Scenario]) -> Iterator[None]:
+    """Say in one sentence that memory ran out for runs."""
+    try:
+        yield
+    except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo has all three, by the place
+        if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
+            raise
+        count, needed = len(scenarios), sum(map(_bytes, scenarios)) / 2**20
+        raise ScenarioError(
+            f"no memory for {count} run{'s' * (count > 1)} at once, about {needed:.0f} MiB beside the traces kept so "
+            "far: give a shorter duration, a longer control period or fewer channels, or take traces from smc.stream"
+        ) from None
+
+
+def give_back() -> None:
+    """Give freed memory back to the system, where the C library is glibc.
+
+    What stays between freed mjData is 45 to 100 kB a run.
+    """
+    if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
+        trim(0)
 
 
 def layout(s: Scenario) -> tuple:

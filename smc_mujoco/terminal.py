@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smc_mujoco.errors import ScenarioError, printable
+from smc_mujoco.interrupts import held_back
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,6 +27,8 @@ def mendable() -> Iterator[None]:
         raise SystemExit(1) from None
     except OSError as error:
         _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
+    except MemoryError:
+        _fail("no memory for all this: give fewer or shorter runs")
     except KeyboardInterrupt:
         _fail("stopped; files already written are complete", 130)
 
@@ -41,16 +43,9 @@ def wrote(console: "Console", path: Path) -> None:
     console.print(f"wrote {printable(str(path))}", soft_wrap=True, highlight=False, markup=False)
 
 
-@contextlib.contextmanager
-def loading() -> Iterator[None]:
+def loading() -> contextlib.AbstractContextManager[None]:
     """Hold Ctrl-C back while libraries load: they cannot be interrupted halfway."""
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    return held_back()
 
 
 class Clock:

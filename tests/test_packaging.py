@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from smc_mujoco import optional
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 EXTRAS = PROJECT["project"]["optional-dependencies"]
@@ -274,6 +276,12 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     assert locked("requirements.lock") & tools == set()
     tested = [*GROUPS["test"], *GROUPS["check"], *(need for name in EXTRAS if name != "all" for need in EXTRAS[name])]
     assert {named(need) for need in tested} <= locked("requirements.lock", "requirements-test.lock")
+
+
+def test_an_extra_that_pip_cannot_install_here_names_a_python_on_which_it_can(monkeypatch):
+    monkeypatch.setattr(optional, "LAST", {"dm": (3, 10)})
+    assert optional.cure("dm").startswith("take Python 3.10, ")
+    assert optional.cure("rl") == "pip install 'smc-mujoco[rl]'"
 
 
 def test_every_extra_is_in_all():

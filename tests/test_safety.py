@@ -3,6 +3,7 @@
 # pyright: reportOptionalMemberAccess=false, reportOperatorIssue=false
 import contextlib
 import copy
+import ctypes
 import dataclasses
 import importlib
 import itertools
@@ -24,10 +25,14 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from numba.core import caching
+from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
-from smc_mujoco import callback, chunk, layout, plain, row
+from smc_mujoco import callback, chunk, fingerprint, identity, layout, plain, row
+from smc_mujoco import compiled as compiled_module
 from smc_mujoco.channels import channels
+from smc_mujoco.compiled import compiled
 from smc_mujoco.law import Measurement, catalogue
 
 PACKAGE = Path(smc.__file__).parent
@@ -889,3 +894,154 @@ def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integr
     assert np.isfinite(trace.x[:k]).all()
     assert np.isfinite(trace.d[:k]).all()
     assert np.isnan(trace.x[k:]).all()
+
+
+# (p) the cache on disk, memory, forks and Ctrl-C
+
+FRESH = """
+from added import added
+from numba import types
+from smc_mujoco.compiled import compiled
+made = compiled(types.float64(types.float64), added, cache=True)
+assert made.ctypes(1.0) == 3.0
+print(made.cache_hits)
+"""
+
+
+def hits(folder: Path) -> str:
+    """How often a new process takes the compiled function from the cache in a folder, "0" or "1"."""
+    (folder / "added.py").write_text("def added(x):\n    return x + 2.0\n")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(folder)])}
+    done = subprocess.run(
+        [sys.executable, "-c", FRESH], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+def flipped(data: bytes) -> bytes:
+    """With one bit changed, in what is compiled or in the index' names."""
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
+
+
+def test_a_damaged_cache_is_written_anew(tmp_path):
+    assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+    damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
+    for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
+        for path in (tmp_path / "__pycache__").glob(name):
+            path.write_bytes(damage(path.read_bytes()))
+        assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    def doubled(x):
+        return 2.0 * x
+
+    assert compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_forked_while_another_thread_compiles_can_compile():
+    compiling = threading.Event()
+
+    def compiles():
+        with global_compiler_lock:
+            compiling.set()
+            time.sleep(0.3)
+
+    thread = threading.Thread(target=compiles)
+    thread.start()
+    assert compiling.wait(60)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        signal.alarm(20)  # a child that hangs dies of it
+        os._exit(0 if global_compiler_lock.is_locked() is False and global_compiler_lock._lock.acquire() else 3)
+    thread.join()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert not global_compiler_lock.is_locked()
+
+
+def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeypatch):
+    done = []
+
+    class Pressed:
+        """What numba's compiler loses an interrupt in, such as a finaliser."""
+
+        def compile(self):
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                return
+            done.append(True)
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(compiled_module, "CFunc", lambda *arguments: Pressed())
+    with pytest.raises(KeyboardInterrupt):
+        compiled(numba.types.float64(numba.types.float64), math.sin)
+    assert done == [True]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("std::bad_alloc"),
+        mujoco.FatalError("Could not allocate memory"),
+        ValueError("Could not allocate memory"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch):
+    def runs_out(*arguments):
+        raise error
+
+    monkeypatch.setattr(RUN, "Chunk", runs_out)
+    with pytest.raises(smc.ScenarioError, match=r"no memory for 2 runs at once, about \d+ MiB"):
+        smc.run([scenario(), scenario(seed=1)])
+    monkeypatch.setattr(plain, "run", runs_out)
+    with pytest.raises(smc.ScenarioError, match="no memory for 1 run at once"):
+        plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0))))
+
+
+@pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])
+def test_another_error_is_not_taken_for_memory_that_ran_out(error):
+    with pytest.raises(type(error), match="sour"), RUN.memory_for([scenario()]):
+        raise error
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")
+def test_many_runs_leave_no_memory_behind():
+    """Without giving it back they leave 45 to 100 kB each."""
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+    many = [scenario(seed=seed, duration=0.002) for seed in range(600)]
+    for _ in smc.stream(many[:64]):
+        pass
+    before = resident()
+    for _ in smc.stream(many):
+        pass
+    assert resident() - before < 10_000 * len(many)
+
+
+def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
+    here = identity.key(scenario())
+    assert identity.described(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
+    monkeypatch.setattr(fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0))
+    monkeypatch.setattr(importlib.import_module("smc_mujoco.record"), "arithmetic", fingerprint.arithmetic.__wrapped__)
+    versions = importlib.import_module("smc_mujoco.record")._versions
+    versions.cache_clear()
+    try:
+        assert identity.key(scenario()) != here
+    finally:
+        versions.cache_clear()

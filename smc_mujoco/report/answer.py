@@ -185,7 +185,7 @@ def _leads(metric: str, standing: Sequence[Standing], conditions: dict[str, list
     plants = [f"{words.law(law)} wins on every plant under {_joined(names)}" for law, names in conditions.items()]
     nobody = top.of - sum(row.alone for row in standing)
     return (
-        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{_joined(told)}; "
+        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(told)}; "
         f"in {nobody or 'none'} nobody wins."
     )
 
