@@ -157,7 +157,7 @@ class Sealed(IndexDataCacheFile):
         return super()._load_data(name) if _whole(self._data_path(name)) else None
 
     @contextlib.contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:
+    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
         written = io.BytesIO()
         yield written
         with super()._open_for_write(filepath) as file:

@@ -173,8 +173,9 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
     end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
-    if not (finite := np.isfinite(log[:, :end]).all(2)).all():
-        k = int(np.argmin(finite.all(0)))
+    finite = np.all(np.isfinite(log[:, :end]), axis=2)
+    if not np.all(finite):
+        k = int(np.argmin(np.all(finite, axis=0)))
         name = LOGGED[int(np.argmin(finite[:, k]))]
         failed_step, failure = k * scenario.steps, f"{name} became NaN or inf"
     if failure is not None:
