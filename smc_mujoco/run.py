@@ -79,7 +79,6 @@ def stream(
     groups: dict[tuple, list[int]] = {}
     slow: list[int] = []
     for index, scenario in enumerate(scenarios):
-        _check(scenario)
         try:
             contents(scenario)  # compiles
             groups.setdefault(layout(scenario), []).append(index)
@@ -170,7 +169,11 @@ def _bytes(s: Scenario) -> int:
 def _listed(scenarios: object) -> list[Scenario]:
     if isinstance(scenarios, str) or not isinstance(scenarios, Iterable):
         raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
-    return list(scenarios)
+    found = []
+    for scenario in scenarios:  # one by one, as they may be without end
+        _check(scenario)
+        found.append(scenario)
+    return found
 
 
 def cores(threads: int | None = None) -> int:

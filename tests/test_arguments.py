@@ -1,6 +1,7 @@
 """Calls of public names with what they do not take: one sentence that names the argument, whatever Python says."""
 
 import inspect
+import itertools
 import os
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -97,6 +98,10 @@ def test_a_method_of_what_a_function_returns(trace):
     assert refused(smc.load, trace) == f"cannot read {trace!r}: give the path of a .npz file that a run wrote"
     tuned = smc.tune("duffing", "classical", budget=8)
     assert refused(tuned.save, None) == "path is None: give a path"
+
+
+def test_the_first_that_is_no_scenario_ends_a_run_without_end():
+    assert refused(smc.run, itertools.count()) == "cannot run 0: give a smc.Scenario"
 
 
 def test_an_error_that_no_argument_explains_stays_as_it_is(trace):
