@@ -5,6 +5,7 @@ kind_of(Sequence[float] | None).one                      # "a list of numbers or
 """
 
 import math
+import numbers
 import os
 import types
 import typing
@@ -53,7 +54,7 @@ def _number(value: Any) -> bool:
 
 
 def _whole(value: Any) -> bool:
-    return not isinstance(value, np.ndarray) and whole("", value, -(2**63), 2**63) is not None
+    return isinstance(value, numbers.Integral) and whole("", value, -(2**63), 2**63 - 1) is not None
 
 
 KINDS: dict[Any, Kind] = {
