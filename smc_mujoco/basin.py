@@ -27,6 +27,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -224,7 +225,8 @@ def load(path: str | os.PathLike) -> Basin:
     """
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:
-        return Basin(**{k: np.array(v, kinds[k]) if k in kinds else v for k, v in read_json(file).items()})
+        fields: dict[str, Any] = read_json(file)
+        return Basin(**fields | {k: np.array(fields[k], kind) for k, kind in kinds.items()})
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ gear's, the lag a hydraulic valve's, the counts, per revolution or metre, an ine
 
 import ast
 import dataclasses
+import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -198,12 +199,12 @@ def _called(node: ast.Call) -> Any:
     try:
         return kind(*values[0], **values[1])
     except TypeError:
-        known = getattr(kind, "defaults", None) or [f.name for f in dataclasses.fields(kind)]
+        known = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
         cure = f"it takes {', '.join(known) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 
 
-def _kinds() -> dict[str, Callable[..., Any]]:
+def _kinds() -> dict[str, Any]:
     """Name -> class, of parts and signals, a user's own included."""
     found: list[type] = [Noise, Jump]
     bases: list[type] = [Part, Signal]

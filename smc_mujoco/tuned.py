@@ -144,14 +144,14 @@ def load(path: str | os.PathLike) -> Tuned:
         scenario = record.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
-        evaluations = {
-            name: tuple(_evaluation(*entry) for entry in data.get(name, ())) for name in ("history", "finals")
-        }
-        if not evaluations["finals"]:  # tuned before there was a second round: the best of the first one
-            evaluations["finals"] = (min(evaluations["history"], key=lambda e: e.objective),)
+        history = tuple(_evaluation(*entry) for entry in data["history"])
+        finals = tuple(_evaluation(*entry) for entry in data.get("finals", ()))
+        if not finals:  # tuned before there was a second round: the best of the first one
+            finals = (min(history, key=lambda e: e.objective),)
         return Tuned(
             **fields,
-            **evaluations,
+            history=history,
+            finals=finals,
             law=scenario.law,
             plant=scenario.plant,
             definition=described(data["definition"]),

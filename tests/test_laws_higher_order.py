@@ -71,6 +71,7 @@ def test_implicit_laws_solve_their_inclusion(name):
     s, w = rng.normal(size=(2, 20_000)) * 10.0 ** rng.uniform(-6, 0, (2, 20_000))
     s *= np.where(rng.random(20_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
     function, on = law(name).function, 0
+    assert function is not None
     for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
         k1_, k2_, h, s_, w_ = values
         memory = np.array([w_])

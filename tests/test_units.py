@@ -91,10 +91,8 @@ def given(name, rng):
 
 def converted(law, system):
     """The law with its gains in another system of units."""
-    units = {gain: bounds.unit(law, gain) for gain in law.gains}
-    return dataclasses.replace(
-        law, gains={g: v * (units[g].of(system) if units[g] else 1.0) for g, v in law.gains.items()}
-    )
+    units = {gain: bounds.unit(law, gain) or bounds.Unit() for gain in law.gains}
+    return dataclasses.replace(law, gains={g: v * units[g].of(system) for g, v in law.gains.items()})
 
 
 @pytest.mark.parametrize("model", [0.0, 1.0])

@@ -43,14 +43,14 @@ def settings(plan: Plan, table: Table) -> dict[str, str]:
     """The grid and the rest in words."""
     across, up = plan.points
     looked = Objective()
-    tuned_on = ", ".join(words.condition(name) for name in looked.conditions)
+    tuned_on = ", ".join(words.condition(one.name) for one in looked.conditions)
     return {
         "grid": f"{len(plan.plants)} plants × {len(plan.conditions)} conditions × {len(plan.laws)} laws × {plan.seeds} "
         f"seeds = {len(table)} runs of {plan.duration:g} s, of which {scores.failed(table)} failed",
         "seeds": f"0 to {plan.seeds - 1}; seed 0 starts at the plant’s own x0, every other within 20 % of it, all laws "
         "alike",
-        "gains": f"set {GAINS}, listed below; found on {tuned_on} from x0 in runs of {looked.duration:g} s; all other "
-        "conditions are new to them",
+        "gains": f"set {GAINS}, listed below; found on {tuned_on}, in runs of {looked.duration:g} s from starts and "
+        "with noise that no seed of the study has; all other conditions are new to them",
         "bound on u": f"|u| ≤ {paper.U_MAX:g} N·m or N, the same for every law",
         "control period": f"{1e3 * paper.CONTROL_PERIOD:g} ms; physics in RK4 steps of 1 ms, with real parts in "
         "implicitfast steps of 0.25 ms",

@@ -1,6 +1,7 @@
 """The marker's cases: plants and conditions of the study as arguments of a test."""
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 from smc_mujoco import paper
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
@@ -41,7 +42,7 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
 
 def _conditions(value: object) -> list[str]:
     """Conditions as texts, from one or several of them."""
-    several = value if isinstance(value, list | tuple) else [value]
+    several: Any = value if isinstance(value, list | tuple) else [value]
     return [str(find_condition(one)) for one in several]
 
 
