@@ -1,7 +1,7 @@
 """Drives, which turn a law's command u, in N m (N on a slide), into force: lag, rate limit, DC motor.
 
-A scenario takes one, and a Backlash after it. Numbers are for implicitfast, whose steps integrate the drives' states
-exactly for a held u.
+A scenario takes one, or a Lag and another in series (`tandem`), and a Backlash after them. Numbers are for
+implicitfast, whose steps integrate the drives' states exactly for a held u.
 """
 
 import dataclasses
@@ -44,6 +44,9 @@ class Lag(Drive):
     Limits: implicitfast or Euler. Under RK4 MuJoCo's filter errs by h/(2 tau), and diverges below tau = h/2.8.
     tau = 0 is the plant's own actuator, in a model of its own.
 
+    Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u / (mu p + 1)^2: exact
+    for a held u too. A Lag may stand before a RateLimit or a DCMotor as well.
+
     Attributes:
       tau: s, 0 (no lag) or more.
     """
@@ -65,6 +68,11 @@ class Lag(Drive):
 
     def structure(self) -> Hashable:
         return type(self), self.tau > 0.0
+
+    @property
+    def delay(self) -> float:
+        """tau."""
+        return self.tau
 
 
 @dataclasses.dataclass(frozen=True)

@@ -33,6 +33,8 @@ class Backlash(Actuator):
       rotor_damping: N m s/rad (N s/m), 0 or more.
     """
 
+    drives = False
+
     gap: float
     rotor_inertia: float = 1e-3
     rotor_damping: float = 0.0

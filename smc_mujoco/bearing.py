@@ -83,7 +83,7 @@ def _doubled(largest: float) -> tuple[float, ...]:
 
 
 def _critical_delay(base: Scenario) -> float | None:
-    lam_k1 = linear.local(base.law)
+    lam_k1 = None if base.actuator else linear.local(base.law)  # (1) knows no drive
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 

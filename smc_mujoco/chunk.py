@@ -55,6 +55,7 @@ def contents(scenario: Scenario) -> row.Contents:
         sigma_x=scenario.noise.position,
         sigma_v=scenario.noise.velocity,
         scale=math.prod(part.scale for part in scenario.actuator),
+        tandem=scenario.tandem,
         bias=sensor.bias,
         counts=0.0 if sensor.counts == math.inf else sensor.counts,
         lost=sensor.dropout,

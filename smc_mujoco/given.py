@@ -8,14 +8,14 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.backlash import Backlash
+from smc_mujoco.actuators import Lag
 from smc_mujoco.component import Component, Template
 from smc_mujoco.contact import Contact
 from smc_mujoco.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.hook import compiled
 from smc_mujoco.law import law
-from smc_mujoco.part import Part
+from smc_mujoco.part import Actuator, Friction, Part
 from smc_mujoco.plant import Plant
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Signal
@@ -153,18 +153,40 @@ def signals(name: str, value: object) -> tuple[Signal, ...]:
 
 
 def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
-    """Parts of one kind, from one, several or None; no two that would take each other's place."""
+    """Parts of one kind, from one, several or None."""
     items = several(value)
     for item in items:
         if not isinstance(item, kind):
             raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
-    places = ["a Backlash" if isinstance(p, Backlash) else "a drive" for p in items]
-    if name == "friction":
-        places = [f"a {type(p).__name__}" for p in items]
-    if twice := [place for place in places if places.count(place) > 1]:
-        raise ScenarioError(f"{name} has {twice[0]} twice, {shown(items)}: give one")
-    # in one order, whatever the user's, with a Backlash after the drive
-    return tuple(sorted(items, key=lambda part: (isinstance(part, Backlash), type(part).__name__)))
+    return items
+
+
+def friction(value: object) -> tuple[Friction, ...]:
+    """Frictions, no two of a kind, in one order, whatever the user's."""
+    items = parts("friction", value, Friction, "smc.Coulomb(0.05)")
+    _once("friction", items, [type(part).__name__ for part in items])
+    return tuple(sorted(items, key=lambda part: type(part).__name__))
+
+
+def actuator(value: object) -> tuple[Actuator, ...]:
+    """A drive, or a Lag and another in series, in the user's order, and after them a Backlash."""
+    items = parts("actuator", value, Actuator, "smc.Lag(0.01)")
+    drives = [part for part in items if part.drives]
+    _once("actuator", items, [type(part).__name__ for part in items if not part.drives])
+    if len(drives) > 2:
+        raise ScenarioError(f"actuator has {len(drives)} drives, {shown(items)}: give one, or two in series")
+    if len(drives) == 2 and not isinstance(drives[0], Lag):
+        raise ScenarioError(
+            f"actuator has {shown(drives[0])} before {shown(drives[1])}, and of two drives in series the first is a "
+            f"Lag: give one drive, or (smc.Lag(0.01), another)"
+        )
+    return tuple(sorted(items, key=lambda part: not part.drives))
+
+
+def _once(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
+    """Raise ScenarioError for two parts that would take each other's place."""
+    if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
+        raise ScenarioError(f"{name} has a {twice[0]} twice, {shown(items)}: give one")
 
 
 def contact_fits(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:

@@ -72,6 +72,7 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
     Attributes:
       setting: the plant with its task.
       data: the simulation's state.
+      first: the output of the first of two drives, (driven,).
       sample: control samples since the episode began.
       last: the sample at which an episode is truncated.
     """
@@ -95,7 +96,7 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
         self.setting, self.render_mode, self.sample = setting(plant, task, changes), render_mode, 0
         self.last = self.setting.scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / self.setting.scenario.control_period))}
-        self.data = mujoco.MjData(self.setting.model)
+        self.data, self.first = mujoco.MjData(self.setting.model), np.zeros(self.setting.shape)
         self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
         self.renderer: mujoco.Renderer | None = None
 
@@ -107,14 +108,14 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
         x, v = self.setting.draw(self.np_random, options)
         mujoco.mj_resetData(self.setting.model, self.data)
         self.setting.place(self.data.qpos, self.data.qvel, x, v)
-        self.sample = 0
+        self.sample, self.first[:] = 0, 0.0
         return self.setting.observe(x, v, 0), {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """One control period under an action: observation, reward, terminated, truncated, and no more to tell."""
         found, data = self.setting, self.data
-        data.ctrl[found.ctrl] = found.command(action)
-        mujoco.mj_step(found.model, data, found.scenario.steps)
+        for steps in found.stretches(data.ctrl, found.command(action), self.first):
+            mujoco.mj_step(found.model, data, steps)
         self.sample += 1
         x, v = data.qpos[found.qpos], data.qvel[found.qvel]
         observation, truncated = found.observe(x, v, self.sample), self.sample >= self.last

@@ -4,11 +4,11 @@ At the first stage of a control sample, per channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> ring of commands
 
-and at every stage: the command whose delay has passed -> ctrl, disturbance(t) -> xfrc_applied. The forces that acted
-since the sample before, on average, are logged with each. Time counts in calls: RK4 calls four times a step, at t,
-t + h/2, t + h/2 and t + h, and the next step begins at t + h again, so the clock alone cannot tell a sample from a last
-stage. A run that leaves the finite world, or whose law raises, is marked in its row and gets no more control; the
-simulations beside it go on.
+and at every stage: the command whose delay has passed -> ctrl, of two drives in series through the first; and
+disturbance(t) -> xfrc_applied. The forces that acted since the sample before, on average, are logged with each. Time
+counts in calls: RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again,
+so the clock alone cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is
+marked in its row and gets no more control; the simulations beside it go on.
 """
 
 # pyright: reportCallIssue=false
@@ -172,13 +172,36 @@ def _driven(table, n):
 @njit(error_model="numpy", inline="always")
 def _apply(row, table, ctrl, step):
     """The command whose delay has passed at a physics step, where one arrives, to the actuators."""
-    n, past = int(row[slot.CHANNELS]), step - int(row[slot.DELAY])
-    if past < 0 or past % int(row[slot.STEPS]) != 0:
-        return
-    ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
+    n, past, first = int(row[slot.CHANNELS]), step - int(row[slot.DELAY]), int(row[slot.FIRST])
+    if past >= 0 and past % int(row[slot.STEPS]) == 0:
+        ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
+        for i in range(n):
+            if first > 0:
+                row[first + 2 * i] = row[ring + i]
+            elif table[i, column.CTRL] >= 0:
+                ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
+    if first > 0:
+        _pass_on(row, table, ctrl, n, first)
+
+
+@njit(error_model="numpy", inline="always")
+def _pass_on(row, table, ctrl, n, first):
+    """Of two drives the first: what it asks of the second over a physics step, and its output at the end."""
     for i in range(n):
         if table[i, column.CTRL] >= 0:
-            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
+            u, a = row[first + 2 * i], row[first + 2 * i + 1]
+            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * (u + row[slot.FIRST_HELD] * (a - u))
+            row[first + 2 * i + 1] = u + row[slot.FIRST_LEFT] * (a - u)
+
+
+@njit(error_model="numpy", inline="always")
+def _applied(row, table, ctrl, i):
+    """The command that reached the drive of channel i."""
+    if table[i, column.CTRL] < 0:
+        return 0.0
+    if row[slot.FIRST] > 0.0:
+        return row[int(row[slot.FIRST]) + 2 * i]
+    return ctrl[table[i, column.CTRL]] / row[slot.SCALE]
 
 
 @njit(error_model="numpy")
@@ -216,7 +239,7 @@ def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators
     elif sampling:
         for i in range(n):
             log[0, k, i], log[1, k, i] = qpos[table[i, column.QPOS]], qvel[table[i, column.QVEL]]
-            log[3, k, i] = ctrl[table[i, column.CTRL]] / row[slot.SCALE] if table[i, column.CTRL] >= 0 else 0.0
+            log[3, k, i] = _applied(row, table, ctrl, i)
             log[5, k, i] = disturbance(table, i, xfrc, joints, tips, anchors)
             at = int(row[slot.FORCES]) + 2 * i
             log[7, k, i], log[8, k, i] = row[at] / row[slot.STEPS], row[at + 1] / row[slot.STEPS]

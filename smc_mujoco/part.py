@@ -50,10 +50,17 @@ class Friction(Part):
 class Actuator(Part):
     """Base of actuators: what stands between a command u, the force asked of the joint, and the joint."""
 
+    drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after what does
+
     @property
     def scale(self) -> float:
         """What the model's actuator takes per unit of u."""
         return 1.0
+
+    @property
+    def delay(self) -> float:
+        """The time constant in s with which the force follows a held u; 0: at once."""
+        return 0.0
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:

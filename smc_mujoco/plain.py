@@ -72,6 +72,8 @@ class Loop:
         self.held = np.zeros((n, 2))  # the last readings that arrived
         self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
         self.scale = math.prod(part.scale for part in scenario.actuator)
+        self.tandem, self.first = scenario.tandem, np.zeros(n)  # of two drives, and the output of the first
+        self.arrived = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((LOGS, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
@@ -108,9 +110,8 @@ class Loop:
             d = self.disturb(data, t)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, column.QPOS]], data.qvel[self.table[:, column.QVEL]]
-                applied = np.where(
-                    self.table[:, column.CTRL] >= 0, data.ctrl[self.table[:, column.CTRL]] / self.scale, 0.0
-                )
+                reached = self.arrived if self.tandem else data.ctrl[self.table[:, column.CTRL]] / self.scale
+                applied = np.where(self.table[:, column.CTRL] >= 0, reached, 0.0)
                 acted = self.acted / self.scenario.steps
                 self.log[:, k] = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
                 self.acted[:] = 0.0
@@ -128,10 +129,11 @@ class Loop:
             self.commands.append(u)
         past = step - self.scenario.delay_steps
         if past >= 0:
-            driven = self.table[:, column.CTRL] >= 0
-            data.ctrl[self.table[driven, column.CTRL]] = (self.scale * self.commands[past // self.scenario.steps])[
-                driven
-            ]
+            self.arrived = self.commands[past // self.scenario.steps]
+        asked, driven = self.arrived, self.table[:, column.CTRL] >= 0
+        if self.tandem:
+            asked, self.first = self.tandem(asked, self.first)
+        data.ctrl[self.table[driven, column.CTRL]] = (self.scale * asked)[driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""

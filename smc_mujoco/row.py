@@ -17,6 +17,7 @@ import numpy as np
     IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
     CHANNELS, TABLE, POSITIONS, VELOCITIES, STEPS, STAGES, STEP, PERIOD,  # channel table, nq, nv, clock
     DELAY, RING, RINGS, LIMIT, LIMITS, SCALE, FORCES,  # delay in steps, ring, its samples; u_max, or one each; drive
+    FIRST, FIRST_HELD, FIRST_LEFT,  # of two drives the first: its command and output a channel, and its Tandem
     SEED, SIGMA_X, SIGMA_V, BIAS, COUNTS, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
     LAW, GAINS, MODEL, SURFACE, SURFACE_GAINS, ESTIMATOR, ESTIMATOR_GAINS,
     NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
@@ -24,7 +25,7 @@ import numpy as np
     INPUT, OUTPUT, STATE,
     LAW_MEMORY, LAW_STRIDE, SURFACE_MEMORY, SURFACE_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
     HEADER,
-) = range(53)  # fmt: skip
+) = range(56)  # fmt: skip
 
 # Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
 # whether it is a Cartesian force.
@@ -77,6 +78,7 @@ class Contents:
     sigma_x: float
     sigma_v: float
     scale: float = 1.0  # what a drive takes per unit of u: V / (N m) of a motor's amplifier
+    tandem: tuple[float, float] | None = None  # of two drives, as of Tandem
     bias: float = 0.0  # of the encoder, in the unit of x
     counts: float = 0.0  # a revolution of a hinge, a metre of a slide; 0: no rounding
     lost: float = 0.0  # probability that a reading gets lost
@@ -117,6 +119,9 @@ def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.nda
     row[MODEL] = c.model
     if c.limits:
         put(LIMITS, c.limits)
+    if c.tandem is not None:
+        row[FIRST_HELD], row[FIRST_LEFT] = c.tandem
+        reserve(FIRST, 2 * n)
     put(GAINS, c.law.values)
     if c.surface is not None:
         row[SURFACE], row[SURFACE_STRIDE] = c.surface.address, c.surface.memory

@@ -24,6 +24,7 @@ from smc_mujoco.plant import Plant, plant
 from smc_mujoco.sensors import Encoder
 from smc_mujoco.signals import Constant, Signal
 from smc_mujoco.surfaces import Surface
+from smc_mujoco.tandem import Tandem, tandem
 
 SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
 
@@ -61,7 +62,8 @@ class Scenario:
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
       mechanism: "equation", or another build of the mechanism that the plant offers.
-      actuator: between command and joint: Lag, RateLimit or DCMotor, and Backlash; None: the command is the force.
+      actuator: between command and joint: a drive - Lag, RateLimit, DCMotor - or a Lag and another drive in series, in
+        this order, and a Backlash after them; None: the command is the force. u is bounded before the drives.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
       condition: what a grid calls the run's condition, see `named`; no argument, and gone where a field is replaced.
 
@@ -139,10 +141,10 @@ class Scenario:
             raise ScenarioError(
                 f"plant is {shown(self.plant)}: give smc.plant(...) or one of the names smc.plants() lists"
             )
-        put("friction", given.parts("friction", self.friction, Friction, "smc.Coulomb(0.05)"))
+        put("friction", given.friction(self.friction))
         put("contact", given.contact(self.contact, self.plant))
         put("mechanism", given.mechanism(self.mechanism, self.plant))
-        put("actuator", given.parts("actuator", self.actuator, Actuator, "smc.Lag(0.01)"))
+        put("actuator", given.actuator(self.actuator))
         if not isinstance(self.sensor, Encoder | None):
             raise ScenarioError(f"sensor is {shown(self.sensor)}: give smc.Encoder(counts=...) or None")
         put("law", given.component(self.law, "law"))
@@ -223,6 +225,11 @@ class Scenario:
     def jump_step(self) -> int:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)
+
+    @property
+    def tandem(self) -> Tandem | None:
+        """What two drives in series do in a physics step; None without a second drive."""
+        return tandem(self.actuator, self.physics_step)
 
     @property
     def work(self) -> int:

@@ -9,7 +9,7 @@ disturbances, contacts and jumps.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import mujoco
@@ -99,6 +99,23 @@ class Setting:
             shape = copies + self.shape
             raise ScenarioError(f"action is {_culprit(action, a, shape)}: give finite numbers, of shape {shape}")
         return self.most * np.minimum(np.maximum(a, -1.0), 1.0)
+
+    def stretches(self, ctrl: np.ndarray, command: np.ndarray, first: np.ndarray) -> Iterator[int]:
+        """Put a command through a control period: write ctrl, and yield for how many physics steps it holds.
+
+        Args:
+          ctrl: of one simulation, (nu,), or of several, (..., nu).
+          command: what `command` returned, (..., driven).
+          first: the output of the first of two drives at the period's begin, which becomes that at its end; as command.
+        """
+        tandem, steps = self.scenario.tandem, self.scenario.steps
+        if tandem is None:
+            ctrl[..., self.ctrl] = command
+            yield steps
+            return
+        for _ in range(steps):
+            ctrl[..., self.ctrl], first[:] = tandem(command, first)
+            yield 1
 
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """A start: x and v, (n,) each, from a numpy generator of either kind, or as options x0 and v0 say.

@@ -13,7 +13,7 @@ An action is the command of the driven channels, in parts of their limits. Obser
 import contextlib
 import functools
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -37,7 +37,22 @@ ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep"
 
 
 class PlantPhysics(Physics):
-    """dm_control's physics, in which a plant that leaves the finite world ends its episode and raises nothing."""
+    """dm_control's physics, in which a plant that leaves the finite world ends its episode and raises nothing.
+
+    Attributes:
+      stretches: how the coming physics steps follow each other, as of `Setting.stretches`.
+    """
+
+    stretches: Iterable[int] = ()
+
+    def step(self, nstep: int = 1) -> None:
+        """Take physics steps, by stretches where a command goes through two drives."""
+        stretches, self.stretches = self.stretches, ()
+        for steps in stretches:
+            super().step(steps)
+            nstep -= steps
+        if nstep > 0:  # whoever steps without a command
+            super().step(nstep)
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
@@ -52,23 +67,25 @@ class PlantTask(control.Task):
       setting: the plant with its task.
       random: the numpy generator of the starts.
       sample: control samples since the episode began.
+      first: the output of the first of two drives, (driven,).
     """
 
     def __init__(self, setting: Setting, random: Any):
         self.setting, self.random, self.sample = setting, random, 0
         self.x = self.v = np.zeros(setting.scenario.plant.n)
+        self.first = np.zeros(setting.shape)
         self.over = False
 
     def initialize_episode(self, physics: Physics) -> None:
         """Draw a start."""
         data = physics.data.ptr
         self.setting.place(data.qpos, data.qvel, *self.setting.draw(self.random))
-        self.sample = 0
+        self.sample, self.first[:] = 0, 0.0
         self._look(physics)
 
-    def before_step(self, action: Any, physics: Physics) -> None:
+    def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Give the command to the actuators."""
-        physics.data.ptr.ctrl[self.setting.ctrl] = self.setting.command(action)
+        physics.stretches = self.setting.stretches(physics.data.ptr.ctrl, self.setting.command(action), self.first)
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample."""

@@ -38,6 +38,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     Attributes:
       setting: the plant with its task.
       batch: the simulations.
+      first: the output of the first of two drives, (num_envs, driven).
       samples: control samples since the episode began, (num_envs,).
       over: whose episode has ended, (num_envs,) of bool.
       last: the sample at which an episode is truncated.
@@ -80,6 +81,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+        self.first = np.zeros((self.num_envs, *self.setting.shape))
         self.randoms: list[np.random.Generator] = []
         self.samples, self.over = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
 
@@ -106,8 +108,8 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
         if anew.any() and mode is AutoresetMode.DISABLED:
             raise ScenarioError(f"the episode of copy {np.argmax(anew)} is over: reset it with the option reset_mask")
-        self.ctrl[:, self.setting.ctrl] = self.setting.command(actions, (self.num_envs,))
-        terminated = self.advance(None if not anew.any() else np.flatnonzero(~anew).astype(np.int32))
+        commands = self.setting.command(actions, (self.num_envs,))
+        terminated = self.advance(None if not anew.any() else np.flatnonzero(~anew).astype(np.int32), commands)
         self.samples += 1
         if anew.any():
             self.begin(anew)
@@ -131,16 +133,18 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
-        self.samples[which], self.over[which] = 0, False
+        self.samples[which], self.over[which], self.first[which] = 0, False, 0.0
 
-    def advance(self, ids: np.ndarray | None) -> np.ndarray:
+    def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
         """Step copies, None for all; in which of them MuJoCo gave up, (num_envs,) of bool."""
         gone = np.zeros(self.num_envs, bool)
-        try:
-            with callback.uninstalled():  # a Batch refuses Python callbacks, and other threads' runs may have one
-                self.batch.step(ids, nstep=self.setting.scenario.steps)
-        except SimulationError as error:
-            gone[list(error.ids)] = True
+        for steps in self.setting.stretches(self.ctrl, commands, self.first):
+            try:
+                with callback.uninstalled():  # a Batch refuses Python callbacks, and other threads' runs may have one
+                    self.batch.step(ids, nstep=steps)
+            except SimulationError as error:
+                gone[list(error.ids)] = True
+                ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
         return gone
 
     def observe(self, lost: np.ndarray | None = None) -> np.ndarray:

@@ -33,6 +33,7 @@ CORE = (
         "model_check",
         "friction",
         "actuators",
+        "tandem",
         "backlash",
         "contact",
         "sensors",

@@ -46,14 +46,26 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
     assert truncated.all()
 
 
-def test_friction_and_motors_hold_in_a_batch_too():
-    changes = {"friction": smc.Coulomb(0.1), "actuator": (smc.DCMotor(), smc.Backlash(0.01)), "duration": 0.1}
+@pytest.mark.parametrize("drives", [(smc.DCMotor(),), (smc.Lag(0.01), smc.Lag(0.02))], ids=["motor", "two lags"])
+def test_friction_and_drives_hold_in_a_batch_too(drives):
+    changes = {"friction": smc.Coulomb(0.1), "actuator": (*drives, smc.Backlash(0.01)), "duration": 0.1}
     many, single = BatchEnv("inverted_pendulum", 2, changes=changes), PlantEnv("inverted_pendulum", changes=changes)
+    for _ in range(2):  # nothing is left of the episode before
+        many.reset(seed=0)
+        single.reset(seed=0)
+        for _ in range(100):
+            o, *_ = many.step([[1.0], [0.0]])
+            assert np.abs(o[0] - single.step([1.0])[0]).max() < 1e-12
+
+
+def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone():
+    changes = {"actuator": (smc.Lag(0.01), smc.Lag(0.02)), "u_max": 9e9, "duration": 0.1, "control_period": 0.05}
+    many, single = BatchEnv("cart_pole", 2, changes=changes), PlantEnv("cart_pole", changes=changes)
     many.reset(seed=0)
     single.reset(seed=0)
-    for _ in range(100):
-        o, *_ = many.step([[1.0], [0.0]])
-        assert np.abs(o[0] - single.step([1.0])[0]).max() < 1e-12
+    o, _, terminated, *_ = many.step([[1e-9], [1.0]])
+    assert terminated.tolist() == [False, True]
+    assert np.abs(o[0] - single.step([1e-9])[0]).max() < 1e-12
 
 
 def test_a_start_from_options_is_the_start_that_the_scenario_sets():

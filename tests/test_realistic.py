@@ -657,7 +657,7 @@ def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, text):
         ({"friction": (LUGRE, LUGRE)}, "friction has a LuGre twice"),
         ({"actuator": 0.01}, "actuator is 0.01: give one such as smc.Lag(0.01)"),
         ({"actuator": smc.Coulomb(0.1)}, "actuator is Coulomb(level=0.1): give one"),
-        ({"actuator": (smc.Lag(0.1), smc.DCMotor())}, "actuator has a drive twice"),
+        ({"actuator": (smc.DCMotor(), smc.Lag(0.1))}, "actuator has DCMotor(resistance=0.299"),
         ({"actuator": (smc.Backlash(0.1), smc.Backlash(0.1))}, "actuator has a Backlash twice"),
         ({"contact": 3}, "contact is 3: give smc.Contact(...) or one of "),
         ({"contact": smc.Coulomb(0.1)}, "contact is Coulomb"),
