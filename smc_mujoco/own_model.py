@@ -66,8 +66,8 @@ class OwnModel:
           ScenarioError: the file is gone, or another than it was.
         """
         spec = self.source.read()
-        for named in [*spec.sensors, *spec.tuples]:  # tuples may name sensors and motors that go
-            spec.delete(named)
+        while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that go
+            spec.delete(named[0])  # from MuJoCo 4 on with the tuples that name it: ask again for what is left
         put(spec, [(drive.joint, drive.motor) for drive in self.drives])
         partners = [drive.partner for drive in self.drives if drive.partner]
         for joint in [*(drive.joint for drive in self.drives), *partners]:
