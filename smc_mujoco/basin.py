@@ -226,7 +226,8 @@ def load(path: str | os.PathLike) -> Basin:
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:
         fields: dict[str, Any] = read_json(file)
-        return Basin(**fields | {k: np.array(fields[k], kind) for k, kind in kinds.items()})
+        fields |= {name: np.array(fields[name], kind) for name, kind in kinds.items()}
+        return Basin(**fields)
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import os
+from typing import Any
 
 import numpy as np
 import pytest

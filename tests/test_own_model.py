@@ -708,7 +708,7 @@ def test_conditions_of_a_model_with_motors_have_the_paper_s_names(arm):
     plant = arm(["shoulder"])
     assert plant.limits
     for name in ("nominal", "noise", "delay_5ms"):
-        fields = paper.fields(name, "arm")
+        fields = paper.fields(name, plant)
         assert identity.condition(smc.Scenario(plant=plant, law="classical", **fields)) == name
     assert identity.condition(smc.Scenario(plant=plant, law="classical", u_max=6.0)) == "u_max=6.0"
 
