@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
 
-from smc_mujoco import __version__, actuators, friction, references  # noqa: F401  # so that a file finds their parts
+from smc_mujoco import __version__, actuators, backlash, friction, references  # noqa: F401  # so that a file finds their parts
 from smc_mujoco.component import Component, Template
 from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError
