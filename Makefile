@@ -38,7 +38,7 @@ docs: ## the documentation as a site, site/index.html
 report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
 	$(BIN)/smc-mujoco report
 
-gains: setup ## the laws' gains again, tuned by one rule (20 minutes)
+gains: setup ## the laws' gains again, tuned by one rule (within 90 minutes on two cores)
 	$(BIN)/python benchmarks/gains.py --all
 
 gallery: setup ## the clips that README shows

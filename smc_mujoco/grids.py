@@ -5,6 +5,7 @@
 Plants may be the suite's, by name, or models of your own; so may laws and conditions.
 """
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -47,7 +48,8 @@ def grid(
     Raises:
       ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
     """
-    numbers = listed("seeds", seeds) if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
+    numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
+    numbers = listed("seeds", itertools.islice(numbers, MOST + 1))
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")

@@ -65,6 +65,7 @@ class Encoder(Part):
 
     def check(self, step: float) -> None:
         """Raise ScenarioError for times that are no whole number of physics steps, or too many to remember."""
+        number("step", step, above=0.0)
         if self.delay / (self.period or step) > MOST_READINGS:
             raise ScenarioError(
                 f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"

@@ -228,6 +228,8 @@ def _variation(trace: Trace, group: Group) -> str:
 def _base(path: str | os.PathLike) -> Path:
     """The path without .svg or .png. What follows a point in "lam_0.5" or "a.b c" is no ending."""
     base = Path(path)
+    if not base.name:
+        raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")
     if base.suffix in (".svg", ".png"):
         return base.with_suffix("")
     if base.suffix[1:].isalnum() and base.suffix[1].isalpha():
