@@ -65,7 +65,7 @@ class Giving(Batch):
 
     asked = ()
 
-    def step(self, ids=None, nstep=1):
+    def step(self, ids=None, nstep=1):  # pyright: ignore[reportIncompatibleMethodOverride]
         self.asked = (*self.asked, list(range(self.nsim)) if ids is None else list(ids))
         super().step(ids, nstep=nstep)
         if len(self.asked) == 3:
