@@ -648,16 +648,6 @@ def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     assert smc.run(scenario()).diverged_at is None
 
 
-def test_a_law_that_ends_the_program_ends_it_and_leaves_the_callback_restored():
-    def leaves(y, gains, memory):
-        json.dumps(y.t)
-        raise SystemExit(3)
-
-    with pytest.raises(SystemExit):
-        plainly(scenario(made(leaves)))
-    assert mujoco.get_mjcb_control() is None
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 def test_scenarios_travel_to_another_process(tmp_path):
     code = """

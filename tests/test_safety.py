@@ -247,7 +247,7 @@ def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(fu
 # (d) signs
 
 STUDIED = list(smc.paper.GAINS["duffing"])  # the other laws' signs are tested with their theorems
-TURNING = {"k", "k1", "k2", "gamma", "c", "leak", "deadzone", "k0", "lam", "phi"}
+TURNING = {"k", "k1", "k2", "gamma", "c", "leak", "deadzone", "k0", "lam", "phi", "w_max"}
 # observer_free holds a plant with a spring of its own for some negative k1 (lam k1 > -K), so it may have one
 SIGNED = [
     (name, gain)
