@@ -248,4 +248,5 @@ def load(path: str | os.PathLike) -> list[Margin]:
 def _margin(entry: dict[str, Any]) -> Margin:
     """The margin in a file. Those of version 0.1 have null for NaN, and "inf"."""
     fields: dict[str, Any] = {name: math.inf if value == "inf" else value for name, value in entry.items()}
-    return Margin(**fields | ({"value": math.nan} if fields["value"] is None else {}))
+    fields["value"] = math.nan if fields["value"] is None else fields["value"]
+    return Margin(**fields)

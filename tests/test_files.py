@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | W
 DATA = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text() | WORDS, inner), max_leaves=20)
 
 
-def strict(text: str) -> object:
+def strict(text: str) -> Any:
     """JSON as other languages read it."""
 
     def constant(word: str) -> None:
