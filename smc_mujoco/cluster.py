@@ -34,6 +34,8 @@ class _Workers(Executor):
         found: Future[Any] = Future()
 
         def told(done: Any) -> None:
+            if not found.set_running_or_notify_cancel():  # nobody waits for it any more
+                return
             try:
                 found.set_result(done.result())
             except CancelledError:

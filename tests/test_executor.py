@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco import executor, identity, paper
+from smc_mujoco import cluster, executor, identity, paper
 from smc_mujoco.grids import grid
 from smc_mujoco.study import study
 
@@ -307,3 +307,21 @@ def test_without_a_scheduler_there_the_sentence_says_so(tmp_path):
     said = (tmp_path / "client.log").read_text().splitlines()[-1]
     assert said.startswith("no dask at dask://127.0.0.1:9")
     assert said.endswith("start `dask scheduler` and `dask worker` there")
+
+
+def test_a_result_that_comes_after_its_study_has_ended_is_dropped():
+    class Late:
+        def submit(self, fn, *args, **kwargs):
+            return self
+
+        def add_done_callback(self, told):
+            self.told = told
+
+        def result(self):
+            return 1
+
+    client = Late()
+    found = cluster._Workers(client).submit(abs, -1)
+    assert found.cancel()
+    client.told(client)
+    assert found.cancelled()
