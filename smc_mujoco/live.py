@@ -7,6 +7,7 @@ pushes with, and the viewer's reset, which begins the run anew.
 
 import contextlib
 import dataclasses
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -80,7 +81,7 @@ class Live:
     def __init__(self, scenario: Scenario, say: Callable[[str], None] = print):
         self.model = slidden(scenario)
         self.data = mujoco.MjData(self.model)
-        ids = [self.model.actuator(GAIN + name).id for name in scenario.law.gains]
+        ids = [self.model.actuator(GAIN + name).id for name in turned(scenario.law)]
         self.sliders = self.model.actuator_ctrladr[ids] if ids else np.zeros(0, int)
         self.limits = self.model.actuator_ctrlrange[self.sliders].T  # a row a control: some actuators take none
         self.paused, self.say, self.told, self.rested = False, say, scenario.law, 0
@@ -127,7 +128,7 @@ class Live:
             return
         self.loop.push[:] = self.data.xfrc_applied
         values = np.clip(self.data.ctrl[self.sliders], *self.limits).tolist()
-        gains = dict(zip(self.law.gains, values, strict=True))
+        gains = dict(self.law.gains) | dict(zip(turned(self.law), values, strict=True))
         self.rested += 1
         if gains != dict(self.law.gains):
             law = dataclasses.replace(self.law, gains=gains)
@@ -161,7 +162,7 @@ class Live:
         if not self.loop.failure:
             seen.time, seen.qpos[:], seen.qvel[:], seen.act[:] = run.time, run.qpos, run.qvel, run.act
             seen.ctrl[: len(run.ctrl)] = run.ctrl
-        seen.ctrl[self.sliders] = list(self.law.gains.values())
+        seen.ctrl[self.sliders] = list(turned(self.law).values())
         seen.xfrc_applied[:] = 0.0
         mujoco.mj_forward(self.model, seen)
 
@@ -185,7 +186,7 @@ def slidden(scenario: Scenario) -> mujoco.MjModel:
     """The mechanism with a slider a gain among the viewer's controls: an actuator of gear 0, which moves nothing."""
     spec = assembly.spec([scenario])
     joint = driven(spec)[0].name
-    for name, gain in scenario.law.gains.items():
+    for name, gain in turned(scenario.law).items():
         spec.add_actuator(
             name=GAIN + name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
@@ -195,6 +196,11 @@ def slidden(scenario: Scenario) -> mujoco.MjModel:
             ctrlrange=reach(gain),
         )
     return ready(spec, 0)
+
+
+def turned(law: Law) -> dict[str, float]:
+    """The gains that have sliders: all that are finite."""
+    return {name: gain for name, gain in law.gains.items() if math.isfinite(gain)}
 
 
 def reach(gain: float) -> list[float]:

@@ -18,10 +18,10 @@ CATALOGUES = ("laws", "surfaces", "plants", "estimators")
 
 # Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
 CORE = (
-    {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook", "mjcf_trial"},
+    {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook", "interrupts", "mjcf_trial"},
     {"libmujoco"},
     {"files", "layout", "mjcf", "compiled", "component", "conditions", "optional"},
-    {"estimators", "signals", "plant"},
+    {"estimators", "fingerprint", "signals", "plant"},
     {"law", "series", "references", "part", "mechanism"},
     {
         "surfaces",
