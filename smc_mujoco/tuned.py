@@ -104,9 +104,9 @@ class Tuned:
 
     @property
     def front(self) -> list[Evaluation]:
-        """The evaluations that none beats in both tracking and variation, by tracking; none that failed."""
+        """The finals that none beats in both tracking and variation, by tracking; none that failed."""
         found: list[Evaluation] = []
-        for one in sorted(self.history, key=lambda e: (e.tracking, e.variation)):
+        for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
             if not one.failed and (not found or one.variation < found[-1].variation):
                 found.append(one)
         return found

@@ -58,7 +58,7 @@ COMPILES = {
     "a mechanism with mismatch": lambda own, trace, folder: smc.Scenario(**SPRINGS).mechanism == "springs",
     "a mechanism's deviation": lambda own, trace, folder: mechanism.deviation("duffing", "springs") < 1.0,
     "a picture": lambda own, trace, folder: still_of(trace, folder),
-    "an own model again": lambda own, trace, folder: smc.plant_from(own.build.path, ["j"], name="again").n == 1,
+    "an own model again": lambda own, trace, folder: smc.plant_from(own.build.source.path, ["j"], name="again").n == 1,
     "a trace of an own model": lambda own, trace, folder: smc.load(folder / "own.npz").scenario == trace.scenario,
     "a plant's model": lambda own, trace, folder: own.load().nv == 1,
     "backlash": lambda own, trace, folder: len(PlantEnv("duffing", changes=PLAY).reset(seed=0)[0]) == 2,

@@ -60,7 +60,7 @@ def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_ar
     for tuned, stair, ring in zip(sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True):
         assert stair.get_drawstyle() == "steps-post"
         corners = [(float(x), float(y)) for x, y in zip(*stair.get_data(), strict=True)]
-        for one in tuned.history:
+        for one in tuned.finals:
             reached = [y for x, y in corners if x <= one.tracking]  # the stair's height above what was tried
             assert one.failed or min(reached) <= max(one.variation, REST)
         (place,) = zip(*ring.get_data(), strict=True)
@@ -72,9 +72,9 @@ def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_ar
 
 def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
     first = pair[0]
-    failed = [dataclasses.replace(one, tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.history]
-    resting = [dataclasses.replace(one, variation=0.0) for one in pair[1].history]
-    both = [dataclasses.replace(first, history=tuple(failed)), dataclasses.replace(pair[1], history=tuple(resting))]
+    failed = [dataclasses.replace(one, tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.finals]
+    resting = [dataclasses.replace(one, variation=0.0) for one in pair[1].finals]
+    both = [dataclasses.replace(first, finals=tuple(failed)), dataclasses.replace(pair[1], finals=tuple(resting))]
     svg, _ = pareto(both, tmp_path / "fronts")
     assert "Observer-free: every run failed" in svg.read_text()
     assert page[0].axes[0].lines[0].get_ydata()[0] == REST

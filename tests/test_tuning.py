@@ -88,9 +88,9 @@ def test_tuning_beats_the_default_gains(law):
 
 def test_the_front_is_what_no_other_evaluation_beats(found):
     front = found.front
-    assert min(e.objective for e in found.history) == min(e.objective for e in front)
+    assert found.objective == min(e.objective for e in front)
     for e in front:
-        assert not any(o.tracking <= e.tracking and o.variation < e.variation for o in found.history)
+        assert not any(o.tracking <= e.tracking and o.variation < e.variation for o in found.finals)
     assert [e.variation for e in front] == sorted((e.variation for e in front), reverse=True)
 
 

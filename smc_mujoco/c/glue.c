@@ -14,11 +14,22 @@ typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPU
 
 /* How this thread rounds, flushes and traps, where we can ask and restore it: after the law it is as it was before. */
 #if defined(__SSE__) && defined(__GNUC__)
-#define SMC_ARITHMETIC() (__builtin_ia32_stmxcsr() & ~0x3fu) /* without the marks of what has happened */
-#define SMC_RESTORE(smc_was) __builtin_ia32_ldmxcsr(smc_was)
+static unsigned smc_mujoco_arithmetic(void)
+{
+    unsigned short smc_x87; /* C's library and MuJoCo's compiler round by this one */
+    __asm__ volatile("fnstcw %0" : "=m"(smc_x87));
+    return (__builtin_ia32_stmxcsr() & 0xffc0u) | (unsigned)smc_x87 << 16; /* without the marks of what has happened */
+}
+
+static void smc_mujoco_restore(unsigned smc_was)
+{
+    const unsigned short smc_x87 = (unsigned short)(smc_was >> 16);
+    __asm__ volatile("fldcw %0" : : "m"(smc_x87));
+    __builtin_ia32_ldmxcsr(smc_was & 0xffc0u);
+}
 #else
-#define SMC_ARITHMETIC() 0u
-#define SMC_RESTORE(smc_was) ((void)0)
+static unsigned smc_mujoco_arithmetic(void) { return 0u; }
+static void smc_mujoco_restore(unsigned smc_was) { (void)smc_was; }
 #endif
 
 static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
@@ -56,9 +67,9 @@ static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, 
 
 long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
-    const unsigned smc_was = SMC_ARITHMETIC();
+    const unsigned smc_was = smc_mujoco_arithmetic();
     const long long smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
-    if (SMC_ARITHMETIC() == smc_was) return smc_code;
-    SMC_RESTORE(smc_was);
+    if (smc_mujoco_arithmetic() == smc_was) return smc_code;
+    smc_mujoco_restore(smc_was);
     return SMC_BEYOND + 2;
 }
