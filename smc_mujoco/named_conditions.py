@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco import errors
-from smc_mujoco.actuators import DCMotor, Lag
+from smc_mujoco.actuators import DCMotor, Drive, Lag
 from smc_mujoco.backlash import Backlash
 from smc_mujoco.component import Component
 from smc_mujoco.conditions import Jump, Noise
@@ -31,7 +31,7 @@ from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.estimators import estimator
 from smc_mujoco.friction import Coulomb, LuGre
 from smc_mujoco.frozen import frozen
-from smc_mujoco.part import Part
+from smc_mujoco.part import Actuator, Friction, Part
 from smc_mujoco.plant import Plant
 from smc_mujoco.scenario import Scenario
 from smc_mujoco.sensors import Encoder
@@ -43,6 +43,7 @@ Fields = Mapping[str, Any]
 OTHERS = ("plant", "law", "model", "surface", "seed", "duration")
 FIELDS = [f.name for f in dataclasses.fields(Scenario) if f.init and f.name not in OTHERS]
 SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up where conditions are joined
+BASES = (Part, Friction, Actuator, Drive, Signal, Recorded)  # of which there are none
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 SINE = Sine(amplitude=0.2, omega=5.0)
@@ -205,12 +206,14 @@ def _called(node: ast.Call) -> Any:
 
 
 def _kinds() -> dict[str, Any]:
-    """Name -> class, of parts and signals, a user's own included."""
+    """Name -> class, of parts and signals, a user's own included; the suite's own go first where names are the same."""
     found: list[type] = [Noise, Jump]
     bases: list[type] = [Part, Signal]
     for base in bases:
         bases += base.__subclasses__()
-    return {kind.__name__: kind for kind in (*found, *bases) if not kind.__subclasses__() and kind is not Recorded}
+    found += [kind for kind in bases if kind not in BASES]
+    found.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
+    return {kind.__name__: kind for kind in found}
 
 
 def _text(value: Any) -> str:

@@ -60,6 +60,19 @@ def test_text_says_a_condition_whole(condition):
     assert parsed(str(condition)) == condition
 
 
+def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
+    @dataclasses.dataclass(frozen=True)
+    class Sine(smc.Signal):  # pyright: ignore[reportUnusedClass]
+        level: float = 0.0
+
+    @dataclasses.dataclass(frozen=True)
+    class Mine(smc.Constant):
+        pass
+
+    made = smc.condition("own", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(0.1), Mine(0.3)))
+    assert parsed(str(made)) == made
+
+
 def test_the_suites_conditions_go_by_their_names():
     assert [str(one) for one in NAMED.values()] == list(NAMED)
     assert find_condition("noise") is NAMED["noise"]
