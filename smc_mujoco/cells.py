@@ -176,7 +176,7 @@ def _repeats(outcome: np.ndarray, there: np.ndarray) -> np.ndarray:
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
-    """What ran in each block of a group; None where that is not at hand, as the code of a plant of yours may be."""
+    """Return a scenario of each block of a group. It is None where its plant is a user's and cannot be loaded here."""
     found: list[Scenario | None] = []
     for row in group.first:
         try:

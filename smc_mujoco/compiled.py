@@ -134,7 +134,7 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
 
 
 class Cache(FunctionCache):
-    """numba's cache of a function, which can do without its files: a damaged one is written anew."""
+    """Cache of a compiled function on disk. A damaged file is compiled again; without a place to write there is none."""
 
     def __init__(self, body: Callable):
         super().__init__(body)
@@ -148,7 +148,7 @@ class Cache(FunctionCache):
 
 
 class Sealed(IndexDataCacheFile):
-    """The files of numba's cache, each with its hash at its end, which numba does not read."""
+    """Files of numba's cache, each with a hash at its end. A file whose hash does not fit counts as missing."""
 
     def _load_index(self) -> dict:
         return super()._load_index() if _whole(self._index_path) else {}

@@ -1,8 +1,10 @@
-"""Who holds MuJoCo's callbacks, which are the whole process's; and models compiled whoever does.
+"""Ownership of MuJoCo's callbacks, and the compiling of models while a callback is installed.
 
-Of its eight callbacks a run installs the control callback and takes the others away, as a trace is to depend on its
-scenario alone. MuJoCo compiles no model while one of them is a Python function: it would call that with a model Python
-does not know. The plain loop installs one; the harness is native, and a model compiles under it.
+A process has one set of callbacks, eight of them. A run installs the control callback and removes the other seven, so
+that a trace depends on its scenario alone; afterwards all are put back.
+
+MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
+that Python does not know. The plain loop installs such a function. The harness is native code, which is no obstacle.
 """
 
 import contextlib

@@ -134,9 +134,9 @@ def law_function(
 
     The function must be pure: what it is to remember goes into memory, what is to vary into gains. Compiled, it keeps
     the globals and closed-over values that it was compiled with, and random numbers in it would come from a shared
-    generator. A function made anew for each value is compiled anew, and kept: some 2.5 MB each, for numba frees none.
-    Compiled, it has no guard: one that never ends hears no Ctrl-C (kill the process), and one that calls itself
-    without end ends the process.
+    generator. Each new function object is compiled once and stays in memory, about 2.5 MB, because numba frees no code:
+    give a gain other values instead of making a function for each. Ctrl-C does not stop a compiled law that never ends;
+    kill the process. A compiled law that calls itself without end crashes the process.
 
     Returns:
       A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.

@@ -30,7 +30,7 @@ def check_c(
     then run with the compiler's address and undefined-behaviour sanitizers. The signature is told in smc_law.h, which
     stands at the top of every file that `export-c` writes.
 
-    The process is no sandbox: the law may open files and connections as any program of yours.
+    The process is not a sandbox: the law can open files and connections, as any program can that you start.
 
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
