@@ -134,7 +134,7 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
 
 
 class Cache(FunctionCache):
-    """Cache of a compiled function on disk. A damaged file is compiled again; without a place to write there is none."""
+    """Cache of a compiled function on disk. A damaged file is compiled again; a disk without room holds none."""
 
     def __init__(self, body: Callable):
         super().__init__(body)
