@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from smc_mujoco import suite
+from smc_mujoco.envs import dm_control_env
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 5 if QUICK else 15
@@ -65,7 +65,7 @@ def singles(table: Table) -> None:
     endless = {"duration": 1e4}
     peer = stepping(theirs.load("pendulum", "swingup", task_kwargs={"time_limit": float("inf")}), np.zeros(1))
     for plant in ("inverted_pendulum", "duffing", "van_der_pol"):
-        mine = stepping(suite.load(plant, changes=endless), np.zeros(1))
+        mine = stepping(dm_control_env.load(plant, changes=endless), np.zeros(1))
         compare(table, f"dm_env {plant} / dm_control pendulum, per step", mine, peer, "<= 1.5", time.process_time)
     mine = stepping(gymnasium.make("smc_mujoco:smc/InvertedPendulum-v0", changes=endless), np.zeros(1))
     compare(

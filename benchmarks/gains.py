@@ -1,4 +1,4 @@
-"""The gains of the sets "tuned" and "tracking", found again: smc_mujoco/tuned_gains.
+"""The gains of the sets "tuned" and "tracking", found again: smc_mujoco/control/tuned_gains.
 
     python benchmarks/gains.py              # what is missing
     python benchmarks/gains.py --all        # all of it, within 90 minutes on two cores
@@ -10,15 +10,16 @@ import argparse
 from collections.abc import Iterator
 
 import smc_mujoco as smc
-from smc_mujoco import gains
-from smc_mujoco.paper import PLANTS
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.studies.paper.general_laws import general
+from smc_mujoco.studies.paper.scenarios import PLANTS
 
 BUDGET = 96
 
 
 def tunings() -> Iterator[tuple[str, str, int]]:
     """Objective, law and seed of all tunings: every law, then those of the first page from their other seeds."""
-    yield from (("balanced", law, 0) for law in gains.general())
+    yield from (("balanced", law, 0) for law in general())
     for name, objective in gains.OBJECTIVES.items():
         first = 1 if name == "tuned" else 0
         yield from ((objective, law, seed) for seed in range(first, gains.SEEDS[name]) for law in gains.LAWS)

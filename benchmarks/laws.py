@@ -22,15 +22,15 @@ from rich.console import Console
 from rich.table import Table
 
 import smc_mujoco as smc
-from smc_mujoco import native
-from smc_mujoco.callback import harness, installed
-from smc_mujoco.chunk import Chunk
-from smc_mujoco.compiled import call
-from smc_mujoco.component import Component
-from smc_mujoco.estimators import catalogue as estimators
-from smc_mujoco.law import Measurement
-from smc_mujoco.law import catalogue as laws
-from smc_mujoco.row import FAILURE, FINE
+from smc_mujoco.common.jit import call
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.simulation import native
+from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.callback import harness, installed
+from smc_mujoco.simulation.state import FAILURE, FINE
 
 QUICK = "--quick" in sys.argv
 CALLS, ROUNDS = (50_000, 5) if QUICK else (200_000, 15)

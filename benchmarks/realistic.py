@@ -17,7 +17,7 @@ from rich.table import Table
 from speed import ROUNDS, STEPS, chunk, ratio, seconds, stepping
 
 import smc_mujoco as smc
-from smc_mujoco.assembly import parts
+from smc_mujoco.simulation.model import parts
 
 TARGET = 250_000  # steps a second, on two threads
 RUNS, THREADS = 32, 2

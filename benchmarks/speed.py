@@ -20,8 +20,8 @@ from rich.console import Console
 from rich.table import Table
 
 import smc_mujoco as smc
-from smc_mujoco.callback import installed
-from smc_mujoco.chunk import Chunk
+from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.callback import installed
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9

@@ -20,12 +20,13 @@ from rich.console import Console
 from rich.progress import track
 
 import smc_mujoco as smc
-from smc_mujoco import executor, paper
-from smc_mujoco.callback import installed
-from smc_mujoco.chunk import Chunk
-from smc_mujoco.grids import grid
-from smc_mujoco.run import cores
-from smc_mujoco.study import study
+from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.callback import installed
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.run import cores
+from smc_mujoco.studies import executor
+from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.study import study
 
 QUICK = "--quick" in sys.argv
 # All at the control period of 1 ms, with the plant's plain equation.

@@ -1,6 +1,6 @@
 """`python -m smc_mujoco`: the command line, also where its program is not on the path."""
 
-from smc_mujoco.cli import main
+from smc_mujoco.cli.main import main
 
 if __name__ == "__main__":
     main()

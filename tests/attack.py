@@ -40,8 +40,8 @@ import numpy as np
 import wild
 
 import smc_mujoco as smc
-from smc_mujoco import arguments
-from smc_mujoco.row import LOGGED
+from smc_mujoco.common import arguments
+from smc_mujoco.simulation.state import LOGGED
 
 START = 600.0  # s in which a process is ready, compiling included
 LIMIT = 60.0  # s a case may take; what computes on after a wrong-typed call is ended after LONG and counts as accepted
@@ -360,7 +360,7 @@ def damaged(random: Random, data: bytes) -> bytes:
 
 def files(random: Random) -> str:
     """A damaged file, read."""
-    from smc_mujoco import tuned
+    from smc_mujoco.analysis.tuning import result as tuned
 
     world()
     kind = random.choice(["trace", "about", "tuned", "json", "table", "csv"])

@@ -9,5 +9,5 @@ pytest_plugins = ["pytester"]
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Load the plugin, unless its entry point has: then, with its options, before they are read."""
-    if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin("smc_mujoco.pytest_plugin"):
-        pluginmanager.register(importlib.import_module("smc_mujoco.pytest_plugin"), "smc_mujoco")
+    if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin("smc_mujoco.testing.plugin"):
+        pluginmanager.register(importlib.import_module("smc_mujoco.testing.plugin"), "smc_mujoco")

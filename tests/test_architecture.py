@@ -14,62 +14,21 @@ import smc_mujoco as smc
 
 PACKAGE = Path(smc.__file__).parent
 ROOT = PACKAGE.parent
-CATALOGUES = ("laws", "surfaces", "plants", "estimators")
-
-# Each may import what stands above it. What is not here shows results: it may import all of this, and none of this it.
-CORE = (
-    {"errors", "gl", "noise", "progress", "row", "coil", "frozen", "remade", "hook", "interrupts", "mjcf_trial"},
-    {"libmujoco"},
-    {"files", "layout", "mjcf", "compiled", "component", "conditions", "optional"},
-    {"estimators", "fingerprint", "signals", "plant"},
-    {"law", "series", "references", "part", "mechanism"},
-    {
-        "surfaces",
-        "native",
-        "channels",
-        "believed",
-        "motors",
-        "own_channels",
-        "model_check",
-        "friction",
-        "actuators",
-        "tandem",
-        "backlash",
-        "contact",
-        "sensors",
-    },
-    {"given", "forces", "pendulum_chain", "cart", "own_model"},
-    {"consistency", "pendulum_row"},
-    {"scenario"},
-    {"harness", "record", "bounds", "assembly", "guarded", "named_conditions", "initial_states"},
-    {"gains"},
-    {"callback", "trace", "paper"},
-    {"plain", "groups"},
-    {"measure"},
-    {"chunk", "metrics"},
-    {"run", "scene"},
-)
-HEIGHT = {name: height for height, names in enumerate(CORE) for name in names}
-TOP = len(CORE)  # the height of what shows results
-ENTRIES = {  # what the files of a catalogue may import of ours
-    "laws": {"law"},
-    "surfaces": {"surfaces", "law"},
-    "plants": {"plant", "pendulum_chain", "pendulum_row", "cart", "contact", "part", "coil", "errors"},
-    "estimators": {"estimators"},
-}
+CATALOGUES = {
+    "laws": "control/laws", "surfaces": "control/surfaces", "estimators": "control/estimators",
+    "plants": "mechanisms/plants",
+}  # fmt: skip
+# The rooms of the package, each of which imports from itself and from those before it.
+ROOMS = (
+    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "studies", "envs", "testing", "cli",
+)  # fmt: skip
+MOVED = "moved"  # old names of modules, for one release
 HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}
 
-PUBLIC = {  # what type checkers see
-    alias.asname
-    for node in ast.walk(ast.parse((PACKAGE / "__init__.py").read_text()))
-    if isinstance(node, ast.ImportFrom)
-    for alias in node.names
-    if alias.asname
-}
+STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
+PUBLIC = {*smc._HOMES, *smc._MODULES}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
-MODULES = {path.stem: path for path in PACKAGE.glob("*.py") if not path.stem.startswith("__")}
-MODULES |= {name: PACKAGE / name / "__init__.py" for name in CATALOGUES}
 SCENES = sorted((ROOT / "scenes").glob("*.py"))
 TEXTS = [
     path
@@ -88,22 +47,24 @@ def label(path: Path) -> str:
 
 
 def imported(path: Path) -> set[str]:
-    """Our modules that a file imports, wherever in it, but for type checkers alone."""
+    """Dotted names of our modules that a file imports, wherever in it, but for type checkers alone."""
     found, tree = set(), ast.parse(path.read_text())
     tree.body = [n for n in tree.body if not (isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")]
     for node in ast.walk(tree):
         match node:
             case ast.Import():
-                names = [alias.name for alias in node.names]
-            case ast.ImportFrom(module="smc_mujoco"):
-                names = [f"smc_mujoco.{alias.name}" for alias in node.names]
+                found |= {alias.name for alias in node.names}
             case ast.ImportFrom():
                 assert node.level == 0, f"{label(path)} imports relatively"
-                names = [node.module or ""]
-            case _:
-                continue
-        found |= {name.split(".")[1] for name in names if name.startswith("smc_mujoco.")}
-    return found
+                found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name.removeprefix("smc_mujoco.") for name in found if name.startswith("smc_mujoco.")}
+
+
+def module(name: str) -> str:
+    """The module of a dotted name, which may be that of something in it; a package stands for its __init__."""
+    while not (PACKAGE / f"{name.replace('.', '/')}.py").exists() and not (PACKAGE / name.replace(".", "/")).is_dir():
+        name = name.rpartition(".")[0]
+    return name
 
 
 def python(code: str, *, folder: Path = ROOT) -> str:
@@ -125,36 +86,27 @@ def python(code: str, *, folder: Path = ROOT) -> str:
 # which way imports point
 
 
-def test_the_core_is_all_there():
-    assert set(HEIGHT) <= set(MODULES)
+def test_the_package_has_these_rooms_and_no_other():
+    entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"} == {*ROOMS, MOVED}
 
 
-@pytest.mark.parametrize("name", sorted(set(MODULES) - {"laws", "plants"}))
-def test_a_module_imports_only_what_stands_above_it(name):
-    height = HEIGHT.get(name, TOP)
-    wrong = {other for other in imported(MODULES[name]) if other in MODULES and HEIGHT.get(other, TOP) >= height}
-    if height == TOP:
-        wrong = {other for other in wrong if other in HEIGHT}
-    assert not wrong, f"{name} imports {sorted(wrong)}"
+@pytest.mark.parametrize("path", [path for path in FILES if path.parent != PACKAGE], ids=label)
+def test_a_file_imports_from_its_own_room_and_those_below(path):
+    room = path.relative_to(PACKAGE).parts[0]
+    below = ROOMS[: ROOMS.index(room) + 1] if room in ROOMS else (MOVED,)
+    assert [name for name in sorted(imported(path)) if name.split(".")[0] not in below] == []
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    graph = {name: imported(path) & set(MODULES) for name, path in MODULES.items()}
+    names = {
+        path: ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__") for path in FILES
+    }
+    graph = {name: {module(other) for other in imported(path)} - {name} for path, name in names.items()}
     while leaves := [name for name, others in graph.items() if not others & set(graph)]:
         for name in leaves:
             del graph[name]
     assert not graph, f"there is a circle among {sorted(graph)}"
-
-
-def test_nothing_imports_the_command_line():
-    assert [name for name, path in MODULES.items() if "cli" in imported(path)] == []
-
-
-@pytest.mark.parametrize("catalogue", CATALOGUES)
-def test_what_a_catalogue_holds_imports_little(catalogue):
-    for path in (PACKAGE / catalogue).glob("*.py"):
-        if path.stem != "__init__":
-            assert imported(path) <= ENTRIES[catalogue], label(path)
 
 
 @pytest.mark.parametrize("path", SCENES, ids=label)
@@ -172,14 +124,14 @@ def test_a_scene_uses_public_names_only(path):
 # what an import costs
 
 
-@pytest.mark.parametrize("module", ["smc_mujoco", "smc_mujoco.gl"])
-def test_importing_the_package_imports_nothing_heavy(module):
-    loaded = set(python(f"import {module}, sys; print(*sys.modules)").split())
+@pytest.mark.parametrize("name", ["smc_mujoco", "smc_mujoco.common.gl"])
+def test_importing_the_package_imports_nothing_heavy(name):
+    loaded = set(python(f"import {name}, sys; print(*sys.modules)").split())
     assert loaded & HEAVY == set()
 
 
 def test_importing_the_command_line_starts_no_simulator():
-    loaded = set(python("import smc_mujoco.cli, sys; print(*sys.modules)").split())
+    loaded = set(python("import smc_mujoco.cli.main, sys; print(*sys.modules)").split())
     assert loaded & (HEAVY - {"rich", "typer", "numpy"}) == set()
 
 
@@ -195,52 +147,41 @@ def test_a_name_that_is_not_there_is_an_attribute_error():
         smc.scenaro  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
 
 
-NAMES = """
-import importlib, sys, types
-modules = {modules!r}
-for name in modules:
-    importlib.import_module("smc_mujoco." + name)
-import smc_mujoco as smc
-print(*[name for name in {public!r} if isinstance(getattr(smc, name), types.ModuleType)])
-print(smc.law("classical").name, smc.plants()[1], len(smc.laws()) > 1, callable(smc.run), callable(smc.estimators))
-"""
-
-
-@pytest.mark.parametrize("first", ["law laws run plant plants estimators", "trace run", "run law"])
-def test_a_submodule_never_hides_a_public_name(first):
-    names, works = python(NAMES.format(modules=first.split(), public=sorted(PUBLIC))).splitlines()
-    assert names.split() in ([], ["paper"])
-    assert works == "classical duffing True True True"
+def test_no_room_hides_a_public_name():
+    assert PUBLIC.isdisjoint(ROOMS)
 
 
 def test_types_and_run_time_agree_on_the_public_names():
-    assert set(smc._HOME) == PUBLIC
+    told = {n.targets[0].id for n in STUB.body if isinstance(n, ast.Assign)} | {
+        alias.asname for n in STUB.body if isinstance(n, ast.ImportFrom) for alias in n.names if alias.asname
+    }
+    assert told == PUBLIC
 
 
 # one file adds one thing
 
 ENTRY = {
     "laws": """
-from smc_mujoco.law import law_function
+from smc_mujoco.control.law import law_function
 @law_function(gains={"k": 2.0})
 def brand_new(y, gains, memory):
     return -gains.k * y.e, y.e
 """,
     "estimators": """
-from smc_mujoco.estimators import estimator_function
+from smc_mujoco.control.estimator import estimator_function
 @estimator_function(gains={"k": 2.0})
 def brand_new(y, gains, memory):
     return gains.k * y.v
 """,
     "surfaces": """
-from smc_mujoco.surfaces import surface_function
+from smc_mujoco.control.surface import surface_function
 @surface_function(gains={"k": 2.0})
 def brand_new(y, gains, memory):
     return y.de + gains.k * y.e, -gains.k * y.de
 """,
     "plants": """
 import dataclasses
-from smc_mujoco.plants.duffing import DUFFING
+from smc_mujoco.mechanisms.plants.duffing import DUFFING
 BRAND_NEW = dataclasses.replace(DUFFING, name="brand_new")
 """,
 }
@@ -257,7 +198,7 @@ def test_a_new_file_is_found_and_runs(catalogue, tmp_path):
     (tmp_path / "brand_new.py").write_text(ENTRY[catalogue])
     code = f"""
 import importlib
-importlib.import_module("smc_mujoco.{catalogue}").__path__.append({str(tmp_path)!r})
+importlib.import_module("smc_mujoco.{CATALOGUES[catalogue].replace("/", ".")}").__path__.append({str(tmp_path)!r})
 import smc_mujoco as smc
 assert "brand_new" in smc.{catalogue}()
 trace = smc.run({RUN[catalogue]})

@@ -10,17 +10,17 @@ import subprocess
 import sys
 
 import pytest
-from pages import ROOT, beside, blocks, titled
+from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco import theory
-from smc_mujoco.metrics import metrics
+from smc_mujoco.analysis import linear_theory
+from smc_mujoco.metrics.catalogue import metrics
 
 DOCS, CONFIGURATION = ROOT / "docs", ROOT / "docs" / "site" / "mkdocs.yml"
 TUTORIAL = DOCS / "tutorial.md"
 NAV = re.findall(r"^ +- (?:\w+: )?(\w+\.md)$", CONFIGURATION.read_text(), re.MULTILINE)
 INSTALLED = bool(importlib.metadata.entry_points(group="pytest11", name="smc_mujoco"))
-PLUGIN = ("-p", "no:cacheprovider", *(() if INSTALLED else ("-p", "smc_mujoco.pytest_plugin")))
+PLUGIN = ("-p", "no:cacheprovider", *(() if INSTALLED else ("-p", "smc_mujoco.testing.plugin")))
 NUMBER = r"\d+(?:\.\d+)?"
 
 
@@ -61,7 +61,9 @@ def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, 
 
 def test_the_smallest_lambda_is_the_formula_that_the_mathematics_tell():
     p = smc.plant("inverted_pendulum").parameters
-    assert theory.smallest_lam(smc.plant("inverted_pendulum"), 9.7) == pytest.approx(p["m"] * p["grav"] * p["l"] / 9.7)
+    assert linear_theory.smallest_lam(smc.plant("inverted_pendulum"), 9.7) == pytest.approx(
+        p["m"] * p["grav"] * p["l"] / 9.7
+    )
 
 
 def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypatch):

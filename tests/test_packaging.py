@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from smc_mujoco import optional
+from smc_mujoco.common import extras
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -131,7 +131,9 @@ def test_a_shell_completes_commands(binaries, tmp_path, shell):
 
 def test_models_are_found_from_the_wheel(binaries, tmp_path):
     names = sorted(name.removeprefix("models/") for name in shipped("models"))
-    code = "import sys; from smc_mujoco.plant import model_path as f; print(*map(f, sys.argv[1:]), sep='\\n')"
+    code = (
+        "import sys; from smc_mujoco.mechanisms.plant import model_path as f; print(*map(f, sys.argv[1:]), sep='\\n')"
+    )
     done = run(binaries / "python", "-c", code, *names, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for name, path in zip(names, map(Path, done.stdout.splitlines()), strict=True):
@@ -210,9 +212,15 @@ DM = "pip install 'smc-mujoco[dm]'" if sys.version_info < (3, 13) else "take Pyt
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("import smc_mujoco.suite", ["smc_mujoco.suite", "dm_control", DM]),
-        ("import smc_mujoco.gym", ["smc_mujoco.gym", "gymnasium", "pip install 'smc-mujoco[rl]'"]),
-        ("import smc_mujoco.vector", ["smc_mujoco.gym", "gymnasium", "pip install 'smc-mujoco[rl]'"]),
+        ("import smc_mujoco.envs.dm_control_env", ["smc_mujoco.envs.dm_control_env", "dm_control", DM]),
+        (
+            "import smc_mujoco.envs.gymnasium_env",
+            ["smc_mujoco.envs.gymnasium_env", "gymnasium", "pip install 'smc-mujoco[rl]'"],
+        ),
+        (
+            "import smc_mujoco.envs.vector_env",
+            ["smc_mujoco.envs.gymnasium_env", "gymnasium", "pip install 'smc-mujoco[rl]'"],
+        ),
         ("smc.report('r', quick=True)", ["a report", "jinja2 and plotly", "pip install 'smc-mujoco[report]'"]),
         ("smc.film(t, 'a.mp4')", ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"]),
         ("films.film([t], 'a')", ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[report]'"]),
@@ -222,7 +230,7 @@ def test_an_extra_that_is_missing_is_one_sentence_where_it_is_needed(code, words
     before = "t = smc.run(smc.Scenario(plant='duffing', law='none', duration=0.01))" if "film" in code else ""
     asked = f"""
 import smc_mujoco as smc
-from smc_mujoco.report import films
+from smc_mujoco.studies.report import films
 {before}
 try:
     {code}
@@ -237,7 +245,8 @@ except ImportError as error:
 
 def test_a_scene_without_the_extra_of_films_says_so_and_does_the_rest(tmp_path):
     code = """
-from smc_mujoco import cli, gl
+from smc_mujoco.cli import main as cli
+from smc_mujoco.common import gl
 gl.missing = lambda: None
 try:
     cli.main(["run", "duffing"])
@@ -279,9 +288,9 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
 
 
 def test_an_extra_that_pip_cannot_install_here_names_a_python_on_which_it_can(monkeypatch):
-    monkeypatch.setattr(optional, "LAST", {"dm": (3, 10)})
-    assert optional.cure("dm").startswith("take Python 3.10, ")
-    assert optional.cure("rl") == "pip install 'smc-mujoco[rl]'"
+    monkeypatch.setattr(extras, "LAST", {"dm": (3, 10)})
+    assert extras.cure("dm").startswith("take Python 3.10, ")
+    assert extras.cure("rl") == "pip install 'smc-mujoco[rl]'"
 
 
 def test_every_extra_is_in_all():

@@ -11,10 +11,13 @@ from pathlib import Path
 
 import pytest
 import typer
-from pages import PAGES, ROOT, beside, blocks, titled
+from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco import bounds, cli, gl, scene, show
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.cli import main, show
+from smc_mujoco.common import gl
+from smc_mujoco.studies import scene
 
 README = PAGES[0].read_text()
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -60,7 +63,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(bounds, "SCALES", dict(bounds.SCALES))  # to which a page adds
+    monkeypatch.setattr(search_space, "SCALES", dict(search_space.SCALES))  # to which a page adds
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
@@ -82,7 +85,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
 )
 def test_a_command_line_names_commands_options_and_files_that_exist(page, line):
     word, *rest = shlex.split(line)[1:]
-    program = typer.main.get_command(cli.app)
+    program = typer.main.get_command(main.app)
     known = program.commands  # pyright: ignore[reportAttributeAccessIssue]
     assert word in known
     options = {option for parameter in known[word].params for option in (*parameter.opts, *parameter.secondary_opts)}
@@ -142,7 +145,7 @@ def test_readme_s_tables_name_every_plant_law_and_scene():
 
 
 def test_readme_lists_what_a_law_sees():
-    from smc_mujoco.law import Measurement
+    from smc_mujoco.control.law import Measurement
 
     assert f"`y` has `{' '.join(Measurement._fields)}`" in README
 

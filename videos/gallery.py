@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.progress import track
 
 import smc_mujoco as smc
-from smc_mujoco.draw.video import clip
+from smc_mujoco.draw.film.film import clip
 
 FOLDER = Path(__file__).parent / "gallery"
 BLOW = {

@@ -14,15 +14,15 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from smc_mujoco import metrics
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import panels, style
-from smc_mujoco.draw.envelope import end, finite
+from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.rows import REALISM, Row, axis, rows_of, titles
-from smc_mujoco.draw.state import HOLD
-from smc_mujoco.errors import ScenarioError
-from smc_mujoco.files import replacing
-from smc_mujoco.groups import Group, cut
-from smc_mujoco.trace import Trace
+from smc_mujoco.draw.states import HOLD
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.metrics.channel_groups import Group, cut
+from smc_mujoco.simulation.trace import Trace
 
 WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
 DPI = 150
@@ -221,7 +221,7 @@ def _variation(trace: Trace, group: Group) -> str:
     """How much u moves in the last part of a run."""
     if trace.diverged_at is not None:
         return style.ending(trace)
-    rate = metrics.tv_rate(trace)
+    rate = catalogue.tv_rate(trace)
     return f"{rate:,.{0 if rate >= 10 else 2}f} {style.units(group)['u']}/s"
 
 

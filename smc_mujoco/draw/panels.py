@@ -12,12 +12,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from smc_mujoco.draw import style
-from smc_mujoco.draw.envelope import columns, end, line, stretches, window
-from smc_mujoco.draw.state import HOLD, resting, rubs
-from smc_mujoco.groups import Group
-from smc_mujoco.measure import BAND, scale
-from smc_mujoco.plain import LEFT_THE_WORLD
-from smc_mujoco.trace import Trace
+from smc_mujoco.draw.decimate import columns, end, line, stretches, window
+from smc_mujoco.draw.states import HOLD, resting, rubs
+from smc_mujoco.metrics.channel_groups import Group
+from smc_mujoco.metrics.conventions import BAND, scale
+from smc_mujoco.simulation.reference import LEFT_THE_WORLD
+from smc_mujoco.simulation.trace import Trace
 
 COLUMNS = 360  # of a panel
 LAST = 60  # control samples in the close-up of u

@@ -14,8 +14,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from smc_mujoco.analysis.tuning.result import Tuned, compare
 from smc_mujoco.draw import figure, style
-from smc_mujoco.tuned import Tuned, compare
 
 HEIGHT = 6.4  # inches
 REST = 1e-6  # 1/s: less variation than that, or none, has no place on a logarithmic axis

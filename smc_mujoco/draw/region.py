@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from smc_mujoco.basin import CONVERGES, DOES_NOT, Basin
+from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import style
-from smc_mujoco.errors import ScenarioError
-from smc_mujoco.files import replacing
 
 ENDINGS = (".png", ".svg")
 # Sooner to later, then undecided and not: apart in lightness alone, so for every eye and in grey. Blue and orange are

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.draw import style
-from smc_mujoco.groups import Group
-from smc_mujoco.trace import Trace
+from smc_mujoco.metrics.channel_groups import Group
+from smc_mujoco.simulation.trace import Trace
 
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
 GAP = 4  # points, between the names of two axes

@@ -9,11 +9,11 @@ import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from smc_mujoco import plain
-from smc_mujoco.errors import ScenarioError
-from smc_mujoco.groups import Group, cut, groups
-from smc_mujoco.plant import EFFORT
-from smc_mujoco.trace import Trace
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.plant import EFFORT
+from smc_mujoco.metrics.channel_groups import Group, cut, groups
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.trace import Trace
 
 COLOURS = {
     "observer_free": "#0072B2",
@@ -128,7 +128,7 @@ def ending(trace: Trace) -> str:
     """How a run ended before its time, "" if it did not: "diverged at 0.4 s" only where the plant went off."""
     if trace.diverged_at is None:
         return ""
-    off = trace.failure is None or trace.failure.startswith(plain.LEFT_THE_WORLD)
+    off = trace.failure is None or trace.failure.startswith(reference.LEFT_THE_WORLD)
     return f"{'diverged' if off else 'failed'} at {trace.diverged_at:.3g} s"
 
 

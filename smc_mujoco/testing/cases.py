@@ -3,10 +3,10 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from smc_mujoco import paper
-from smc_mujoco.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.named_conditions import find_condition
-from smc_mujoco.plant import catalogue as plants
+from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation.conditions import find_condition
+from smc_mujoco.studies.paper import scenarios
 
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
 
@@ -28,7 +28,7 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
         if name not in ("plants", "conditions"):
             raise unknown("argument of marker smc", name, ("plants", "conditions"))
     wanted = {
-        "plant": _names("plant", named.get("plants", list(paper.GAINS)), plants()),
+        "plant": _names("plant", named.get("plants", list(scenarios.GAINS)), plants()),
         "condition": _conditions(named.get("conditions", ["nominal"])),
     }
     for argument, plural in (("plant", "plants"), ("condition", "conditions")):

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from smc_mujoco.errors import ScenarioError, number, shown
-from smc_mujoco.files import plain, read_json, replacing
+from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.files import plain, read_json, replacing
 from smc_mujoco.testing.limits import Limit, answer, table, told
 from smc_mujoco.testing.response import StepResponse
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from smc_mujoco.errors import ScenarioError, number, shown
+from smc_mujoco.common.errors import ScenarioError, number, shown
 
 
 class Limit(NamedTuple):

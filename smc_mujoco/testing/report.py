@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from smc_mujoco.scene import slug
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.scene import slug
 from smc_mujoco.testing.response import StepResponse
-from smc_mujoco.trace import Trace
 
 LONGEST = 150  # bytes of a test's id in a file's name, which most file systems bound at 255
 
@@ -46,12 +46,12 @@ def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
 
 
 def _no_film() -> str | None:
-    from smc_mujoco.draw.video import missing
+    from smc_mujoco.draw.film.film import missing
 
     return missing()
 
 
 def _film(traces: Sequence[Trace], path: Path) -> Path:
-    from smc_mujoco.draw.video import film
+    from smc_mujoco.draw.film.film import film
 
     return film(traces, path)

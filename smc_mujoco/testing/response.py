@@ -4,21 +4,21 @@ import dataclasses
 import functools
 from collections.abc import Callable, Mapping
 
-from smc_mujoco import paper
-from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, number, shown, unknown
-from smc_mujoco.groups import groups
-from smc_mujoco.measure import CATALOGUE
-from smc_mujoco.metrics import score, scores
-from smc_mujoco.named_conditions import Condition, find_condition
-from smc_mujoco.plant import Plant
-from smc_mujoco.plant import plant as find_plant
-from smc_mujoco.run import run
-from smc_mujoco.scenario import Scenario
-from smc_mujoco.signals import Step
+from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics.catalogue import score, scores
+from smc_mujoco.metrics.channel_groups import groups
+from smc_mujoco.metrics.conventions import CATALOGUE
+from smc_mujoco.simulation.conditions import Condition, find_condition
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Step
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.testing.limits import Limit, Value, answer, bound, table, told
 from smc_mujoco.testing.sentence import mendable
-from smc_mujoco.trace import Trace
 
 TOLD = ("settling_time", "overshoot", "tv_rate")  # of the metrics, in one line
 
@@ -190,8 +190,8 @@ def respond(
     """
     given = dict(fields or {})
     for name in given:
-        if name not in paper.FIELDS:
-            raise unknown("field of a Scenario", name, paper.FIELDS)
+        if name not in scenarios.FIELDS:
+            raise unknown("field of a Scenario", name, scenarios.FIELDS)
     if "reference" in given:
         raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, for it is the step of {step}")
     if isinstance(law, Callable) and not isinstance(law, Template):
@@ -201,7 +201,7 @@ def respond(
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
     asked = find_condition(condition)
     machine = find_plant(plant) if isinstance(plant, str) else plant
-    of_study = asked.on(machine, number("duration", given.get("duration", paper.DURATION)))
+    of_study = asked.on(machine, number("duration", given.get("duration", scenarios.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
     told = [asked.name] * (asked.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
     return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(told))

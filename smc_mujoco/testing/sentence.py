@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -1,0 +1,146 @@
+"""Medians and shares of runs, with their uncertainty over seeds.
+
+    median_interval([1.2, 1.3, math.inf])              # Interval(median=1.3, low=1.2, high=inf, n=3)
+
+Seeds are the sample. Conditions and plants are fixed blocks, and a seed gives all of them, under every law, the same
+start and noise; so seeds are drawn again as wholes (A. C. Davison, D. V. Hinkley, Bootstrap Methods and Their
+Application, 1997, 3.8). inf is "never" or a failed run: worst, and as bad as any other.
+
+Intervals are percentile bootstraps (B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13): their
+ends are values of the sample, so that inf is no difficulty. BCa needs the jackknife, which fails for the median
+(ch. 11). The percentiles are those of T. C. Hesterberg (The American Statistician 69(4), 2015), farther out where seeds
+are few. The binomial interval of order statistics, the alternative, knows no blocks; of a single block the bootstrap's
+ends are order statistics too, and cover as the binomial distribution says: 93 % or more with 6 to 40 seeds, and
+1 - 2^(1 - n) with fewer, which is all that the range of a sample can cover.
+
+The median of several blocks is the median of their medians. A law with the lower median in every block then has the
+lower one over all of them; the median of all runs together does not promise that.
+"""
+
+import functools
+import math
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from smc_mujoco.common.errors import ScenarioError, number, whole
+
+RESAMPLES = 1999  # chosen; one more is a whole number of usual percentiles
+
+
+class Interval(NamedTuple):
+    """A median, or a share, with its interval.
+
+    Attributes:
+      median: of the values; of `share_interval` the share.
+      low: NaN where it is not known: a median of a single seed.
+      high: likewise; inf where it may be "never".
+      n: seeds.
+    """
+
+    median: float
+    low: float
+    high: float
+    n: int
+
+
+def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+    """The median of runs, and its bootstrap interval.
+
+    The median of an even number of runs is the mean of the middle two; the interval reaches from the resampled lower
+    of the two to the resampled higher.
+
+    Args:
+      values: (n,) a value a seed, or (blocks, n), whose columns are drawn together and of which the median is that of
+        the blocks' medians; inf for never.
+      level: of the interval.
+
+    Raises:
+      ScenarioError: no values, or NaN: whether it stands for a failure or for nothing is for the caller to say.
+    """
+    given = np.atleast_2d(np.asarray(values, float))
+    if given.ndim != 2 or not given.size:
+        raise ScenarioError(f"values have the shape {given.shape}: give (n,) or (blocks, n), with at least one value")
+    if np.isnan(given).any():
+        raise ScenarioError("a value is nan: give inf for a run that failed, and leave out one that has no value")
+    return median_of(np.sort(given) if len(given) == 1 else given, level, resamples, seed)
+
+
+def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
+    """As `median_interval`, of (blocks, n) in which NaN is a cell without a run; no column is without any."""
+    n, centre = values.shape[1], float(middle(middle(values)))
+    if n < 2:
+        return Interval(centre, math.nan, math.nan, n)
+    at = outermost(n, level, resamples)
+    lower, upper = (np.sort(middle(ends)) for ends in drawn_medians(values, draws(n, resamples, seed)))
+    return Interval(centre, float(lower[at - 1]), float(upper[resamples - at]), n)
+
+
+def middle(values: np.ndarray) -> np.ndarray:
+    """The median over the last axis of the values that are not NaN; NaN where all are."""
+    ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
+    low, high = (np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2))
+    return ((low + high) / 2)[..., 0]
+
+
+def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The lower and the upper of the middle two of each block in each resample of its seeds.
+
+    Args:
+      values: (blocks, n), NaN where no run is.
+      drawn: (n, resamples), how often each seed is drawn.
+
+    Returns:
+      Two arrays (resamples, blocks), NaN where no run of the block is drawn.
+    """
+    found = np.full((2, drawn.shape[1], len(values)), math.nan)
+    for k, block in enumerate(values):
+        order = np.argsort(block)[: (~np.isnan(block)).sum()]
+        counted = 2 * np.cumsum(drawn[order], axis=0, dtype=drawn.dtype)
+        total, ordered = counted[-1] // 2, np.append(block[order], math.nan)
+        found[0, :, k] = ordered[(counted < np.maximum(total, 1)).sum(axis=0)]
+        found[1, :, k] = ordered[(counted <= total).sum(axis=0)]
+    return found[0], found[1]
+
+
+def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
+    """A share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927), which has a width at 0 and 1 too.
+
+    A seed's own share lies in [0, 1] and so varies by p (1 - p) at most: with n the seeds, however many runs each has
+    and however alike they are, the interval is wide enough.
+    """
+    number("share", share, least=0.0, most=1.0)
+    whole("n", n, 1, 10**9)
+    z = NormalDist().inv_cdf((1 + checked(level)) / 2)
+    middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
+    low, high = ((middle + side * half) / (1 + z * z / n) for side in (-1, 1))
+    return Interval(share, max(low, 0.0), min(high, 1.0), n)
+
+
+@functools.lru_cache(maxsize=8)
+def draws(n: int, resamples: int, seed: int) -> np.ndarray:
+    """How often each of n seeds comes in each resample, (n, resamples)."""
+    whole("resamples", resamples, 99, 10**6)
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
+    drawn = np.ascontiguousarray(drawn.T, np.int32)
+    drawn.setflags(write=False)
+    return drawn
+
+
+@functools.lru_cache(maxsize=32)
+def outermost(n: int, level: float, resamples: int) -> int:
+    """Which resample from either end, the outermost being 1, an interval of n >= 2 seeds ends at.
+
+    Hesterberg's expanded percentile, Phi(-sqrt(n / (n - 1)) t), t being Student's with n - 1 degrees of freedom.
+    """
+    from scipy.special import ndtr, stdtrit
+
+    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + checked(level)) / 2))
+    return max(1, math.floor(tail * (resamples + 1)))
+
+
+def checked(level: float) -> float:
+    """A level of confidence."""
+    return number("level", level, least=0.5, most=0.999)

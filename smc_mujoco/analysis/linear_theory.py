@@ -1,0 +1,191 @@
+"""What linear theory says of the paper's law at rest: smallest lambda, critical delay, steady error.
+
+    plant = smc.plant("inverted_pendulum")
+    smallest_lam(plant, k1=9.7)                                # 0.253
+    critical_delay(plant, lam=4.4, k1=9.7)                     # s, continuous control
+    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)    # s, as it runs: sampled and held
+    steady_error(plant, lam=4.4, k1=9.7, d=0.2)                # rad
+    rest_error(plant, law, d=0.2)                              # the same without linearising
+
+At rest the plant is M x'' = -K x - D x' + u + d (`linear`) and u = -lam tanh(x' + k1 x) is -lam (x' + k1 x), so that
+
+    M x'' + (D + lam) x' + (K + lam k1) x = d,                                                          (1)
+
+in n modes that differ in their stiffness K_j alone: each statement below is the worst mode's. The middle of a saturated
+law is of the same kind, with lam = k/phi and k1 = c (`linear.local`). Laws that switch have no linear part, and no
+theory here.
+Source: Routh-Hurwitz for (1), the paper's stability claim is "any lambda > 0"; the crossings of a delay after
+K. L. Cooke & Z. Grossman, J. Math. Anal. Appl. 86:592, 1982; sampling after Astrom & Wittenmark, Computer-Controlled
+Systems, 1997, chapter 2; the rest derived here.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from smc_mujoco.analysis.linearisation import ASIDE, Linear, holding, linear, rising, sampled
+from smc_mujoco.common.errors import number
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant
+
+# stability
+
+
+def smallest_lam(plant: Plant, k1: float) -> float:
+    """The lam above which (1) is stable, continuous control: lam > -D and lam k1 > -K_j for every mode; at least 0.
+
+    By Routh-Hurwitz both coefficients of (1) must be positive. 0 bears the paper's claim out; inf: no lam does.
+    """
+    k1, at = number("k1", k1, least=0.0), linear(plant)
+    soft = -float(at.modes[0])
+    stiff = soft / k1 if k1 > 0.0 else (math.inf if soft >= 0.0 else 0.0)
+    return max(0.0, -at.damping, stiff)
+
+
+def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, float]:
+    """Between which lam the loop is stable as it runs, sampled and held, without delay; (inf, inf): nowhere.
+
+    A sample moves a mode by z+ = z + E z + Gamma u, z = (x, x'), u = -lam (k1, 1) z: exact. Jury's conditions, of the
+    trace t and determinant d of the closed E, are d > 0, t + d < 0 and 4 + 2 t + d > 0, all affine in lam.
+    """
+    k1, at = number("k1", k1, least=0.0), linear(plant)
+    low, high = 0.0, math.inf
+    for stiffness in at.modes:
+        e, gamma = sampled(at, stiffness, control_period)
+        row = np.array([k1, 1.0])
+        t, d = np.array([np.trace(e), -row @ gamma]), np.array([np.linalg.det(e), -row @ _adjugate(e) @ gamma])
+        for a, b in (d, -t - d, np.array([4.0, 0.0]) + 2.0 * t + d):
+            if b > 0.0:
+                low = max(low, -a / b)
+            elif b < 0.0:
+                high = min(high, -a / b)
+            elif a <= 0.0:
+                return math.inf, math.inf
+    return (float(low), float(high)) if low < high else (math.inf, math.inf)
+
+
+def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
+    """The input delay in s from which (1) is unstable; 0 if it is without one, inf if no delay makes it so.
+
+    Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
+    right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|, a quadratic in w^2 without tau, which the phase then
+    gives. Holding the input over h acts like h/2 of delay more.
+    Sampled (control_period h): a delay of m periods makes it 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
+    N = lam (k1, 1) adj(w - E) Gamma, and |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
+    gives m, not whole: stable for all whole m below it, no more at the next. A loop still above 1 at the highest
+    frequency a sampled loop has, z = -1, bears less than one period.
+    """
+    lam, k1 = number("lam", lam, least=0.0), number("k1", k1, least=0.0)
+    at, h = linear(plant), number("control_period", control_period, least=0.0)
+    if h:
+        low, high = lam_range(plant, k1, h)
+        return min(_sampled_crossing(at, k, lam, k1, h) for k in at.modes) if low < lam < high else 0.0
+    return min(_crossing(at, k, lam, k1) for k in at.modes) if lam > smallest_lam(plant, k1) else 0.0
+
+
+def _crossing(at: Linear, stiffness: float, lam: float, k1: float) -> float:
+    """The delay at which a mode first crosses, s."""
+    m, d, k = at.inertia, at.damping, stiffness
+    delays = [math.inf]
+    for square in _roots(m * m, d * d - 2.0 * m * k - lam * lam, k * k - (lam * k1) ** 2):
+        if square > 0.0:
+            w = math.sqrt(square)
+            turned = np.angle(-lam * (k1 + 1j * w) / (k - m * w * w + 1j * d * w))  # = w tau, modulo a turn
+            delays.append(turned % math.tau / w)
+    return float(min(delays))
+
+
+def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
+    """The same of a mode as it runs."""
+    e, gamma = sampled(at, stiffness, h)
+    t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
+    n1, n0 = row @ gamma, -row @ _adjugate(e) @ gamma  # adj(w - E) = w - adj(E)
+    periods = [1.0] if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d else [math.inf]
+    # |w^2 - t w + d|^2 = |n1 w + n0|^2 where |w|^2 = 2 y and w + conj(w) = -2 y
+    for y in _roots(4.0 * (1.0 + t + d), 2.0 * (t * t + t * d - 2.0 * d - n1 * n1 + n1 * n0), d * d - n0 * n0):
+        if 0.0 < y <= 2.0:
+            w = complex(-y, math.sqrt(y * (2.0 - y)))
+            turned = np.angle(-(n1 * w + n0) / (w * w - t * w + d)) % math.tau
+            periods.append(turned / (2.0 * math.asin(math.sqrt(y / 2.0))))
+    return float(h * min(periods))
+
+
+def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: int = 0) -> float:
+    """By what factor the loop with a delay of whole control periods grows a period in the end: stable below 1.
+
+    The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode: what `critical_delay` answers in closed form.
+    """
+    at, largest = linear(plant), 0.0
+    for stiffness in at.modes:
+        e, gamma = sampled(at, stiffness, control_period)
+        whole = np.zeros((2 + periods, 2 + periods))
+        whole[:2, :2] = np.eye(2) + e
+        if periods:
+            whole[:2, -1] = gamma
+            whole[2, :2] = -lam * k1, -lam
+            whole[3:, 2:-1] = np.eye(periods - 1)
+        else:
+            whole -= lam * np.outer(gamma, (k1, 1.0))
+        largest = max(largest, float(np.abs(np.linalg.eigvals(whole)).max()))
+    return largest
+
+
+def _roots(a: float, b: float, c: float) -> list[float]:
+    """Real roots of a z^2 + b z + c."""
+    return [float(z.real) for z in np.roots([a, b, c]) if abs(z.imag) <= 1e-9 * abs(z)]
+
+
+def _adjugate(m: np.ndarray) -> np.ndarray:
+    return np.array([[m[1, 1], -m[0, 1]], [-m[1, 0], m[0, 0]]])
+
+
+# at rest
+
+
+def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
+    """Where (1) rests under a constant d on every channel, worst channel, rad or m: |d| / (lam k1 + K) of one joint."""
+    lam, k1, d = number("lam", lam, least=0.0), number("k1", k1, least=0.0), number("d", d)
+    at = linear(plant)
+    loop = at.stiffness + lam * k1 * np.eye(plant.n)
+    return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
+
+
+def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> float | None:
+    """The same without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|; inf if there is none.
+
+    None for a law without theory. Followed from x = 0 to the first summit of that force: beyond it nothing holds.
+    """
+    force = holding(plant, law, u_max)
+    if force is None:
+        return None
+    values, d = rising(force), abs(number("d", d))
+    beyond = np.flatnonzero(values >= d)
+    if beyond.size:
+        return float(np.interp(d, np.r_[0.0, values], np.r_[0.0, ASIDE[: values.size]]))
+    summit, most = _summit(force, values.size)
+    return summit if d <= most else math.inf
+
+
+def borne(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
+    """The largest constant d, or dry friction, at which the plant rests within |x| <= most; None as of `rest_error`.
+
+    Dry friction up to this level cannot hold the plant further out; a plant may still happen to stop further in.
+    """
+    force = holding(plant, law, u_max)
+    if force is None:
+        return None
+    most = number("most", most, above=0.0)
+    summit, highest = _summit(force, rising(force).size)
+    return max(highest if most >= summit else float(force(np.array([most]))[0]), 0.0)
+
+
+def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
+    """Where a force that rises over the first `size` places of ASIDE is largest, and how large."""
+    from scipy.optimize import minimize_scalar
+
+    ends = ASIDE[max(size - 2, 0)], ASIDE[min(size, ASIDE.size - 1)]
+    found = minimize_scalar(
+        lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
+    )
+    return float(found.x), -float(found.fun)

@@ -1,0 +1,140 @@
+"""A plant at rest as M x'' = -K x - D x' + u + d, and the laws that are linear there.
+
+    at = linear(smc.plant("pendulum_network"))
+    at.inertia, at.damping, at.modes        # kg m^2, N m s/rad, (n,) N m/rad
+
+x is (n,); M = 1/g, K = -(df/dx)/g (n, n) and D = -(df/dv)/g come from the plant's nominal f and g. M and D are the same
+on every channel and K is symmetric, so its eigenvectors part the plant into n modes that differ in their stiffness
+alone.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.frozen import Frozen, frozen
+from smc_mujoco.control.design import STEP
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant
+
+SAME = 1e-6  # relative: what differs by less is called the same
+REACH = 10.0  # rad or m, chosen: beyond the first summit of every restoring force here
+ASIDE = np.geomspace(1e-7, REACH, 4000)  # where a force at rest is looked at: each 0.5 % further out
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """A plant at rest: inertia M and damping D of every channel, stiffness K (n, n); SI units."""
+
+    inertia: float
+    damping: float
+    stiffness: np.ndarray
+
+    @functools.cached_property
+    def modes(self) -> np.ndarray:
+        """The modes' stiffnesses, (n,), smallest first; a negative one falls over by itself."""
+        return np.linalg.eigvalsh(self.stiffness)
+
+
+def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
+    """The plant linearised at x = x' = 0.
+
+    Args:
+      factors: parameter name -> factor, for the true plant of a mismatch; None: the nominal one.
+
+    Raises:
+      ScenarioError: channels without an actuator, of two units, of unlike inertia or damping, or coupled otherwise
+        than by springs.
+    """
+    return _linear(plant, frozen(factors or {}))
+
+
+@functools.lru_cache(maxsize=64)
+def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
+    if plant.unmodelled:
+        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
+    n, p = plant.n, SimpleNamespace(**vars(plant.values(factors)))
+    rest = np.zeros(n)
+    g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
+    if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > SAME * g.max():
+        raise ScenarioError(
+            f"{plant.name} has no theory here: give a plant with an actuator on each of its like joints"
+        )
+
+    def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
+        """-d f_i / d z_j / g, (n, n), by central differences."""
+        found = np.empty((n, n))
+        for j in range(n):
+            moved = rest.copy()
+            moved[j] = STEP
+            found[:, j] = [(at(-moved, i) - at(moved, i)) / (2.0 * STEP * g[i]) for i in range(n)]
+        return found
+
+    stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
+    damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
+    d, small = damping[0, 0], SAME * (1.0 + np.abs(stiffness).max())
+    if np.abs(damping - d * np.eye(n)).max() > small or np.abs(stiffness - stiffness.T).max() > small:
+        raise ScenarioError(f"{plant.name} has no theory here: give a plant whose joints are coupled by springs alone")
+    return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0)
+
+
+# law -> of its gains g and the error x at rest: lam and k1 of its linear part, and its force towards 0
+LOCAL: dict[str, tuple[Callable, Callable]] = {
+    "observer_free": (lambda g: (g["lam"], g["k1"]), lambda g, x: g["lam"] * np.tanh(g["k1"] * x)),
+    "boundary_layer": (
+        lambda g: (g["k"] / g["phi"], g["c"]),
+        lambda g, x: g["k"] * np.clip(g["c"] * x / g["phi"], -1.0, 1.0),
+    ),
+}
+
+
+def local(law: Law) -> tuple[float, float] | None:
+    """lam and k1 of u = -lam (e' + k1 e), which the law is near s = 0; None for one that has no such part."""
+    return LOCAL[law.name][0](law.gains) if law.name in LOCAL else None
+
+
+def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """E (2, 2) and Gamma (2,) of z+ = z + E z + Gamma u, z = (x, x'), of a mode over h in which u is held: exact.
+
+    E is what a sample changes, not the usual Phi = 1 + E: for short h all that there is to know is in the difference.
+    """
+    return _moved(stiffness / at.inertia, at.damping / at.inertia, h, at.inertia)
+
+
+@functools.lru_cache(maxsize=1024)
+def _moved(k: float, d: float, h: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.linalg import expm
+
+    rates, whole = np.array([[0.0, 1.0], [-k, -d]]), np.zeros((4, 4))
+    whole[:2, :2], whole[:2, 2:] = rates * h, np.eye(2) * h
+    summed = expm(whole)[:2, 2:]  # the integral of exp(rates t) over h
+    return rates @ summed, summed[:, 1] / inertia
+
+
+def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The force that holds every channel at the same x > 0, N or N m, as a function of x; None for other laws."""
+    if law.name not in LOCAL:
+        return None
+    linear(plant)  # or refuses
+    p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
+    ratios = [plant.nominal(np.full(plant.n, 1.0), still, i, p) for i in range(plant.n)]
+    if np.ptp([f / g for f, g in ratios]) > SAME * (1.0 + abs(ratios[0][0] / ratios[0][1])):
+        raise ScenarioError(f"{plant.name} has no theory at rest: give a plant whose joints are alike")
+
+    def force(x: np.ndarray) -> np.ndarray:
+        own = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
+        return np.minimum(LOCAL[law.name][1](law.gains, x), u_max) - np.array([f / g for f, g in own])
+
+    return force
+
+
+def rising(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """The force of `holding` at ASIDE, as far as it rises."""
+    values = force(ASIDE)
+    falls = np.flatnonzero(np.diff(np.r_[0.0, values]) < 0.0)
+    return values[: falls[0]] if falls.size else values

@@ -1,0 +1,133 @@
+"""What is asked of a law for its margins: the kinds of trouble, their levels, and when a run bears one.
+
+`SPECS` has a Kind for each. `margins` searches them.
+"""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from smc_mujoco.analysis import linear_theory as theory
+from smc_mujoco.analysis import linearisation
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import EFFORT
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.metrics.conventions import parts, refuse, scale
+from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Constant
+from smc_mujoco.simulation.trace import Trace
+
+BEARS = 0.05  # of the scale: the audit's threshold for an ultimate bound
+RATE = 5.0  # 1/s: noise of the velocity over that of the position, as of the study's sensor
+LARGEST = 6.0  # N or N m: the study's u_max, beyond which no actuator of it holds anything
+HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, well beyond what is borne
+DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A thing to be borne.
+
+    Attributes:
+      unit: {x} stands for the unit of x, {u} for that of u.
+      levels: those looked at first, from small to large.
+      put: a scenario with a level of it.
+      none: the level at which there is none.
+      periods: whether a level is a whole number of control periods.
+      theory: the largest level by linear theory, or None where there is none; it may refuse the plant.
+    """
+
+    unit: str
+    levels: tuple[float, ...]
+    put: Callable[[Scenario, float], Scenario]
+    none: float = 0.0
+    periods: bool = False
+    theory: Callable[[Scenario], float | None] = lambda base: None
+
+    def unit_for(self, x: str) -> str:
+        """The unit where positions have the unit x, "rad" or "m"."""
+        return self.unit.format(x=x, u=EFFORT[x])
+
+    def scan(self, base: Scenario) -> list[float]:
+        """The levels looked at first in a scenario."""
+        return list(dict.fromkeys(self.rounded(base, level) for level in self.levels))
+
+    def rounded(self, base: Scenario, level: float) -> float:
+        """The nearest level that a scenario can have, above none."""
+        if not self.periods:
+            return level
+        return max(1, round(level / base.control_period)) * base.control_period
+
+    def expected(self, base: Scenario) -> float | None:
+        """The largest level by linear theory; None where that has nothing to say of the law or the plant."""
+        try:
+            return self.theory(base)
+        except ScenarioError:
+            return None
+
+
+def bears(trace: Trace) -> bool:
+    """Whether a run did not fail and ended within 5 % of its scale, its free joints too, each group of its own."""
+    try:
+        refuse(trace)
+    except ScenarioError:  # it failed, or diverged
+        return False
+    bound = catalogue.CATALOGUE["ultimate_bound"].formula
+    return all(bound(part) <= BEARS * scale(part) for part in parts(trace).values())
+
+
+def _doubled(largest: float) -> tuple[float, ...]:
+    """Nine levels, each twice the last."""
+    return tuple(largest * 2.0 ** (i - 8) for i in range(9))
+
+
+def _critical_delay(base: Scenario) -> float | None:
+    lam_k1 = None if base.actuator else linearisation.local(base.law)  # (1) knows no drive
+    return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
+
+
+def _at_rest(base: Scenario) -> float | None:
+    most = BEARS * (max(map(abs, base.x0)) or 1.0)
+    return theory.borne(base.plant, base.law, most, min(base.limits))
+
+
+def _heavier(base: Scenario, level: float) -> Scenario:
+    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"  # which has two names
+    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})  # of the nominal one
+
+
+SPECS: dict[str, Kind] = {
+    "delay": Kind(
+        unit="s",
+        levels=DELAYS,
+        put=lambda base, level: dataclasses.replace(base, input_delay=level),
+        periods=True,
+        theory=_critical_delay,
+    ),
+    "disturbance": Kind(
+        unit="{u}",
+        levels=_doubled(LARGEST),
+        put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
+        theory=_at_rest,
+    ),
+    "friction": Kind(
+        unit="{u}",
+        levels=_doubled(LARGEST),
+        put=lambda base, level: dataclasses.replace(base, friction=(*base.friction, Coulomb(level))),
+        theory=_at_rest,
+    ),
+    "mass": Kind(
+        unit="1",
+        levels=tuple(float(factor) for factor in np.geomspace(1.0, HEAVIEST, 10)[1:]),
+        put=_heavier,
+        none=1.0,
+    ),
+    "noise": Kind(
+        unit="{x}",
+        levels=_doubled(NOISIEST),
+        put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),
+    ),
+}

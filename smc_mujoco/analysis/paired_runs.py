@@ -1,0 +1,203 @@
+"""A table's runs by group, and in each the cells - plant, condition, seed - in which every law ran.
+
+for group in groups(table, by=("plant",)):
+    group.scores(values(table, "itae"))        # law -> (blocks, seeds), as `ranking` takes them
+"""
+
+import contextlib
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from smc_mujoco.analysis.differences import OF_SCALE
+from smc_mujoco.common.errors import ScenarioError, unknown
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.channel_groups import groups as channel_groups
+from smc_mujoco.simulation.scenario import Scenario
+
+SETTLES = "settles"  # no metric of a run: whether its settling time is finite
+GROUPS = ("plant", "condition")
+
+
+class Columns(Protocol):
+    """A table, a row a run: plant, law, condition, seed, failure, diverged_at, and every metric."""
+
+    def column(self, name: str) -> np.ndarray:
+        """Values by row; None or NaN where there is none."""
+        ...
+
+    def scenario(self, i: int) -> Scenario:
+        """What ran in row i; ScenarioError where that is not at hand."""
+        ...
+
+
+def values(table: Columns, metric: str) -> np.ndarray:
+    """A metric by row, inf for a run that failed, NaN where it does not apply; of "settles" 0.0 or, if not, 1.0.
+
+    It does not apply to a plant whose runs all lack it, but for those that failed.
+    """
+    found = np.array(table.column("settling_time" if metric == SETTLES else metric), float)
+    failed = np.array([failure is not None for failure in table.column("failure")], bool)
+    failed |= ~np.isnan(np.array(table.column("diverged_at"), float))
+    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(found) & ~failed
+    without = set(plants[lacking]) - set(plants[~lacking & ~failed])
+    found[failed] = np.inf
+    found[np.isin(plants, list(without))] = np.nan
+    return np.isinf(found).astype(float) if metric == SETTLES else found
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Group:
+    """The runs that share a plant, a condition, or both.
+
+    Attributes:
+      name: what they share.
+      rows: of the table.
+      laws: that ran, by name.
+      blocks: (plant, condition), in the table's order.
+      shape: laws, blocks, seeds.
+      places: where among these each row is, flat.
+      seeds: of each block, in how many every law ran.
+      repeats: (blocks, seeds), whether every law has done the same in an earlier seed.
+    """
+
+    name: Mapping[str, str]
+    rows: np.ndarray
+    laws: tuple[str, ...]
+    blocks: tuple[tuple[str, str], ...]
+    shape: tuple[int, int, int]
+    places: np.ndarray
+    seeds: tuple[int, ...]
+    repeats: np.ndarray
+
+    @property
+    def plants(self) -> int:
+        """In how many plants the runs are."""
+        return len({plant for plant, _ in self.blocks})
+
+    @property
+    def first(self) -> list[int]:
+        """A row of each block."""
+        block = np.unravel_index(self.places, self.shape)[1]
+        return [int(self.rows[np.argmax(block == k)]) for k in range(self.shape[1])]
+
+    def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray]]:
+        """The blocks in which a metric applies, and law -> (these blocks, seeds); of none, {}.
+
+        Scores are NaN in cells that not all laws have, and in repeats.
+
+        Raises:
+          ScenarioError: the laws share no cell.
+        """
+        if np.isnan(by_row[self.rows]).all():
+            return [], {}
+        cube = np.full(self.shape, np.nan)
+        cube.flat[self.places] = by_row[self.rows]
+        common = ~np.isnan(cube).any(axis=0)
+        if not common.any():
+            where = f" of {', '.join(self.name.values())}" if self.name else ""
+            laws = ", ".join(self.laws)
+            raise ScenarioError(f"{laws} have no run{where} in common: run them in the same conditions and seeds")
+        common &= ~self.repeats
+        cube[:, ~common] = np.nan
+        blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
+        return blocks.tolist(), dict(zip(self.laws, cube[:, blocks][:, :, seeds], strict=True))
+
+
+def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
+    """The groups of a table, in the order of its rows; () is all of it.
+
+    Raises:
+      ScenarioError: no runs, an unknown group, or two runs in a cell.
+    """
+    for name in by:
+        if name not in GROUPS:
+            raise unknown("group of a leaderboard", name, GROUPS)
+    columns = {name: np.asarray(table.column(name), str) for name in (*GROUPS, "law")}
+    seeds = np.asarray(table.column("seed"), int)
+    if not seeds.size:
+        raise ScenarioError("the table has no runs: run a study first")
+    columns |= {"seed": seeds, "outcome": _outcomes(table)}
+    keys = np.stack([columns[name] for name in by]) if by else np.zeros((1, seeds.size), str)
+    shared, first, which = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    for i in np.argsort(first):
+        rows = np.flatnonzero(which.ravel() == i)
+        name = dict(zip(by, shared[:, i].tolist(), strict=True)) if by else {}
+        yield _group(name, rows, {name: values[rows] for name, values in columns.items()})
+
+
+def _outcomes(table: Columns) -> np.ndarray:
+    """A number a row, the same for runs that are the same in every metric."""
+    columns = []
+    for name in [*(metric.name for metric in metrics()), "diverged_at"]:
+        with contextlib.suppress(ScenarioError):  # a metric that was not there when the table was written
+            columns.append(np.array(table.column(name), float))
+    numbers = np.ascontiguousarray(np.stack(columns, axis=1))
+    numbers[np.isnan(numbers)] = math.nan  # one kind of it
+    return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
+
+
+def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray]) -> Group:
+    laws, law = np.unique(columns["law"], return_inverse=True)
+    keys = np.stack([columns["plant"], columns["condition"]])
+    blocks, first, block = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    blocks, block = blocks[:, order], np.argsort(order)[block.ravel()]
+    numbers, seed = np.unique(columns["seed"], return_inverse=True)
+    shape = len(laws), blocks.shape[1], len(numbers)
+    places = np.ravel_multi_index((law, block, seed), shape)
+    if (twice := np.bincount(places) > 1).any():
+        a, b, c = np.unravel_index(int(np.argmax(twice)), shape)
+        cell = f"{laws[a]} on {blocks[0, b]}, {blocks[1, b]}, seed {numbers[c]}"
+        raise ScenarioError(f"the table has several runs of {cell}: give those of one set of gains and one duration")
+    outcome = np.full(shape, -1)
+    outcome.flat[places] = columns["outcome"]
+    there = np.all(outcome >= 0, axis=0)
+    return Group(
+        name=name,
+        rows=rows,
+        laws=tuple(laws.tolist()),
+        blocks=tuple(zip(*blocks.tolist(), strict=True)),
+        shape=shape,
+        places=places,
+        seeds=tuple(there.sum(axis=1).tolist()),
+        repeats=np.stack([_repeats(outcome[:, k], there[k]) for k in range(shape[1])]),
+    )
+
+
+def _repeats(outcome: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Where a column of (laws, seeds) is there and equal to an earlier one, (seeds,)."""
+    found, seeds = there.copy(), np.flatnonzero(there)
+    found[seeds[np.unique(outcome[:, there], axis=1, return_index=True)[1]]] = False
+    return found
+
+
+def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
+    """Return a scenario of each block of a group. It is None where its plant is a user's and cannot be loaded here."""
+    found: list[Scenario | None] = []
+    for row in group.first:
+        try:
+            found.append(table.scenario(row))
+        except ScenarioError:
+            found.append(None)
+    return found
+
+
+def floor(scenario: Scenario | None, unit: str) -> float:
+    """The least relevant difference of two values of a metric in this unit, whatever they are; 0 of no scenario.
+
+    0.5 % of the scale of such values, see `differences`: of the largest |x0| of a driven channel, of the bound on u, of
+    100 %. For a position also half a count of the encoder, where there is one.
+    """
+    if scenario is None:
+        return 0.0
+    driven = [group for group in channel_groups(scenario.plant) if group.driven]
+    x0 = max(abs(scenario.x0[i]) for group in driven for i in group.channels)
+    limit = max(scenario.limits)
+    scale = {"{x}": x0, "{u}": limit, "{u}/s": limit, "%": 100.0}.get(unit, 0.0)
+    counts = [scenario.sensor.quantum(group.unit == "rad") for group in driven] if scenario.sensor else []
+    half = max(counts) / 2 if counts and unit == "{x}" else 0.0
+    return max(OF_SCALE * scale if math.isfinite(scale) else 0.0, half)

@@ -1,0 +1,1 @@
+"""Gains by one rule for every law."""

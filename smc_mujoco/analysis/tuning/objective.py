@@ -1,0 +1,130 @@
+"""What tuning minimises: tracking error plus effort, summed over the conditions that a law has to withstand.
+
+    J = sum over the conditions of  ITAE / sum |x0|  +  w TV / (u_max duration)        in s^2
+
+ITAE is that of `metrics`, summed over the channels as the |x0| are; TV is the total variation of u, worst channel. A
+command that swings from bound to bound at every sample has TV / (u_max duration) = 2 / h, h the control period. The
+weight is w = h times 1 s^2 = 1e-3 s^3, chosen so that a run which chatters like that pays 2 s^2: as much as one that
+stands at x0 for its first 2 s. Without it ("tracking", w = 0), nothing speaks against chattering.
+
+The conditions are those in which laws are ranked afterwards: nominal, noisy, delayed, disturbed by a sine and by a
+constant, and with a mass that is 30 % less and 30 % more than the law's gains were meant for. Every run of them has a
+seed, a noise and a start (`initial_states`) that no grid takes, so no law is judged on runs that it was tuned on.
+
+A run that fails has no ITAE. It costs FAILED (2 - t / duration), t the time of its failure: finite, more than any run
+that does not fail, and less the later it fails.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.metrics import catalogue as metrics
+from smc_mujoco.simulation.coerce import U_MAX
+from smc_mujoco.simulation.conditions import NAMED, Condition, find_condition
+from smc_mujoco.simulation.grid import CONTROL_PERIOD
+from smc_mujoco.simulation.initial_states import SEEDS, Starts
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+DURATION = 5.0  # s, chosen: half the study's, 8 T and more of its plants; settled runs add little after it
+CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
+AROUND = Starts()
+RUNS = 1000  # seeds of runs that a seed of tuning has: one a condition
+FAILED = 1e9  # s^2; a run fails beyond |x| = 1e6, so ITAE / |x0| is less for any |x0| > 0.05, and is cut there
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Objective:
+    """J as data; two tunings are comparable only if theirs are equal.
+
+    Attributes:
+      conditions: names, or conditions of your own; each is one run of a candidate.
+      starts: where its runs begin, see `starts`.
+      weight: w, s^3.
+      duration: of a run, s.
+      control_period: s.
+      u_max: bound on |u| of every law, N or N m.
+
+    Raises:
+      ScenarioError: an unknown condition, or a number out of its range.
+    """
+
+    conditions: tuple[Condition, ...] = CONDITIONS
+    starts: Starts = AROUND
+    weight: float = 1e-3
+    duration: float = DURATION
+    control_period: float = CONTROL_PERIOD
+    u_max: float = U_MAX
+
+    def __post_init__(self):
+        found = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
+        if not 0 < len(found) <= RUNS:
+            raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
+        object.__setattr__(self, "conditions", tuple(find_condition(one) for one in found))
+        if not isinstance(self.starts, Starts):
+            raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
+        number("weight", self.weight, least=0.0)
+        for name in ("duration", "control_period", "u_max"):
+            number(name, getattr(self, name), above=0.0)
+
+    def __str__(self) -> str:
+        terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
+        return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}, |u| <= {self.u_max:g}"
+
+    def described(self) -> dict[str, Any]:
+        """As plain data that JSON holds, from which `described` makes it again."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return values | {
+            "conditions": [str(one) for one in self.conditions],
+            "starts": dataclasses.asdict(self.starts),
+        }
+
+    def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
+        """One run for each condition; every candidate has the same starts and the same noise."""
+        common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
+        first = Scenario(plant=plant, law=law, **common)
+        cases = [dataclasses.replace(first, **one.on(first.plant, self.duration)) for one in self.conditions]
+        return [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
+
+    def terms(self, traces: list[Trace]) -> tuple[float, float]:
+        """Tracking and variation of a candidate's runs, each summed over them; J = tracking + weight variation."""
+        parts = [self.parts(trace) for trace in traces]
+        return sum(tracking for tracking, _ in parts), sum(variation for _, variation in parts)
+
+    def parts(self, trace: Trace) -> tuple[float, float]:
+        """ITAE / sum |x0| in s^2, and TV / (u_max duration) in 1/s; of a failed run its price, and 0."""
+        if trace.diverged_at is not None:
+            return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
+        start = float(np.abs(trace.x[0]).sum())
+        tracking = min(metrics.itae(trace) / start, FAILED)
+        return tracking, metrics.tv(trace) / (self.u_max * self.duration)
+
+
+def described(data: Mapping[str, Any]) -> Objective:
+    """The objective of `Objective.described`; one from before there were starts has the default ones."""
+    found = dict(data.get("starts", {}))
+    if found.get("x0") is not None:
+        found["x0"] = tuple(found["x0"])
+    return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**found)})
+
+
+@functools.cache
+def catalogue() -> dict[str, Objective]:
+    """Objectives by name."""
+    return {"balanced": Objective(), "tracking": Objective(weight=0.0)}
+
+
+def objective(given: object) -> Objective:
+    """An Objective, as given or by its name.
+
+    Raises:
+      ScenarioError: neither.
+    """
+    return given if isinstance(given, Objective) else find("objective", given, catalogue())

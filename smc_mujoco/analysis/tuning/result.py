@@ -1,0 +1,217 @@
+"""What a tuning found, with all that it depends on: saved as JSON, and compared only with its like."""
+
+import dataclasses
+import math
+import os
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.analysis.tuning.objective import FAILED, Objective, described
+from smc_mujoco.analysis.tuning.search_space import Box, at_bound, box
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import read_json, reading, write_json
+from smc_mujoco.common.version import __version__
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation import serialise
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# What two tunings must share to be compared, as the sentence that refuses calls it.
+ALIKE = {
+    "rule": "rule",
+    "plant": "plant",
+    "definition": "objective",
+    "budget": "budget",
+    "seed": "seed",
+    "versions": "versions",
+}
+WRITTEN = ("objective", "before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation, see `objective`."""
+
+    gains: tuple[float, ...]
+    objective: float
+    tracking: float
+    variation: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether one of its runs did."""
+        return self.tracking >= FAILED
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Tuned:
+    """A law's best gains, and how they were found.
+
+    Attributes:
+      law: with the best gains.
+      objective: what they cost, s^2.
+      history: every evaluation of the search, in order.
+      finals: the best of them, run accurately; one of these has the gains.
+      before: what the gains cost with which the law was given, which the search did not know; s^2.
+      plant: the plant.
+      definition: what was minimised, its conditions and u_max among it.
+      rule: in words.
+      budget: how many sets of gains were evaluated.
+      seed: of search and noise.
+      scales: the plant's X, F, M, T, SI units.
+      bounds: gain -> lowest, highest, as the rule gives them.
+      searched: the same in the end, some a decade wider.
+      versions: of the packages that the numbers depend on.
+    """
+
+    law: Component
+    objective: float
+    history: tuple[Evaluation, ...]
+    finals: tuple[Evaluation, ...]
+    before: float
+    plant: Plant
+    definition: Objective
+    rule: str
+    budget: int
+    seed: int
+    scales: dict[str, float]
+    bounds: Box
+    searched: Box
+    versions: dict[str, str]
+
+    def __repr__(self) -> str:
+        return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, budget={self.budget})"
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """The gains that were tuned."""
+        return {name: self.law.gains[name] for name in self.bounds}
+
+    @property
+    def at_bound(self) -> dict[str, str]:
+        """Gains that are within 2 % of a bound they were searched in -> "lower" or "upper"."""
+        return at_bound(self.gains, self.searched)
+
+    @property
+    def widened(self) -> list[str]:
+        """Gains of which a bound was moved."""
+        return [name for name in self.bounds if self.bounds[name] != self.searched[name]]
+
+    @property
+    def front(self) -> list[Evaluation]:
+        """The finals that none beats in both tracking and variation, by tracking; none that failed."""
+        found: list[Evaluation] = []
+        for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
+            if not one.failed and (not found or one.variation < found[-1].variation):
+                found.append(one)
+        return found
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write a .json file that `load` reads back."""
+        path = checked(path)
+        scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
+        data = {name: getattr(self, name) for name in WRITTEN} | {
+            "definition": self.definition.described(),
+            "at_bound": self.at_bound,
+            "scenario": serialise.describe(scenario),
+            "history": [dataclasses.astuple(e) for e in self.history],
+            "finals": [dataclasses.astuple(e) for e in self.finals],
+        }
+        return write_json(path, data)
+
+
+def checked(path: str | os.PathLike) -> Path:
+    """The path, if a tuning can be saved under its name."""
+    path = Path(path)
+    if path.suffix != ".json" or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in .json")
+    return path
+
+
+def load(path: str | os.PathLike) -> Tuned:
+    """The tuning that `Tuned.save` wrote.
+
+    Raises:
+      ScenarioError: no such file, or no tuning.
+    """
+    with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
+        data = read_json(file)
+        scenario = serialise.restore(data["scenario"])
+        fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
+        fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
+        history = tuple(_evaluation(*entry) for entry in data["history"])
+        finals = tuple(_evaluation(*entry) for entry in data.get("finals", ()))
+        if not finals:  # tuned before there was a second round: the best of the first one
+            finals = (min(history, key=lambda e: e.objective),)
+        return Tuned(
+            **fields,
+            history=history,
+            finals=finals,
+            law=scenario.law,
+            plant=scenario.plant,
+            definition=described(data["definition"]),
+        )
+
+
+def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) -> Tuned:
+    """The tuning that comes with the package, from which the gains of a set in `gains` are.
+
+    Raises:
+      ScenarioError: there is none.
+    """
+    return load(gains.file(plant, law, objective, seed))
+
+
+def _evaluation(gains: Sequence[float], objective: float, tracking: float, variation: float) -> Evaluation:
+    return Evaluation(gains=tuple(gains), objective=objective, tracking=tracking, variation=variation)
+
+
+def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
+    """The tunings, best first, if all were made by the same rule with the same means.
+
+    Raises:
+      ScenarioError: one had another rule, plant, objective, budget, seed, versions or width of bounds than the first,
+        or evaluated another number of gains than its budget.
+    """
+    tuned = list(tuned)
+    if not tuned or not all(isinstance(one, Tuned) for one in tuned):
+        raise ScenarioError(f"cannot compare {shown(tuned)}: give a list of tunings")
+    first = tuned[0]
+    for one in tuned:
+        for field, name in ALIKE.items():
+            if (its := getattr(one, field)) != (other := getattr(first, field)):
+                pair = f"{one.law.name} has {its}, {first.law.name} {other}"
+                raise ScenarioError(f"laws tuned with unequal {name} cannot be compared, {pair}: tune them alike")
+        if len(one.history) != one.budget:
+            counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
+            raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
+        for gain, ends in box(one.law, one.scales).items():
+            if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
+                pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
+                raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
+    return sorted(tuned, key=lambda one: one.objective)
+
+
+def table(tuned: Tuned) -> "Table":
+    """A line for each gain that was tuned: its value, between which bounds, and whether it is at one."""
+    from rich.table import Table
+
+    found = Table("gain", "tuned", "searched from", "to", "", box=None, padding=(0, 2, 0, 0))
+    found.title, found.title_justify = f"{tuned.law.name} on {tuned.plant.name}", "left"
+    for name, (low, high) in tuned.searched.items():
+        notes = [f"at its {tuned.at_bound[name]} bound"] if name in tuned.at_bound else []
+        notes += ["bound widened by a decade"] if name in tuned.widened else []
+        found.add_row(name, f"{tuned.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes))
+    return found
+
+
+def versions() -> dict[str, str]:
+    """Of what the numbers of a tuning depend on."""
+    return {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy", "scipy")}

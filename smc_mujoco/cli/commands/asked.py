@@ -1,0 +1,86 @@
+"""What several commands are asked for in the same words: plants, conditions, starts."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.conditions import Condition
+    from smc_mujoco.simulation.initial_states import Starts
+
+Conditions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--condition",
+        metavar="TEXT|FILE",
+        help='One of your own, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file of such'
+        " lines; may be repeated.",
+    ),
+]
+During = Annotated[
+    str,
+    typer.Option(
+        "--condition",
+        metavar="NAME|TEXT",
+        help='What holds besides, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
+    ),
+]
+Middle = Annotated[
+    float | None, typer.Option("--x0", help="Where runs begin, rad or m; default the plant's own start.")
+]
+Spread = Annotated[
+    float | None, typer.Option("--spread", help="By how much of x0 seeds move the start to either side; default 0.2.")
+]
+
+
+def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
+    """The names in a,b; the default if none is given."""
+    return default if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+def plants(texts: Sequence[str]) -> "list[str | Plant]":
+    """Plants by name, or as FILE.xml:joint+joint, an MJCF model of which these joints are controlled.
+
+    Raises:
+      ScenarioError: a model without joints, or one that cannot be a plant.
+    """
+    return [plant(text) for text in texts]
+
+
+def plant(text: str) -> "str | Plant":
+    """One plant; see `plants`."""
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.mechanisms.custom.plant_from import plant_from
+
+    path, _, joints = text.rpartition(":") if ".xml:" in text else (text, "", "")
+    if not path.endswith(".xml"):
+        return text
+    if not (chosen := [joint for joint in joints.split("+") if joint]):
+        raise ScenarioError(f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow")
+    return plant_from(path, chosen)
+
+
+def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Condition]":
+    """Conditions by name, then those of the option --condition.
+
+    Raises:
+      ScenarioError: an unknown name, or a text or file that cannot be read.
+    """
+    from smc_mujoco.simulation.conditions import find_condition, from_file
+
+    found = [find_condition(name) for name in named]
+    for text in own or ():
+        found += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
+    return found
+
+
+def starts(x0: float | None, spread: float | None) -> "Starts | None":
+    """Where runs begin; None: where they do by default."""
+    from smc_mujoco.simulation.initial_states import SPREAD
+    from smc_mujoco.simulation.initial_states import starts as made
+
+    return None if x0 is None and spread is None else made(x0, SPREAD if spread is None else spread)

@@ -1,0 +1,77 @@
+"""smc-mujoco bench: the study's grid, computed so that nothing is lost, to a table and a leaderboard."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import asked
+from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
+
+
+def bench(
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="A fraction: 3 plants, 3 conditions, 16 seeds, 3 s a run; half a minute on 2 cores."
+        ),
+    ] = False,
+    plants: Annotated[
+        str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
+    ] = None,
+    laws: Annotated[str | None, typer.Option(help="Laws, as a,b, or all; default the report's short list.")] = None,
+    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
+    condition: asked.Conditions = None,
+    x0: asked.Middle = None,
+    spread: asked.Spread = None,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="How many starts and noises; default 20, of which 16 can name a winner.")
+    ] = None,
+    gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
+    duration: Annotated[float | None, typer.Option(help="Of a run, s; default 10.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
+    executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
+    traces: Annotated[
+        str, typer.Option(help="Which to save: none, all, or the worst by plant and condition.")
+    ] = "none",
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the runs that the folder holds.")] = False,
+    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+) -> None:
+    """Compare laws on plants in conditions: every combination from every seed, to OUT/results.parquet.
+
+    Finished runs are kept: stop it whenever you like, start it again with the same options, and it goes on. The table
+    is of the last command alone: give each study an --out of its own. Laws and conditions are those that `smc-mujoco
+    list` shows; --laws all ranks every general law that has gains in the set on these plants: `default` ones are there
+    for all. The leaderboard says who wins under each condition, and over all of them what holds in every one.
+
+    Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 16 --out duffing
+    """
+    with mendable():
+        with loading():
+            from rich.console import Console
+
+            from smc_mujoco.cli.leaderboard_table import leaderboard_table
+            from smc_mujoco.simulation.grid import grid
+            from smc_mujoco.studies.leaderboard import leaderboard
+            from smc_mujoco.studies.paper.general_laws import general_laws
+            from smc_mujoco.studies.study import FULL, QUICK, study
+
+        clock, console = Clock(), Console()
+        chosen = QUICK if quick else FULL
+        with clock("in all"):
+            named = asked.plants(asked.names(plants, chosen.plants))
+            scenarios = grid(
+                named,
+                general_laws(named, gains) if laws == "all" else asked.names(laws, chosen.laws),
+                asked.conditions(asked.names(conditions, () if condition else chosen.conditions), condition),
+                seeds or chosen.seeds,
+                gains,
+                chosen.duration if duration is None else duration,
+                asked.starts(x0, spread),
+            )
+            table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
+        console.print(leaderboard_table(leaderboard(table)))
+        failed = len(table) - table.data["failure"].null_count
+        said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        console.print(said, soft_wrap=True, highlight=False)
+        wrote(console, out / "results.parquet")

@@ -1,0 +1,51 @@
+"""Packages that an extra brings, as in `pip install 'smc-mujoco[film]'`: one sentence where one is missing."""
+
+import contextlib
+import importlib.util
+import sys
+from collections.abc import Iterator
+
+from smc_mujoco.common.errors import ScenarioError
+
+LAST = {"dm": (3, 12)}  # the last Python for which pip can install an extra
+
+
+class MissingPackageError(ScenarioError, ImportError):
+    """An optional package is not installed, or does not fit. The message says what brings one that fits."""
+
+
+@contextlib.contextmanager
+def extra(name: str, what: str) -> Iterator[None]:
+    """Import packages of an extra, in a with block.
+
+    Args:
+      name: the extra, such as "film".
+      what: what needs it; begins the sentence.
+
+    Raises:
+      MissingPackageError: an import in the block failed.
+    """
+    try:
+        yield
+    except (ImportError, AttributeError) as error:  # the second from a package older than what it imports
+        raise MissingPackageError(f"{what} needs an optional package ({error}): {cure(name)}") from error
+
+
+def missing(name: str, what: str, *packages: str) -> str | None:
+    """None when packages of an extra are installed, else a sentence that says which are not.
+
+    Args:
+      name: the extra, such as "film".
+      what: what needs it; begins the sentence.
+      packages: as they are imported.
+    """
+    absent = [package for package in packages if importlib.util.find_spec(package) is None]
+    return f"{what} needs {' and '.join(absent)}: {cure(name)}" if absent else None
+
+
+def cure(name: str) -> str:
+    """How to install an extra."""
+    last = LAST.get(name, sys.version_info[:2])
+    if sys.version_info[:2] > last:
+        return f"take Python {'.'.join(map(str, last))}, the last one that pip can install it on"
+    return f"pip install 'smc-mujoco[{name}]'"

@@ -1,0 +1,157 @@
+"""Files: the shipped ones, written ones that are there whole or not at all, JSON with NaN and infinity."""
+
+import contextlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError, shown
+
+WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
+
+
+def shipped(folder: str) -> Path:
+    """The folder models/ or scenes/, from a checkout or from an installed wheel."""
+    here = Path(__file__).parents[1]
+    for place in (here / folder, here.parent / folder):
+        if place.is_dir():
+            return place
+    raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
+
+
+def ended(path: str | os.PathLike, ending: str) -> Path:
+    """The path, if a file can have its name and the ending, such as ".json"; else a ScenarioError."""
+    path = Path(path)
+    if path.suffix != ending or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {ending}")
+    return path
+
+
+def writable(path: str | os.PathLike) -> None:
+    """Raise ScenarioError for a file that cannot be written, before minutes go by."""
+    path = Path(path)
+    if path.is_dir():
+        raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        why = error.strerror or error
+        raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
+
+
+@contextlib.contextmanager
+def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
+    """Read a file that may be damaged: whatever goes wrong in the block is one sentence.
+
+    Args:
+      path: of a regular file; a pipe or a device, which may never end, is refused.
+      kind: what the file should be, such as "trace".
+      cure: what to give instead.
+
+    Raises:
+      ScenarioError: there is no such file, it cannot be read, or the block raised something.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"cannot read {shown(path)}: {cure}")
+    try:
+        if (file := Path(path)).exists() and not file.is_file():
+            raise ScenarioError("it is no regular file")
+        yield file
+    except FileNotFoundError:
+        raise ScenarioError(f"no {kind} at {path}: {cure}") from None
+    except Exception as error:  # damaged bytes raise any exception there is
+        own = isinstance(error, ScenarioError)
+        why = str(error) if own else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+        raise ScenarioError(f"{path} is no {kind} ({why}): {cure}") from None
+
+
+def plain(data: Any) -> Any:
+    """The data as JSON holds it without loss: NaN and the infinities become the words of WORDS.
+
+    A text that is such a word gets a ' before it.
+    """
+    if isinstance(data, Mapping):
+        return {name: plain(value) for name, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [plain(value) for value in data]
+    if isinstance(data, float) and not math.isfinite(data):
+        return "NaN" if math.isnan(data) else "Infinity" if data > 0 else "-Infinity"
+    if isinstance(data, str) and data.lstrip("'") in WORDS:
+        return f"'{data}"
+    return data
+
+
+def _found(data: Any) -> Any:
+    """What `plain` was given; tuples are lists."""
+    if isinstance(data, dict):
+        return {name: _found(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_found(value) for value in data]
+    if isinstance(data, str) and data.lstrip("'") in WORDS:
+        return data[1:] if data.startswith("'") else WORDS[data]
+    return data
+
+
+def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> str:
+    """The data as strict JSON; numbers that JSON lacks are words, see `plain`."""
+    return json.dumps(plain(data), indent=indent, sort_keys=sort_keys, allow_nan=False)
+
+
+def from_json(text: str) -> Any:
+    """The data in a JSON text, with numbers for the words "NaN", "Infinity" and "-Infinity".
+
+    Bare NaN and Infinity, which older files have, are read, too.
+    """
+    return _found(json.loads(text))
+
+
+def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
+    """Write data as a JSON file, whole or not at all.
+
+    Raises:
+      ScenarioError: the folder cannot be made or written.
+    """
+    text = to_json(data, indent)
+    with replacing(path) as file:
+        file.write_text(f"{text}\n", encoding="utf-8")
+    return path
+
+
+def read_json(path: Path) -> Any:
+    """The data in a JSON file, see `from_json`."""
+    return from_json(path.read_text(encoding="utf-8"))
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary file beside `path`, with its ending, that takes its place when the block ends well, else goes away.
+
+    Raises:
+      ScenarioError: the folder cannot be made or written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        os.close(handle)
+        try:
+            yield Path(name)
+            os.chmod(name, 0o666 & ~_umask())
+            os.replace(name, path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        why = error.strerror or error
+        raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
+
+
+def _umask() -> int:
+    """The user's; it can only be read by setting it."""
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,225 @@
+"""The machinery of compilation: intrinsics for addresses and calls, and functions compiled so that mistakes show."""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import contextlib
+import functools
+import hashlib
+import io
+import os
+import re
+from collections import namedtuple
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from llvmlite import ir
+from numba import njit, types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.ccallback import CFunc
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import TypingError
+from numba.core.sigutils import normalize_signature
+from numba.extending import intrinsic
+
+from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.remade import remade
+
+SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
+DIGEST = hashlib.sha256().digest_size
+
+if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread that compiled in its parent
+    os.register_at_fork(
+        before=global_compiler_lock.acquire,
+        after_in_parent=global_compiler_lock.release,
+        after_in_child=global_compiler_lock.release,
+    )
+
+
+class NotCompilable(Exception):
+    """Why a function runs in the plain loop instead."""
+
+
+def _pointer_to(kind: types.Type) -> Callable:
+    @intrinsic
+    def pointer(typingctx, address):
+        def codegen(context, builder, signature, args):
+            return builder.inttoptr(args[0], context.get_value_type(kind).as_pointer())
+
+        return types.CPointer(kind)(types.intp), codegen
+
+    return pointer
+
+
+pointer = _pointer_to(types.float64)  # an address as a pointer to float64
+integers = _pointer_to(types.int64)  # an address as a pointer to int64
+
+
+@intrinsic
+def call(typingctx, address, inputs, parameters, memory, outputs):
+    """Call the C function at an address; the status it returns."""
+
+    def codegen(context, builder, signature, args):
+        function = ir.FunctionType(ir.IntType(64), [ir.IntType(64)] * 4).as_pointer()
+        return builder.call(builder.inttoptr(args[0], function), args[1:])
+
+    return types.int64(*[types.intp] * 5), codegen
+
+
+@intrinsic
+def call_int(typingctx, address, inputs, parameters, memory, outputs):
+    """`call` for a C function that returns an int: the rest of the register it comes in is not its own."""
+
+    def codegen(context, builder, signature, args):
+        function = ir.FunctionType(ir.IntType(32), [ir.IntType(64)] * 4).as_pointer()
+        return builder.sext(builder.call(builder.inttoptr(args[0], function), args[1:]), ir.IntType(64))
+
+    return types.int64(*[types.intp] * 5), codegen
+
+
+@intrinsic
+def attempt(typingctx, body, arguments):
+    """(whether body(*arguments) returned, what it returned): an exception ends as False, not in Python."""
+    resolved = body.get_call_type(typingctx, tuple(arguments), {})
+    returned = resolved.return_type
+    for item in returned.types if isinstance(returned, types.BaseTuple) else (returned,):
+        if not isinstance(item, types.Integer | types.Float | types.Boolean):
+            raise TypingError(f"it returns {returned} instead of numbers")
+
+    def codegen(context, builder, signature, args):
+        compiled = body.dispatcher.overloads[resolved.args]
+        context.active_code_library.add_linking_library(compiled.library)
+        values = [builder.extract_value(args[1], i) for i in range(len(resolved.args))]
+        status, result = context.call_internal_no_propagate(builder, compiled.fndesc, resolved, values)
+        return context.make_tuple(builder, signature.return_type, [status.is_ok, result])
+
+    return types.Tuple([types.boolean, returned])(body, arguments), codegen
+
+
+@functools.cache
+def named(names: tuple[str, ...]) -> type:
+    """The NamedTuple type with these fields; one unused field where there is none."""
+    return namedtuple("Parameters", names or ("unused",))
+
+
+@functools.cache
+def loader(kind: type) -> Callable:
+    """A compiled function that reads a NamedTuple of floats from an address."""
+    record = types.NamedUniTuple(types.float64, len(kind._fields), kind)
+
+    @intrinsic
+    def load(typingctx, address):
+        def codegen(context, builder, signature, args):
+            stored = context.get_value_type(record)
+            return builder.load(builder.inttoptr(args[0], stored.as_pointer()), typ=stored)
+
+        return record(types.intp), codegen
+
+    return load
+
+
+def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
+    """A C function of numba's, compiled; Ctrl-C is heard once that is done, as numba may lose it.
+
+    Args:
+      cache: whether to keep it on disk, where there is a place for it, and to take it from there.
+    """
+    made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
+    if cache:
+        with contextlib.suppress(RuntimeError):  # nowhere to write
+            made._cache = Cache(body)
+    with held_back():
+        made.compile()
+    return made
+
+
+class Cache(FunctionCache):
+    """Cache of a compiled function on disk. A damaged file is compiled again; a disk without room holds none."""
+
+    def __init__(self, body: Callable):
+        super().__init__(body)
+        locator = self._impl.locator
+        self._cache_file = Sealed(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Write it, unless the disk is full or the files are somebody else's."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class Sealed(IndexDataCacheFile):
+    """Files of numba's cache, each with a hash at its end. A file whose hash does not fit counts as missing."""
+
+    def _load_index(self) -> dict:
+        return super()._load_index() if _whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        return super()._load_data(name) if _whole(self._data_path(name)) else None
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        written = io.BytesIO()
+        yield written
+        with super()._open_for_write(filepath) as file:
+            file.write(written.getvalue() + hashlib.sha256(written.getvalue()).digest())
+
+
+def _whole(path: str) -> bool:
+    """Whether a file of the cache is there and as it was written."""
+    try:
+        held = Path(path).read_bytes()
+    except OSError:
+        return False
+    return hashlib.sha256(held[:-DIGEST]).digest() == held[-DIGEST:]
+
+
+class Function:
+    """A compiled C function, kept alive; `address` is where it lies."""
+
+    def __init__(self, body: Callable):
+        try:
+            self._cfunc = compiled(SIGNATURE, body)
+        except Exception as error:  # numba raises many kinds; each means the same to the caller
+            raise NotCompilable(reason(error)) from None
+        self.address: int = self._cfunc.address
+
+
+class AtAddress:
+    """What is a C function of the callback's type already.
+
+    Attributes:
+      address: where it lies, as long as this lives.
+      digest: a hash of its machine code.
+    """
+
+    address: int
+    digest: str
+
+
+class Uncompiled:
+    """What is Python by its nature; `why` says so of a law, after its name."""
+
+    why: str
+
+
+# How the lines of numba's errors begin that say where it was, not what it did not like.
+WHEREABOUTS = re.compile(
+    r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
+    r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
+)
+
+
+def reason(error: Exception) -> str:
+    """The line of a compiler's error that says what it did not like."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~.")]
+    telling = [line for line in lines if not WHEREABOUTS.match(line)]
+    return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
+
+
+@functools.cache
+def jit(function: Callable) -> Callable:
+    """`function`, and whatever compiled functions it calls, compiled to raise out of bounds and at division by zero."""
+    try:
+        return remade(function, njit(error_model="python", boundscheck=True))
+    except Exception as error:
+        raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error

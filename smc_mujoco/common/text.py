@@ -1,0 +1,15 @@
+"""Numbers as text."""
+
+import math
+
+
+def number(value: float, digits: int = 3) -> str:
+    """So many significant digits, written short; "never" for inf; "<1e-9" where little but rounding is left."""
+    if math.isinf(value):
+        return "never"
+    if 0.0 < abs(value) < 1e-9:
+        return "<1e-9"
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}" if value else "0"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}"

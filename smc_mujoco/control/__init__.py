@@ -1,0 +1,1 @@
+"""Functions without a simulator: laws, surfaces, estimators, policies."""

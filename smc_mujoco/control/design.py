@@ -1,0 +1,61 @@
+"""Gains from a plant's own model: what a textbook's formula makes of its nominal f and g."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import Law, law
+from smc_mujoco.mechanisms.plant import Plant, plant
+
+STEP = 1e-6  # rad or m, and per second: of the central differences, about the cube root of a float's precision
+
+
+def linearised(plant: Plant) -> tuple[float, float, float]:
+    """a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; of a network, those of its least stable channel.
+
+    What a neighbour's motion does to a channel is no part of them.
+
+    Raises:
+      ScenarioError: a channel that no actuator pushes its own way: a joint that only moves with others.
+    """
+    if plant.unmodelled:
+        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
+    if plant.underactuated:
+        raise ScenarioError(
+            f"{plant.name}'s channel {plant.driven} has no actuator, and lqr does not see such a joint: "
+            "take a law that does, 'hierarchical'"
+        )
+    rows = [_channel(plant, i) for i in range(plant.n)]
+    for i, (_, _, b) in enumerate(rows):
+        if b <= 0.0:
+            raise ScenarioError(f"{plant.name}'s channel {i} has no actuator (g = {b:g}): design is for those with one")
+    return max(rows)
+
+
+def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
+    p, rest, moved = SimpleNamespace(**plant.parameters), np.zeros(plant.n), np.zeros(plant.n)
+    moved[i] = STEP
+
+    def slope(at: Callable[[np.ndarray], tuple[float, float]]) -> float:
+        return (at(moved)[0] - at(-moved)[0]) / (2.0 * STEP)
+
+    a1 = slope(lambda x: plant.nominal(x, rest, i, p))
+    a2 = slope(lambda v: plant.nominal(rest, v, i, p))
+    return a1, a2, plant.nominal(rest, rest, i, p)[1]
+
+
+def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
+    """The law `lqr` for a plant linearised at the origin: least integral of q[0] e^2 + q[1] de^2 + r u^2.
+
+    Args:
+      of: a Plant or the name of one.
+      q: weights of error and rate, the plant's units.
+      r: weight of the control.
+
+    Raises:
+      ScenarioError: a weight out of its range, or a joint without an actuator.
+    """
+    a1, a2, b = linearised(plant(of) if isinstance(of, str) else of)
+    return law("lqr", q1=q[0], q2=q[1], r=r, a1=a1, a2=a2, b=b)

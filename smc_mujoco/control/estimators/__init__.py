@@ -1,0 +1,1 @@
+"""Velocity estimators, one per file; found by walking this package."""

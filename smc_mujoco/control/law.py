@@ -1,0 +1,186 @@
+"""What a control law is: a pure function of one channel's measurement, its gains and its memory.
+
+    @law_function(gains={"lam": 6.0, "k1": 3.0})
+    def my_law(y, gains, memory):
+        s = y.de + gains.k1 * y.e
+        return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
+
+The law runs once per control sample; its u is clipped to +-limit and held. It never sees the simulator: what it knows
+of the plant is the nominal f and g in its measurement.
+
+Laws of this library are written in the wanted acceleration v of the error: `sliding` gives the sliding variable and the
+acceleration that keeps it, and `command` turns v into u, with the nominal model where the scenario gives it to the law,
+and as it stands where it does not (f = 0, g = 1).
+"""
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Mapping
+from types import SimpleNamespace
+from typing import NamedTuple, overload
+
+from numba import njit
+
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.control.component import Component, Template, discover, template
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant as find_plant
+
+Law = Component
+
+
+class Measurement(NamedTuple):
+    """What a law sees of its channel at a sample, SI units."""
+
+    t: float  # time of the sample
+    dt: float  # control period
+    x: float  # measured position
+    v: float  # measured or estimated velocity
+    e: float  # x - r
+    de: float  # v - r'
+    r: float  # reference
+    dr: float
+    ddr: float
+    f: float  # nominal f(x, v) of x'' = f + g u, at the measured x and v
+    g: float
+    a: float = 0.0  # estimated acceleration; r'' where the estimator gives none
+    limit: float = math.inf  # bound on |u|: u_max, or what the channel's own motor gives
+    model: float = 0.0  # 1 where the scenario lets its law use f and g
+    surfaced: float = 0.0  # 1 where the scenario has a surface, and what it gives:
+    s: float = 0.0  # sliding variable
+    eq: float = 0.0  # acceleration of the error that keeps s constant
+    q: float = 0.0  # of the joint that moves with this one without an actuator of its own: measured position,
+    dq: float = 0.0  # velocity,
+    fq: float = 0.0  # and nominal q'' = fq + gq u; all 0 without such a joint
+    gq: float = 0.0
+
+
+@njit
+def sliding(y, c):
+    """The sliding variable s and the acceleration eq of the error that keeps it.
+
+    Those of the scenario's surface, eq included whether the law has the model or not; or s = de + c e, for which
+    eq = -c de: left out where the law has no model, as model-free laws are published without it.
+    """
+    if y.surfaced != 0.0:
+        return y.s, y.eq
+    return y.de + c * y.e, -y.model * c * y.de
+
+
+@njit
+def command(y, v):
+    """The u that gives the error the acceleration v: (v - f + r'') / g with the model, v without."""
+    if y.model == 0.0:
+        return v
+    return (v - y.f + y.ddr) / y.g
+
+
+@njit
+def input_gain(y):
+    """g as the law may know it: nominal with the model, 1 without."""
+    return y.g if y.model != 0.0 else 1.0
+
+
+@njit
+def sgn(a):
+    """Sign of a; 0 at 0."""
+    return math.copysign(1.0, a) if a != 0.0 else 0.0
+
+
+@njit
+def power(a, p):
+    """[a]^p = |a|^p sgn(a), p > 0."""
+    return math.copysign(abs(a) ** p, a) if a != 0.0 else 0.0
+
+
+@overload
+def law_function(function: Callable, /) -> Template: ...
+@overload
+def law_function(
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+    degree: int = 1,
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    plants: Iterable[str] = (),
+    modelled: bool = False,
+) -> Callable[[Callable], Template]: ...
+def law_function(
+    function: Callable | None = None,
+    /,
+    *,
+    gains: Mapping[str, float] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+    degree: int = 1,
+    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    plants: Iterable[str] = (),
+    modelled: bool = False,
+) -> Callable[[Callable], Template] | Template:
+    """Make a law of a function (y, gains, memory) -> (u, s).
+
+    Args:
+      gains: name -> default value.
+      memory: floats of state per channel.
+      positive, nonnegative: gains that must be greater than 0, or at least 0.
+      degree: relative degree of the sliding variable that the law needs: 1, or 2 and 3 for laws of e and its rates.
+      conditions: what its theorem asks of the gains, in words -> whether gains satisfy it; else a warning quotes them.
+      plants: names of the plants that it is for; empty: every one.
+      modelled: whether it cannot do without the nominal model, which a scenario then gives it by default.
+
+    The function must be pure: what it is to remember goes into memory, what is to vary into gains. Compiled, it keeps
+    the globals and closed-over values that it was compiled with, and random numbers in it would come from a shared
+    generator. Each new function object is compiled once and stays in memory, about 2.5 MB, because numba frees no code:
+    give a gain other values instead of making a function for each. Ctrl-C does not stop a compiled law that never ends;
+    kill the process. A compiled law that calls itself without end crashes the process.
+
+    Returns:
+      A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.
+    """
+    decorate = template("law", gains, memory, positive, nonnegative, degree, conditions, plants, modelled)
+    return decorate if function is None else decorate(function)
+
+
+@functools.cache
+def catalogue() -> dict[str, Template]:
+    """Every law found in smc_mujoco.control.laws, by name."""
+    return discover("smc_mujoco.control.laws")
+
+
+def law(name: str, **gains: float) -> Law:
+    """The law `name` of the library, with some of its gains changed.
+
+    Raises:
+      ScenarioError: unknown law or gain, or a gain out of its range.
+    """
+    return find("law", name, catalogue()).bind(gains, warn=True)
+
+
+def fits(law: Law | Template, plant: Plant) -> bool:
+    """Whether a law is for a plant: every one, those it names, or as they are, a model of the user's with partners."""
+    if not law.plants or plant.name in law.plants:
+        return True
+    known = [plants_known()[name] for name in law.plants if name in plants_known()]
+    return plant.direct and plant.underactuated and any(each.underactuated for each in known)
+
+
+def laws(plant: Plant | str | None = None) -> list[str]:
+    """Names that `law` knows; with a plant, of those laws that are for it.
+
+    A law without `plants` of its own is for every plant whose channels all have an actuator; `none` for every plant;
+    one for joints without an actuator for models of yours that have such joints too.
+    """
+    if plant is None:
+        return list(catalogue())
+    kind = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(kind, Plant):
+        raise ScenarioError(f"plant is {shown(kind)}: give smc.plant(...) or one of the names smc.plants() lists")
+    return [
+        name
+        for name, template in catalogue().items()
+        if fits(template, kind) and (template.plants or name == "none" or not kind.underactuated)
+    ]

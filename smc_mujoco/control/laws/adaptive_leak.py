@@ -1,0 +1,21 @@
+"""Adaptive gain with leakage: u = -K sgn(s), K' = gamma |s| [|s| > deadzone] - leak K, K(0) = k0, s = de + c e.
+
+The dead zone and the leak (sigma modification) keep K bounded under noise and sampling, at the price of a residual s.
+K is integrated by the explicit Euler rule and kept from falling below 0, where leak dt > 1 would take it.
+Source: P. Ioannou & P. Kokotovic, "Instability analysis and improvement of robustness of adaptive control",
+Automatica 20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (in a switching gain).
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn, sliding
+
+
+@law_function(
+    gains={"gamma": 15.0, "c": 2.5, "leak": 3.0, "deadzone": 0.05, "k0": 0.0},
+    nonnegative=("gamma", "c", "leak", "deadzone", "k0"),
+)
+def adaptive_leak(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    K = gains.k0 + memory[0]
+    growth = gains.gamma * abs(s) if abs(s) > gains.deadzone else 0.0
+    memory[0] = max(K + y.dt * (growth - gains.leak * K), 0.0) - gains.k0
+    return command(y, eq - K * sgn(s)), s

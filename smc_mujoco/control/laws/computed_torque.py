@@ -1,0 +1,17 @@
+"""Computed torque: u = (r'' - kd de - kp e - f) / g.
+
+With the nominal model the error obeys e'' + kd de + kp e = g d exactly: kp = w^2, kd = 2 w is critical damping. Without
+the model it is the PD law u = -kp e - kd de. A baseline, no sliding mode: a constant g d leaves the error g d / kp.
+The trace's s is kp e + kd de.
+Source: B. R. Markiewicz, Analysis of the Computed Torque Drive Method, JPL Technical Memorandum 33-601, 1973;
+J. Y. S. Luh, M. W. Walker & R. P. C. Paul, "Resolved-acceleration control of mechanical manipulators", IEEE Trans.
+Automatic Control 25(3):468, 1980.
+"""
+
+from smc_mujoco.control.law import command, law_function
+
+
+@law_function(gains={"kp": 9.0, "kd": 6.0}, positive=("kp", "kd"), degree=2)
+def computed_torque(y, gains, memory):
+    s = gains.kp * y.e + gains.kd * y.de
+    return command(y, -s), s

@@ -1,0 +1,27 @@
+"""Continuous twisting: u = -k1 L^(2/3) [e]^(1/3) - k2 L^(1/2) [de]^(1/2) + w, w' = -L (k3 sgn(e) + k4 sgn(de)).
+
+A continuous u that brings e = de = 0 in finite time for e'' = u + d with |d'| <= L, and w = -d there: 3-sliding with
+respect to e. Gains (k1, k2, k3, k4) = (7, 5, 2.3, 1.1) are proved for L = 1, by homogeneity for every L. Sampled with
+the explicit Euler rule: |e| = O(dt^3), |de| = O(dt^2). w winds up where the actuator saturates. The trace's s is e, of
+relative degree 2.
+Source: V. Torres-Gonzalez, T. Sanchez, L. Fridman & J. Moreno, "Design of continuous twisting algorithm", Automatica
+80:119, 2017.
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function, power, sgn
+
+
+@law_function(
+    gains={"L": 1.0, "k1": 7.0, "k2": 5.0, "k3": 2.3, "k4": 1.1},
+    memory=1,
+    positive=("L", "k1", "k2", "k3", "k4"),
+    degree=2,
+    conditions={"k3 > k4 + 1": lambda g: g.k3 > g.k4 + 1.0},
+)
+def continuous_twisting(y, gains, memory):
+    L = gains.L
+    v = memory[0] - gains.k1 * power(L, 2.0 / 3.0) * power(y.e, 1.0 / 3.0) - gains.k2 * math.sqrt(L) * power(y.de, 0.5)
+    memory[0] -= y.dt * L * (gains.k3 * sgn(y.e) + gains.k4 * sgn(y.de))
+    return command(y, v), y.e

@@ -1,0 +1,26 @@
+"""Discrete-time sliding mode: u = -k sat((s / dt + d_) / k), d_ = (s - s_) / dt - u_; s = de + c e, _ a sample earlier.
+
+d_ is the mean disturbance of the last period, exactly, and is taken for that of the next: s+ = dt (d - d_) in one
+sample where |u| < k (deadbeat). For |d'| <= L the residual is |s| <= dt^2 L, of second order, and u does not chatter.
+What d_ is subtracted from is the u that was held, k or the actuator's bound, so nothing winds up. It needs to know g:
+d_ holds (g - 1) u_ as well, and the linear loop z^2 + 2 (g - 1) z + 1 - g is stable for 0 < g < 4/3 only; beyond, u
+swings between its bounds.
+Source: W.-C. Su, S. V. Drakunov & U. Ozguner, "An O(T^2) boundary layer in sliding mode for sampled-data systems", IEEE
+Trans. Autom. Control 45(3):482, 2000 (law and order); V. Utkin & S. Drakunov, "On discrete-time sliding modes", IFAC
+Nonlinear Control Systems Design 1989 (bounded u); the condition on g: Jury's, derived here.
+"""
+
+from smc_mujoco.control.law import command, input_gain, law_function, sliding
+
+
+@law_function(gains={"k": 4.0, "c": 2.5}, nonnegative=("k", "c"), memory=3)
+def discrete_time(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    d = (s - memory[0]) / y.dt - memory[1] if memory[2] != 0.0 else 0.0
+    v = min(max(-(s / y.dt + d), -gains.k), gains.k)
+    u = command(y, eq + v)
+    held = v
+    if abs(u) > y.limit:
+        held = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)
+    memory[0], memory[1], memory[2] = s, held, 1.0
+    return u, s

@@ -1,0 +1,24 @@
+"""Dynamic sliding mode: u' = -k sgn(sigma), sigma = s' + q s, s = de + c e.
+
+The switching is in u', and u is its integral: continuous, with |u'| = k. sigma = 0 is reached for k > |(s' + q s)' -
+u'|, that is above |d'| + q |s'| for s' = u + d, locally in s'; then s decays as exp(-q t) under a disturbance that
+changes, without chattering of u. s' is the backward difference of s, a sample old, which leaves sigma and s at O(dt);
+noise in s counts 1 / dt fold. u is held where it would leave the actuator's bound, so it does not wind up.
+Source: H. Sira-Ramirez, "On the dynamical sliding mode control of nonlinear systems", Int. J. Control 57(5):1039, 1993;
+A. Koshkouei, K. Burnham & A. Zinober, "Dynamic sliding mode control design", IEE Proc. Control Theory Appl. 152(4):392,
+2005.
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn, sliding
+
+
+@law_function(gains={"k": 30.0, "q": 5.0, "c": 2.5}, nonnegative=("k", "q", "c"), memory=3)
+def dynamic(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    rate = (s - memory[1]) / y.dt if memory[2] != 0.0 else 0.0
+    memory[1], memory[2] = s, 1.0
+    u, w = command(y, eq + memory[0]), memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
+    after = command(y, eq + w)
+    if abs(after) <= y.limit or abs(after) < abs(u):
+        memory[0] = w
+    return u, s

@@ -1,0 +1,20 @@
+"""Exponential reaching law: u = -(k sgn(s) + q s), s = de + c e.
+
+"Constant plus proportional rate": s' = u reaches s = 0 at ln(1 + q |s0| / k) / q, for q |s0| >> k far sooner than
+|s0| / k; under |d| <= D < k at ln(1 + q |s0| / (k - D)) / q at the latest, and the residual is that of classical,
+O(dt). Explicit; sampled, it needs g q dt < 1. With k = 0 it is linear and never reaches.
+Source: W. Gao & J. C. Hung, "Variable structure control of nonlinear systems: a new approach", IEEE Trans. Ind.
+Electron. 40(1):45, 1993 (law); times: integrated here.
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn, sliding
+
+
+@law_function(
+    gains={"k": 3.0, "q": 3.0, "c": 2.5},
+    nonnegative=("k", "q", "c"),
+    conditions={"k > 0": lambda g: g.k > 0.0},
+)
+def exponential_reaching(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    return command(y, eq - (gains.k * sgn(s) + gains.q * s)), s

@@ -1,0 +1,23 @@
+"""Fixed-time reaching: u = -(k1 [s]^a + k2 [s]^b + k sgn(s)), 0 < a < 1 < b, s = de + c e.
+
+s' = u + d with |d| <= D <= k reaches s = 0 before 1 / (k1 (1 - a)) + 1 / (k2 (b - 1)), whatever s0. Explicit, this
+holds only below |s0| = (2 / (k2 dt))^(1/(b - 1)), beyond which k2 [s]^b overshoots further at each sample and diverges
+where nothing bounds u. After reaching: that of classical with k, which is 0 under k = 0, where |d| <= D leaves
+(D / k1)^(1/a).
+Source: A. Polyakov, "Nonlinear feedback design for fixed-time stabilization of linear control systems", IEEE Trans.
+Autom. Control 57(8):2106, 2012 (Lemma 1: the bound).
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sgn, sliding
+
+
+@law_function(
+    gains={"k1": 2.0, "k2": 2.0, "a": 0.5, "b": 1.5, "k": 2.0, "c": 2.5},
+    positive=("a", "b"),
+    nonnegative=("k1", "k2", "k", "c"),
+    conditions={"a < 1 < b": lambda g: g.a < 1.0 < g.b, "k1, k2 > 0": lambda g: g.k1 > 0.0 and g.k2 > 0.0},
+)
+def fixed_time(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    pull = gains.k1 * power(s, gains.a) + gains.k2 * power(s, gains.b)
+    return command(y, eq - (pull + gains.k * sgn(s))), s

@@ -1,0 +1,28 @@
+"""Linear quadratic regulator: u = -(k1 e + k2 de), for the least integral of q1 e^2 + q2 de^2 + r u^2.
+
+On e'' = a1 e + a2 de + b u, k1 = (a1 + sqrt(a1^2 + b^2 q1 / r)) / b and k2 = (a2 + sqrt(a2^2 + 2 b k1 + b^2 q2 / r)) /
+b: the Riccati equation of two states in closed form (derived). The linear loop is stable, with a phase margin of 60
+degrees at least. Defaults: the double integrator; `smc.lqr` gives those of a plant. With the nominal
+model the law regulates what is left when f and g are cancelled, e'' = v, for which a1, a2, b are 0, 0, 1. A baseline,
+no sliding mode; the trace's s is k1 e + k2 de.
+Source: R. E. Kalman, "Contributions to the theory of optimal control", Bol. Soc. Mat. Mexicana 5:102, 1960; margins:
+B. D. O. Anderson & J. B. Moore, Optimal Control: Linear Quadratic Methods, Prentice Hall 1990, section 5.4.
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function
+
+
+@law_function(
+    gains={"q1": 100.0, "q2": 16.0, "r": 1.0, "a1": 0.0, "a2": 0.0, "b": 1.0},
+    positive=("q1", "r", "b"),
+    nonnegative=("q2",),
+    degree=2,
+)
+def lqr(y, gains, memory):
+    a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)
+    k1 = (a1 + math.sqrt(a1 * a1 + b * b * gains.q1 / gains.r)) / b
+    k2 = (a2 + math.sqrt(a2 * a2 + 2.0 * b * k1 + b * b * gains.q2 / gains.r)) / b
+    s = k1 * y.e + k2 * y.de
+    return command(y, -s), s

@@ -1,0 +1,26 @@
+"""Non-singular fast terminal: u = eq - k sgn(s) - rate s, s = e + a [e]^q + b [de]^p, 1 < p < 2, q > p.
+
+eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - eq). s = 0 in finite time for e'' = u + d,
+|d| <= D < k; from afar rate s brings it there sooner. From s = 0 on, de = -[(e + a [e]^q) / b]^(1/p) to e = 0 in finite
+time, faster from afar than without a.
+Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|, on s = 0 with the de above.
+Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J.
+Robust Nonlinear Control 21(16):1865, 2011, with k sgn(s) for k2 [s]^rho of its reaching law.
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sgn
+
+
+@law_function(
+    gains={"k": 4.0, "rate": 3.0, "a": 0.5, "q": 2.0, "b": 0.4, "p": 1.6},
+    memory=1,
+    positive=("k", "a", "q", "b", "p"),
+    nonnegative=("rate",),
+    degree=2,
+    conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0, "q > p": lambda g: g.q > g.p},
+)
+def nonsingular_fast_terminal(y, gains, memory):
+    s = y.e + gains.a * power(y.e, gains.q) + gains.b * power(y.de, gains.p)
+    slope = 1.0 + gains.a * gains.q * abs(y.e) ** (gains.q - 1.0)
+    eq = -power(y.de, 2.0 - gains.p) * slope / (gains.b * gains.p)
+    return command(y, eq - (gains.k * sgn(s) + gains.rate * s)), s

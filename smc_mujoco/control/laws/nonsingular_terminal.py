@@ -1,0 +1,23 @@
+"""Non-singular terminal: u = eq - k sgn(s), s = e + [de]^p / B, eq = -(B/p) [de]^(2-p), 1 < p < 2.
+
+s = 0 in finite time for e'' = u + d, |d| <= D < k, and from there e = 0 in |e|^(1-1/p) / (B^(1/p) (1-1/p)); u is finite
+everywhere. s' = (p/B) |de|^(p-1) (e'' - eq): at rest, s waits until the law has set e moving.
+Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|, where |eq| is
+(B/p) |B e|^((2-p)/p) on s = 0.
+Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of rigid manipulators", Automatica
+38(12):2159, 2002.
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sgn
+
+
+@law_function(
+    gains={"k": 4.0, "B": 3.0, "p": 1.6},
+    memory=1,
+    positive=("k", "B", "p"),
+    degree=2,
+    conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0},
+)
+def nonsingular_terminal(y, gains, memory):
+    s, eq = y.e + power(y.de, gains.p) / gains.B, -gains.B / gains.p * power(y.de, 2.0 - gains.p)
+    return command(y, eq - gains.k * sgn(s)), s

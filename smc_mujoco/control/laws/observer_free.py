@@ -1,0 +1,17 @@
+"""Observer-free law of J. Gaber: u = -lam tanh(s), s = de + k1 e.
+
+A tanh boundary layer of fixed width 1 in the unit of s. Bounded by lam. On J x'' + D x' + K x = u the origin is
+locally stable for lam > -D and lam k1 > -K (linearisation tanh(s) ~ s, Routh-Hurwitz).
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4. The paper writes its sliding
+variable as s - u/g; the law uses neither g nor that variable, so the trace holds the s above (the paper's alpha).
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function, sliding
+
+
+@law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
+def observer_free(y, gains, memory):
+    s, eq = sliding(y, gains.k1)
+    return command(y, eq - gains.lam * math.tanh(s)), s

@@ -1,0 +1,19 @@
+"""Observer-free law at relative degree 3: u = -lam tanh(s), s = e'' + k2 de + k1 e.
+
+The paper's general form, for a plant with an actuator lag. Bounded by lam. On J x'' + D x' + K x = F, tau F' = u - F,
+the origin is locally stable just where a3 p^3 + a2 p^2 + a1 p + a0, a3 = tau J, a2 = J + tau D + lam,
+a1 = D + tau K + lam k2, a0 = K + lam k1, has positive coefficients and a2 a1 > a3 a0 (linearisation tanh(s) ~ s,
+Routh-Hurwitz). It takes an acceleration, which a second-order differentiator gives: observer-free in name. Where the
+estimator gives none, e'' counts as 0.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", section 3, alpha for r = 3.
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function
+
+
+@law_function(gains={"lam": 6.0, "k1": 6.25, "k2": 5.0}, memory=1, positive=("lam", "k1", "k2"), degree=3)
+def observer_free_third(y, gains, memory):
+    s = y.a - y.ddr + gains.k2 * y.de + gains.k1 * y.e
+    return command(y, -gains.lam * math.tanh(s)), s

@@ -1,0 +1,30 @@
+"""PID: u = -(kp e + kd D) + w, tau D' = de - D, w' = -ki e + (sat(u) - u) / tt.
+
+A baseline, no sliding mode; the trace's s is kp e + kd D. The filter tau bounds the derivative's gain under noise.
+Back-calculation unwinds the integrator w through the saturation sat at +-u_max with time constant tt: while u is out of
+bounds, w tends to where u is back on its bound. On x'' = u the loop is stable just for kp kd > ki (Routh, tau = 0), and
+a constant disturbance leaves no error. D by the implicit (backward) Euler rule, from the first de on; w by the explicit
+one.
+Source: K. J. Astrom & T. Hagglund, PID Controllers: Theory, Design, and Tuning, 2nd ed., ISA 1995, sections 3.4
+(derivative) and 3.5 (integrator windup).
+"""
+
+from smc_mujoco.control.law import command, input_gain, law_function
+
+
+@law_function(
+    gains={"kp": 10.0, "ki": 5.0, "kd": 6.0, "tau": 5e-3, "tt": 0.5},
+    memory=3,
+    positive=("tt",),
+    nonnegative=("kp", "ki", "kd", "tau"),
+    degree=2,
+    conditions={"kp kd > ki": lambda g: g.kp * g.kd > g.ki or g.ki == 0.0},
+)
+def pid(y, gains, memory):
+    started, w, D = memory
+    D = (gains.tau * D + y.dt * y.de) / (gains.tau + y.dt) if started else y.de
+    s = gains.kp * y.e + gains.kd * D
+    u = command(y, w - s)
+    lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
+    memory[0], memory[1], memory[2] = 1.0, w + y.dt * (lost / gains.tt - gains.ki * y.e), D
+    return u, s

@@ -1,0 +1,21 @@
+"""Power-rate reaching law: u = -k [s]^a, 0 < a < 1, s = de + c e.
+
+s' = u reaches s = 0 at |s0|^(1 - a) / (k (1 - a)), and u goes to 0 with s, so that there is less chattering; but there
+is no sliding mode under a disturbance: |d| <= D leaves |s| <= (D / k)^(1/a). Sampled, the infinite slope at 0 leaves
+O(dt^(1/(1 - a))) without one. Explicit.
+Source: W. Gao & J. C. Hung, "Variable structure control of nonlinear systems: a new approach", IEEE Trans. Ind.
+Electron. 40(1):45, 1993 (law); time and bounds: integrated here.
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sliding
+
+
+@law_function(
+    gains={"k": 6.0, "a": 0.5, "c": 2.5},
+    positive=("a",),
+    nonnegative=("k", "c"),
+    conditions={"a < 1": lambda g: g.a < 1.0},
+)
+def power_rate(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    return command(y, eq - gains.k * power(s, gains.a)), s

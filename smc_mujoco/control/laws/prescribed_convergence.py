@@ -1,0 +1,21 @@
+"""Prescribed convergence: u = -a sgn(de + b [e]^(1/2)).
+
+2-sliding along a curve chosen beforehand: for e'' = g u + d, |d| <= D, a g - D > b^2/2 the state comes to
+de = -b [e]^(1/2) and along it to e = 0 in 2 sqrt(|e|) / b. Sampled: |e| = O(dt^2), |de| = O(dt). The trace's s is e, of
+relative degree 2.
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993,
+section 5 (the algorithm with a prescribed law of variation), following S. Emelyanov, S. Korovin & L. Levantovsky, 1986.
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sgn
+
+
+@law_function(
+    gains={"a": 5.0, "b": 2.0},
+    memory=1,
+    positive=("a", "b"),
+    degree=2,
+    conditions={"a > b^2/2": lambda g: g.a > g.b**2 / 2.0},
+)
+def prescribed_convergence(y, gains, memory):
+    return command(y, -gains.a * sgn(y.de + gains.b * power(y.e, 0.5))), y.e

@@ -1,0 +1,34 @@
+"""Quasi-continuous, order 2: u = -a (de + b [e]^(1/2)) / (|de| + b |e|^(1/2)).
+
+Continuous but at e = de = 0, reached in finite time for e'' = g u + d, |d| <= D, if some r > b has
+a g (r - b) / (r + b) > D + r^2/2: the state comes between de = -b [e]^(1/2) and de = -r [e]^(1/2), and ends there in at
+most 2 sqrt(|e|) / b. Without d and with g = 1 the condition is on r^3 + b r^2 - 2 a r + 2 a b < 0. Sampled:
+|e| = O(dt^2), |de| = O(dt). The trace's s is e, of relative degree 2.
+Source: A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE Trans. Autom. Control 50(11):1812, 2005;
+condition: A. Levant, "Principles of 2-sliding mode design", Automatica 43(4):576, 2007.
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function, power
+
+
+def brakes(gains):
+    """Whether the cubic of the docstring, least at this r, falls below 0 beyond b."""
+    a, b = gains.a, gains.b
+    r = (math.sqrt(b * b + 6.0 * a) - b) / 3.0
+    return r > b and r**3 + b * r * r - 2.0 * a * r + 2.0 * a * b < 0.0
+
+
+@law_function(
+    gains={"a": 6.0, "b": 1.0},
+    memory=1,
+    positive=("a", "b"),
+    degree=2,
+    conditions={"a (r - b) / (r + b) > r^2/2 for some r > b": brakes},
+)
+def quasi_continuous(y, gains, memory):
+    size = abs(y.de) + gains.b * math.sqrt(abs(y.e))
+    if size == 0.0:
+        return command(y, 0.0), y.e
+    return command(y, -gains.a * (y.de + gains.b * power(y.e, 0.5)) / size), y.e

@@ -1,0 +1,28 @@
+"""Sub-optimal: u = -r1 sgn(e - m/2) + r2 sgn(m), m = e where de last was 0.
+
+2-sliding without the value of de, only where it vanishes, taken here between two samples whose de differ in sign. For
+e'' = g u + d, |d| <= D: r1 > r2, 2 ((r1 + r2) g - D) > (r1 - r2) g + D and (r1 - r2) g > D. It brakes half-way: from
+rest and without d, e stops next at r2 / (r1 + r2) of where it was, with no overshoot. Before de first vanishes m is 0
+and u = -r1 sgn(e). Sampled: |e| = O(dt^2). The trace's s is e, of relative degree 2.
+Source: G. Bartolini, A. Ferrara & E. Usai, "Chattering avoidance by second-order sliding mode control", IEEE Trans.
+Autom. Control 43(2):241, 1998; form and conditions of A. Levant, "Principles of 2-sliding mode design", Automatica
+43(4):576, 2007.
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn
+
+
+@law_function(
+    gains={"r1": 4.0, "r2": 1.5},
+    memory=3,
+    positive=("r1", "r2"),
+    degree=2,
+    conditions={"r1 > r2": lambda g: g.r1 > g.r2},
+)
+def suboptimal(y, gains, memory):
+    if y.de * memory[1] < 0.0 or y.de == 0.0:  # memory: m, the last de and e
+        memory[0] = y.e if abs(y.e) > abs(memory[2]) else memory[2]
+        if y.de == 0.0:
+            memory[0] = y.e
+    memory[1], memory[2] = y.de, y.e
+    return command(y, -gains.r1 * sgn(y.e - 0.5 * memory[0]) + gains.r2 * sgn(memory[0])), y.e

@@ -1,0 +1,18 @@
+"""Super-twisting as published, its integral without a bound: u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s), s = de + c e.
+
+`super_twisting` with w_max = inf, under a name of its own, so that a comparison can have both: where the actuator
+saturates, w winds up.
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993.
+"""
+
+import math
+
+from smc_mujoco.control.law import command, law_function, sgn, sliding
+
+
+@law_function(gains={"k1": 3.0, "k2": 4.4, "c": 2.5}, nonnegative=("k1", "k2", "c"))
+def super_twisting_unclamped(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    v = eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
+    memory[0] -= y.dt * gains.k2 * sgn(s)
+    return command(y, v), s

@@ -1,0 +1,35 @@
+"""Swing-up and catch: u = -k E sgn(x'), E = J (x'^2 / 2 + w^2 (cos x - 1)); near upright u = -q s, s = de + w e.
+
+E is the pendulum's energy above upright at rest. Swinging, E' = u x' - b x'^2 has the sign of -E wherever k |E| exceeds
+the friction b |x'|: |E| falls, however small u_max is beside m l grav. Near upright s is the mode that falls away, s' =
+w s + u / J: with |u| <= u_max it can be brought back just where |s| < u_max / (J w), and u = -q s, q > J w, does so
+from all of that; what is left decays as exp(-w t). The catch takes over at `part` of that bound, within 1 rad (chosen),
+and lets go beyond it. Angles count from the nearest upright position; at rest it first pushes upwards.
+
+J = m l^2 and w = sqrt(grav / l) are gains, here of the library's pendulum; with the nominal model J is its 1 / g. The
+trace's s is E sgn(x') while it swings.
+Source: K. J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287, 2000, eq. 8, with
+the torque at the pivot in place of the pivot's acceleration; the catch is derived.
+"""
+
+import math
+
+from smc_mujoco.control.law import law_function, sgn
+
+
+@law_function(
+    gains={"k": 4.0, "q": 6.0, "J": 0.125, "w": 4.43, "part": 0.8},
+    positive=("k", "q", "J", "w", "part"),
+    degree=2,
+    conditions={"q > J w": lambda g: g.q > g.J * g.w, "part < 1": lambda g: g.part < 1.0},
+    plants=("inverted_pendulum",),
+)
+def swing_up(y, gains, memory):
+    J = 1.0 / y.g if y.model != 0.0 else gains.J
+    near = math.atan2(math.sin(y.e), math.cos(y.e))
+    s = y.de + gains.w * near
+    if abs(near) < 1.0 and abs(s) < gains.part * y.limit / (J * gains.w):
+        return -gains.q * s, s
+    E = J * (0.5 * y.v * y.v + gains.w * gains.w * (math.cos(y.x) - 1.0))
+    s = E * (sgn(y.v) if y.v != 0.0 else -sgn(near))
+    return -gains.k * s, s

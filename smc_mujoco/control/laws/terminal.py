@@ -1,0 +1,25 @@
+"""Terminal: u = eq - k sgn(s), s = de + b [e]^p, eq = -b p |e|^(p-1) de bounded by `bound`, 1/2 < p < 1.
+
+s = 0 in finite time for e'' = u + d, |d| <= D < k, and from there e = 0 in |e|^(1-p) / (b (1-p)). eq is singular at
+e = 0 off the surface, on it b^2 p |e|^(2p-1): the bound changes nothing there.
+Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|.
+Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
+Control 115(3):554, 1993 (law); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
+systems", Automatica 49(6):1715, 2013 (bound).
+"""
+
+from smc_mujoco.control.law import command, law_function, power, sgn
+
+
+@law_function(
+    gains={"k": 4.0, "b": 2.0, "p": 0.6, "bound": 20.0},
+    memory=1,
+    positive=("k", "b", "p", "bound"),
+    degree=2,
+    conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+)
+def terminal(y, gains, memory):
+    s, eq = y.de + gains.b * power(y.e, gains.p), 0.0
+    if y.e != 0.0:
+        eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
+    return command(y, min(max(eq, -gains.bound), gains.bound) - gains.k * sgn(s)), s

@@ -1,0 +1,21 @@
+"""Twisting: u = -r1 sgn(e) - r2 sgn(de).
+
+2-sliding: e = de = 0 in finite time for e'' = g u + d, |d| <= D, (r1 + r2) g - D > (r1 - r2) g + D and
+(r1 - r2) g > D. Without d the peaks of e fall by q = (r1 - r2) / (r1 + r2) each, and the time from rest at e is
+sqrt(2 |e| / (r1 - r2)) (1 + q) / (1 - sqrt(q)) for g = 1. Sampled: |e| = O(dt^2), |de| = O(dt). The trace's s is e, of
+relative degree 2.
+Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993.
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn
+
+
+@law_function(
+    gains={"r1": 3.7, "r2": 2.3},
+    memory=1,
+    positive=("r1", "r2"),
+    degree=2,
+    conditions={"r1 > r2": lambda g: g.r1 > g.r2},
+)
+def twisting(y, gains, memory):
+    return command(y, -gains.r1 * sgn(y.e) - gains.r2 * sgn(y.de)), y.e

@@ -1,0 +1,1 @@
+"""Sliding surfaces, one per file; found by walking this package."""

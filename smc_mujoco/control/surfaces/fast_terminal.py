@@ -1,0 +1,24 @@
+"""Fast terminal: s = de + a e + b [e]^p, 1/2 < p < 1.
+
+Exponential from afar, terminal near by: on s = 0 the error ends at ln(1 + a |e(0)|^(1-p) / b) / (a (1-p)). eq is
+singular at e = 0 off the surface as in `terminal`, and its singular part is bounded by `bound` likewise.
+Source: X. Yu & Z. Man, "Fast terminal sliding-mode control design for nonlinear dynamical systems", IEEE Trans.
+Circuits Syst. I 49(2):261, 2002.
+"""
+
+from smc_mujoco.control.law import power
+from smc_mujoco.control.surface import surface_function
+
+
+@surface_function(
+    gains={"a": 1.0, "b": 1.0, "p": 0.6, "bound": 20.0},
+    memory=1,
+    positive=("a", "b", "p", "bound"),
+    conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+)
+def fast_terminal(y, gains, memory):
+    s = y.de + gains.a * y.e + gains.b * power(y.e, gains.p)
+    if y.e == 0.0:
+        return s, -gains.a * y.de
+    singular = gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
+    return s, -gains.a * y.de - min(max(singular, -gains.bound), gains.bound)

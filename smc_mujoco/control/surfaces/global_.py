@@ -1,0 +1,20 @@
+"""Global: s = de + c e - (de(0) + c e(0)) exp(-q t); s(0) = 0: no reaching phase.
+
+The offset that makes s(0) = 0 decays, and the linear surface is left: on s = 0 and with s0 = de(0) + c e(0),
+e = e(0) exp(-c t) + s0 (exp(-q t) - exp(-c t)) / (c - q).
+Source: Y.-S. Lu & J.-S. Chen, "Design of a global sliding-mode controller for a motor drive with bounded control",
+Int. J. Control 62(5):1001, 1995.
+"""
+
+import math
+
+from smc_mujoco.control.surface import surface_function
+
+
+@surface_function(gains={"c": 2.5, "q": 1.5}, memory=3, positive=("c", "q"))
+def global_(y, gains, memory):
+    linear = y.de + gains.c * y.e
+    if memory[0] == 0.0:  # the first sample
+        memory[0], memory[1], memory[2] = 1.0, linear, y.t
+    offset = memory[1] * math.exp(-gains.q * (y.t - memory[2]))
+    return linear - offset, -gains.c * y.de - gains.q * offset

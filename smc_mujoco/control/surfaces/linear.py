@@ -1,0 +1,11 @@
+"""Linear: s = de + c e; on s = 0 the error decays as exp(-c t).
+
+Source: V. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 1.
+"""
+
+from smc_mujoco.control.surface import surface_function
+
+
+@surface_function(gains={"c": 3.0}, positive=("c",))
+def linear(y, gains, memory):
+    return y.de + gains.c * y.e, -gains.c * y.de

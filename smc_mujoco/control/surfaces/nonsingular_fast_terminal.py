@@ -1,0 +1,22 @@
+"""Non-singular fast terminal: s = e + a [e]^q + b [de]^p, 1 < p < 2, q > p.
+
+On s = 0, de = -[(e + a [e]^q) / b]^(1/p): faster than `nonsingular_terminal` from afar, and in finite time.
+eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p) is finite everywhere.
+Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J.
+Robust Nonlinear Control 21(16):1865, 2011.
+"""
+
+from smc_mujoco.control.law import power
+from smc_mujoco.control.surface import surface_function
+
+
+@surface_function(
+    gains={"a": 0.5, "q": 2.0, "b": 0.4, "p": 1.6},
+    memory=1,
+    positive=("a", "q", "b", "p"),
+    conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0, "q > p": lambda g: g.q > g.p},
+)
+def nonsingular_fast_terminal(y, gains, memory):
+    s = y.e + gains.a * power(y.e, gains.q) + gains.b * power(y.de, gains.p)
+    slope = 1.0 + gains.a * gains.q * abs(y.e) ** (gains.q - 1.0)
+    return s, -power(y.de, 2.0 - gains.p) * slope / (gains.b * gains.p)

@@ -1,0 +1,25 @@
+"""Terminal: s = de + b [e]^p, 1/2 < p < 1; on s = 0 the error ends at |e(0)|^(1-p) / (b (1-p)).
+
+eq = -b p |e|^(p-1) de is singular at e = 0 off the surface; on it, it is b^2 p [e]^(2p-1), finite for p > 1/2. So it
+is bounded by `bound`, which changes nothing where it asks for less.
+Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
+Control 115(3):554, 1993 (surface); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
+systems", Automatica 49(6):1715, 2013 (bound).
+"""
+
+from smc_mujoco.control.law import power
+from smc_mujoco.control.surface import surface_function
+
+
+@surface_function(
+    gains={"b": 2.0, "p": 0.6, "bound": 20.0},
+    memory=1,
+    positive=("b", "p", "bound"),
+    conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+)
+def terminal(y, gains, memory):
+    s = y.de + gains.b * power(y.e, gains.p)
+    if y.e == 0.0:
+        return s, 0.0
+    eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
+    return s, min(max(eq, -gains.bound), gains.bound)

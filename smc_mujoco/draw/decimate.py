@@ -1,0 +1,139 @@
+"""A dense signal on paper: its range in few windows of time, and one line.
+
+A chattering control drawn sample by sample is a solid block. Its range says how hard it switches, its mean is what the
+plant feels: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is that mean while
+the signal chatters, and the signal itself while it does not.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.simulation.trace import ARRAYS, Trace
+
+WINDOW = 0.01, 40  # what a mean is taken over: so much of the run, at least so many samples; chosen, see `window`
+STILL = 2e-3  # of the largest value: a smaller step from sample to sample is no move of a chattering signal
+REVERSALS = 6  # this many in a row are chattering, if they follow each other within a quarter of a window
+POINTS = 250  # of a line: its least and largest value in each is kept
+
+
+class Envelope(NamedTuple):
+    """Windows (t[i], t[i+1]) of a signal: low, mean and high, each (windows, n)."""
+
+    t: np.ndarray  # middles, (windows,)
+    low: np.ndarray
+    mean: np.ndarray
+    high: np.ndarray
+
+
+def finite(trace: Trace) -> Trace:
+    """The trace up to its last finite sample. Of one that failed at once: where it started, and NaN for the rest."""
+    bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
+    if not bad.any():
+        return trace
+    count = int(np.argmax(bad))
+    part = {name: getattr(trace, name)[: max(1, count)] for name in ARRAYS}
+    if count == 0:
+        part |= {"x": np.array([trace.scenario.x0]), "v": np.array([trace.scenario.v0])}
+    return dataclasses.replace(trace, **part)
+
+
+def end(traces: Sequence[Trace]) -> float:
+    """When the longest run was to end, s."""
+    return max(trace.scenario.samples * trace.scenario.control_period for trace in traces)
+
+
+def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
+    """Range and mean of y (K+1, n), held from sample to sample, between consecutive edges (s, ascending).
+
+    A window has the samples in it and the one held at its left edge.
+    """
+    start = np.clip(np.searchsorted(t, edges + 1e-9, side="right") - 1, 0, len(t) - 1)
+    y, start, stop = y[: start[-1] + 1], start[:-1], np.append(start[1:-1], start[-1] + 1)
+    low, total, high = (f.reduceat(y, start, axis=0) for f in (np.minimum, np.add, np.maximum))
+    count = np.maximum(stop - start, 1)[:, None]
+    return Envelope((edges[:-1] + edges[1:]) / 2, low, total / count, high)
+
+
+def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
+    """Range and mean of y in at most `most` windows of equally many samples.
+
+    The number is even, so that a control which switches at every sample has the mean that it should.
+    """
+    count = len(t) - 1
+    if count <= most:
+        return Envelope(t, y, y, y)
+    edges = t[:: 2 * -(-count // (2 * most))]
+    return windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
+
+
+def window(trace: Trace) -> int:
+    """How many samples a mean is taken over: a multiple of 4.
+
+    Of a control that switches irregularly between +-1, the mean over w samples is uncertain by some 2 / w. So a window
+    of a column's width on paper shows teeth that are not there; w is chosen so that they are thinner than a line.
+    """
+    share, least = WINDOW
+    return 4 * round(max(share * trace.scenario.samples, least) / 4)
+
+
+def stretches(y: np.ndarray, width: int) -> list[slice]:
+    """Where y (K+1,) chatters; elsewhere, as under saturation on the way to a surface, it is its own line.
+
+    A move is a step from one sample to the next of more than STILL of the largest |y|, a reversal two moves in a row of
+    opposite signs. Reversals follow each other within n samples if neither the value held in one nor the way to the
+    next takes longer. Chattering is REVERSALS of them within a quarter of the width, with all that follow each other
+    within the width before and after: from the first of their moves to the last, and to an end of y that is as near.
+    The rule is the same read backwards.
+    """
+    step = np.diff(y)
+    moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
+    turns = np.flatnonzero(np.diff(np.sign(step[moves])))
+    first, last = moves[turns], moves[turns + 1]
+    seeds = [part for part in _following(first, last, width // 4) if len(part) >= REVERSALS]
+    starts = np.array([first[part[0]] for part in seeds])
+    found = []
+    for part in _following(first, last, width):
+        a, b = first[part[0]] + 1, last[part[-1]] + 1
+        if ((starts + 1 >= a) & (starts < b)).any():
+            found.append(slice(a if a > width else 0, b if b < len(y) - width else len(y)))
+    return found
+
+
+def _following(first: np.ndarray, last: np.ndarray, near: int) -> list[np.ndarray]:
+    """The reversals, from move `first` to move `last`, by number: those together that follow each other."""
+    brief = np.flatnonzero(last - first <= near)
+    parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
+    return [part for part in parts if len(part)]
+
+
+def smooth(y: np.ndarray, width: int) -> np.ndarray:
+    """y (K+1,), replaced where it chatters by its mean over `width` samples, the nearer ones weighing more.
+
+    It is the mean of means over half the width each: a triangle, which leaves far less of a periodic signal than one
+    mean does. Within half a width of a stretch's ends it is that of the nearest whole triangle; in a stretch shorter
+    than the width, one triangle as long as the stretch.
+    """
+    line = y.astype(float)
+    for part in stretches(y, width):
+        half = min(width // 2, (part.stop - part.start + 1) // 2)
+        line[part] = np.pad(running(running(line[part], half), half), half - 1, "edge")
+    return line
+
+
+def running(y: np.ndarray, width: int) -> np.ndarray:
+    """Mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
+    total = np.concatenate([[0.0], np.cumsum(y)])
+    return (total[width:] - total[:-width]) / width
+
+
+def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """A curve for y (K+1,): smoothed where it chatters, in few points that keep every extreme."""
+    y, size = smooth(y, width), -(-len(t) // POINTS)
+    starts = np.arange(0, len(t), size)
+    padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)
+    keep = np.unique([0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1])
+    keep = keep[keep < len(t)]
+    return t[keep], y[keep]

@@ -1,0 +1,238 @@
+"""Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
+
+stage.py has the scene, arrows.py what acts on it, state.py what holds or hits it, caption.py the words, charts.py the
+charts. Pictures are made and
+written one by one: a film's length costs time but no memory.
+"""
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable, Generator, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from smc_mujoco.common import extras, gl
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import replacing
+from smc_mujoco.draw import states, style
+from smc_mujoco.draw.decimate import end, finite, windows
+from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film.caption import Caption
+from smc_mujoco.draw.film.charts import Charts
+from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.simulation.trace import Trace
+
+FPS = 30.0
+MOST = 8  # machines: more are too small to tell apart
+LEAST, LARGEST = (320, 180), (1920, 1080)  # px
+FULL = 1280  # px, the width for which sizes of letters are stated
+CHARTS = 0.36  # of the height
+SEEN = 1e-3  # rad, m, or of the longest arrow: less than half a pixel, and not worth a new picture
+REST = 1200  # ms for which a clip's last picture stays before it starts again
+CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
+Report = Callable[[int], None]
+
+
+def film(
+    traces: Trace | Sequence[Trace],
+    path: str | os.PathLike,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: tuple[int, int] = (1280, 720),
+    fps: float = FPS,
+    report: Report = lambda frames: None,
+) -> Path:
+    """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
+
+    Args:
+      traces: several, or a single one.
+      labels: one a trace; default: the laws' names.
+      title: default: the plant's name.
+      size: width and height in px, even.
+      report: called with the number of frames written since its last call.
+
+    Raises:
+      ScenarioError: nothing to show, a size that cannot be, or no OpenGL to render with.
+    """
+    path = Path(path)
+    if path.suffix != ".mp4":
+        raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
+    times = clock(traces, fps)
+    pictures = frames(traces, times, labels, title, size)
+    with replacing(path) as part, contextlib.closing(pictures):
+        first = next(pictures)
+        with encoder(part, first.shape[:2], fps) as write:
+            write(first)
+            report(1)
+            for picture in pictures:
+                write(picture)
+                report(1)
+    return path
+
+
+def missing() -> str | None:
+    """None when a film can be written, else one sentence that says why not and what to do."""
+    return gl.missing() or extras.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
+
+
+@contextlib.contextmanager
+def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[np.ndarray], None]]:
+    """A function that adds a picture (height, width, 3) to the film at `path`.
+
+    Ctrl-C comes out as KeyboardInterrupt: the terminal sends it to ffmpeg too, which must not end first.
+
+    Raises:
+      MissingPackageError: there is no ffmpeg.
+      ScenarioError: it cannot write.
+    """
+    with extras.extra("film", "a film"):
+        import imageio_ffmpeg
+        import mediapy
+
+    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
+    writer = mediapy.VideoWriter(path, shape, **options, ffmpeg_args="-movflags +faststart")
+    try:
+        with deaf():
+            writer.__enter__()
+        with contextlib.closing(writer):
+            yield writer.add_image
+    except (OSError, RuntimeError) as error:
+        if isinstance(error.__context__, KeyboardInterrupt):  # what ffmpeg says of half a picture
+            raise KeyboardInterrupt from None
+        raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
+
+
+@contextlib.contextmanager
+def deaf() -> Iterator[None]:
+    """Blocks SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def clip(
+    traces: Trace | Sequence[Trace],
+    path: str | os.PathLike,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    span: tuple[float, float] = (0.0, 4.0),
+    size: tuple[int, int] = (800, 450),
+    fps: float = 20.0,
+    report: Report = lambda frames: None,
+) -> Path:
+    """Write an animated .webp of the time `span`, s: small, and shown as an image by web pages. Else as `film`."""
+    path = Path(path)
+    if path.suffix != ".webp":
+        raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
+    times = clock(traces, fps)
+    times = times[(times >= span[0]) & (times <= span[1])]
+    if not 0 < len(times) <= 600:
+        raise ScenarioError(
+            f"a clip of {span[0]:g} .. {span[1]:g} s has {len(times)} frames: give a span with 1 to 600"
+        )
+    pictures = []
+    for picture in frames(traces, times, labels, title, size):
+        pictures.append(Image.fromarray(picture))
+        report(1)
+    ends = [round(1000 / fps)] * (len(times) - 1) + [REST]
+    with replacing(path) as part:
+        pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
+    return path
+
+
+def still(
+    traces: Trace | Sequence[Trace],
+    time: float,
+    path: str | os.PathLike,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: tuple[int, int] = (1280, 720),
+) -> Path:
+    """Write the frame at `time` in s as a .png. Else as `film`."""
+    path = Path(path)
+    if path.suffix != ".png":
+        raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
+    with (
+        contextlib.closing(frames(traces, np.array([time]), labels, title, size)) as pictures,
+        replacing(path) as part,
+    ):
+        Image.fromarray(next(pictures)).save(part, optimize=True)
+    return path
+
+
+def clock(traces: Trace | Sequence[Trace], fps: float) -> np.ndarray:
+    """The times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
+    traces = style.same_plant(traces)
+    if not 1.0 <= fps <= 120.0:
+        raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
+    return np.arange(int(end(traces) * fps + 1e-6) + 1) / fps
+
+
+def frames(
+    traces: Trace | Sequence[Trace],
+    times: np.ndarray,
+    labels: Sequence[str] | None,
+    title: str | None,
+    size: tuple[int, int],
+) -> Generator[np.ndarray]:
+    """The film's pictures at the given times, each (height, width, 3) uint8."""
+    traces = style.same_plant(traces)
+    names, colours = style.labels(traces, labels), style.colours(traces)
+    if len(traces) > MOST:
+        raise ScenarioError(f"{len(traces)} machines in one film: show at most {MOST}")
+    if any(side % 2 or not low <= side <= high for side, low, high in zip(size, LEAST, LARGEST, strict=True)):
+        raise ScenarioError(f"a film of {size} px: give two even numbers from {LEAST} to {LARGEST}")
+    if why := gl.missing():
+        raise ScenarioError(why)
+    scale = (size[0] / FULL) ** 0.6  # letters shrink less than pictures
+    below = 2 * round(CHARTS * size[1] / 2)
+    above = size[0], size[1] - below
+    gap = times[1] - times[0] if len(times) > 1 else 1 / 30
+    traces = [finite(trace) for trace in traces]
+    longest = arrows.longest(traces)
+    scales = [arrows.scales(trace, longest) for trace in traces]
+    acts = [arrows.acts(trace, times, gap) for trace in traces]
+    told = [states.told(trace, times, max(states.HOLD, gap)) for trace in traces]
+    caption = Caption(traces, names, colours, title, above, scale, longest, told)
+    charts = Charts(traces, names, colours, (size[0], below), scale)
+    with Stage(traces, colours, above, caption.room) as stage:
+        caption.put(stage.boxes)
+        places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        ahead = [rotors(trace, times, gap)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        shown, picture = np.empty(0), np.empty(0)
+        for frame, time in enumerate(times.tolist()):
+            failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
+            drawn = []
+            for k, colour in enumerate(colours):
+                stage.dress(k, time)
+                stage.pose(k, places[k][frame], ahead[k][frame])
+                stage.paint(k, style.FAILED if failed[k] else colour)
+                for i, most in enumerate([] if failed[k] else scales[k][: stage.shown[k]]):
+                    drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, most, colour)]
+            ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
+            moved = [part[frame] for part in (*places, *ahead)]
+            now = np.concatenate([*moved, failed, stage.dressed, ends])
+            if len(now) != len(shown) or np.abs(now - shown).max() > SEEN:
+                shown, picture = now, stage.render(drawn)
+            words = tuple(each[frame] for each in told)
+            yield np.concatenate([caption.over(picture, time, failed, words), charts.at(time)])
+
+
+def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
+    """x at the times, (times, n), between samples on a straight line; after a failure the last finite one."""
+    return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)
+
+
+def rotors(trace: Trace, times: np.ndarray, gap: float) -> np.ndarray:
+    """How far the rotors are ahead of their joints, (times, n): on the flank that pushes, on the mean over a frame."""
+    edges = np.concatenate([[times[0] - gap], times])
+    return 0.5 * states.play(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean

@@ -1,0 +1,221 @@
+"""Many copies of a plant as one gymnasium.vector.VectorEnv: all of them step in one MuJoCo Batch, on all cores.
+
+    environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
+
+Copy i moves as the single environment with seed + i does, to 1e-12. A copy whose episode is over starts anew as
+gymnasium's own vectors do: in the next step, whose action it ignores (AutoresetMode.NEXT_STEP, the default), in the
+same one, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.envs.core import bounded, setting
+from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
+from smc_mujoco.mechanisms.custom.plant_from import smooth
+from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
+from smc_mujoco.simulation import callback
+from smc_mujoco.simulation.run import cores
+
+# isort: split
+from gymnasium.utils import seeding  # by now imported by gym
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from mujoco.batch import Batch, SimulationError  # by now imported by callback
+
+MOST = 1_000_000  # copies: a number that is surely meant as something else
+SEEDS = 2**64
+
+
+class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Copies of one plant with one task; they are not drawn.
+
+    Attributes:
+      setting: the plant with its task.
+      batch: the simulations.
+      first: the output of the first of two drives, (num_envs, driven).
+      samples: control samples since the episode began, (num_envs,).
+      over: whose episode has ended, (num_envs,) of bool.
+      last: the sample at which an episode is truncated.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as gymnasium has it
+
+    def __init__(
+        self,
+        plant: Plant | str,
+        num_envs: int = 1,
+        task: str = "regulate",
+        changes: Mapping[str, Any] | None = None,
+        threads: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: None = None,
+    ):
+        """Arguments as of `setting.setting`.
+
+        Args:
+          threads: None for one per available core.
+          autoreset_mode: when a copy whose episode is over starts anew.
+          max_episode_steps: control samples after which an episode is truncated, if the duration has not come first.
+          render_mode: None: copies are not drawn.
+
+        Raises:
+          ScenarioError: what `setting` raises, or a value of these that there is not.
+        """
+        if render_mode is not None:
+            raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
+        self.num_envs, self.setting = whole("num_envs", num_envs, 1, MOST), setting(plant, task, changes, edit=strip)
+        relieve(self.setting.model)
+        self.metadata = self.metadata | {"autoreset_mode": _mode(autoreset_mode)}
+        most = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
+        self.last = min(self.setting.scenario.samples, most)
+        self.single_action_space = action_space(self.setting)
+        self.single_observation_space = observation_space(self.setting)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
+        self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
+        self.first = np.zeros((self.num_envs, *self.setting.shape))
+        self.randoms: list[np.random.Generator] = []
+        self.samples, self.over = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start all copies: from seed, seed + 1, ... or one seed each; options x0 and v0 hold for all of them.
+
+        The option reset_mask, (num_envs,) of bool, says which are to start; the others stay as they are.
+        """
+        which, options = self._which(options)
+        held = self.randoms or [None] * self.num_envs
+        self.randoms = [
+            seeding.np_random(own)[0] if random is None or (anew and own is not None) else random
+            for random, own, anew in zip(held, self._seeds(seed), which, strict=True)
+        ]
+        self.begin(which, options)
+        return self.observe(), {}
+
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One control period of every copy, or its next start: observations, rewards, terminated, truncated, infos."""
+        if not self.randoms:
+            raise ScenarioError("these environments have not begun: call reset first")
+        anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
+        if anew.any() and mode is AutoresetMode.DISABLED:
+            raise ScenarioError(f"the episode of copy {np.argmax(anew)} is over: reset it with the option reset_mask")
+        commands = self.setting.command(actions, (self.num_envs,))
+        terminated = self.advance(None if not anew.any() else np.flatnonzero(~anew).astype(np.int32), commands)
+        self.samples += 1
+        if anew.any():
+            self.begin(anew)
+        x, v = self.state()
+        terminated |= self.setting.lost(x, v)
+        truncated = self.samples >= self.last
+        with np.errstate(over="ignore", invalid="ignore"):
+            rewards = np.where(terminated | anew, 0.0, self.setting.reward(x, v, self.samples))
+        observations, self.over = self.observe(terminated), terminated | truncated
+        if mode is AutoresetMode.SAME_STEP and self.over.any():
+            for i in np.flatnonzero(self.over):
+                infos = self._add_info(infos, {"final_obs": observations[i].copy(), "final_info": {}}, int(i))
+            self.begin(self.over.copy())
+            observations = self.observe()
+        return observations, rewards, terminated, truncated, infos
+
+    def begin(self, which: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
+        """Start copies, (num_envs,) of bool, anew."""
+        ids = np.flatnonzero(which)
+        with callback.uninstalled():
+            self.batch.reset(ids.astype(np.int32), stage=0)
+        for i in ids:
+            self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
+        self.samples[which], self.over[which], self.first[which] = 0, False, 0.0
+
+    def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
+        """Step copies, None for all; in which of them MuJoCo gave up, (num_envs,) of bool."""
+        gone = np.zeros(self.num_envs, bool)
+        for steps in self.setting.stretches(self.ctrl, commands, self.first):
+            try:
+                with callback.uninstalled():  # a Batch refuses Python callbacks, and other threads' runs may have one
+                    self.batch.step(ids, nstep=steps)
+            except SimulationError as error:
+                gone[list(error.ids)] = True
+                ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
+        return gone
+
+    def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
+        """The observations of all copies, (num_envs, size); None for `lost`: who is lost is found out."""
+        x, v = self.state()
+        out: np.ndarray = self.setting.lost(x, v) if lost is None else lost
+        observations = self.setting.observe(x, v, self.samples)
+        if out.any():
+            observations[out] = bounded(observations[out])
+        return observations
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and velocities of all copies, (num_envs, n) each."""
+        return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
+
+    def _which(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
+        """The copies that a reset is for, and its other options."""
+        if not isinstance(options, Mapping) or "reset_mask" not in options:
+            return np.ones(self.num_envs, bool), options
+        mask = options["reset_mask"]
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
+            cure = f"give an array of {self.num_envs} bools, one of them True"
+            raise ScenarioError(f"reset_mask is {shown(mask)}: {cure}")
+        if not self.randoms:
+            raise ScenarioError("reset_mask is for environments that have begun: call reset without it first")
+        return mask, {name: value for name, value in options.items() if name != "reset_mask"}
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """One seed a copy."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+            if len(seed) != self.num_envs:
+                raise ScenarioError(f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all")
+            return [None if own is None else whole("seed", own, 0, SEEDS) for own in seed]
+        first = whole("seed", seed, 0, SEEDS)
+        return range(first, first + self.num_envs)
+
+
+def _mode(mode: object) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = ", ".join(repr(known.value) for known in AutoresetMode)
+        raise ScenarioError(f"autoreset_mode is {shown(mode)}: choose from {known}") from None
+
+
+def strip(spec: mujoco.MjSpec) -> None:
+    """Take away what is only looked at, which MuJoCo would move along in every step: a third of its time.
+
+    Models of users stay as they are, but for sensors: a part that is fixed may be a floor, or hold a tendon.
+    """
+    if not any(text.name == DIRECTLY for text in spec.texts):
+        for thing in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
+            spec.delete(thing)
+        spec.compiler.fusestatic = True
+    # nobody reads them here: an observation is taken from the state
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+
+
+def relieve(model: mujoco.MjModel) -> None:
+    """Let MuJoCo skip its search for constraints where there can be none: a tenth of its time."""
+    if smooth(model) and not model.nflex:
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
+
+
+def _scenery(geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom neither moves nor touches anything."""
+    return _fixed(geom.parent) and not geom.contype and not geom.conaffinity
+
+
+def _fixed(body: mujoco.MjsBody | None) -> bool:
+    """Whether no joint moves a body."""
+    return body is None or (not body.joints and _fixed(body.parent))

@@ -1,8 +1,0 @@
-"""The velocity sensor itself."""
-
-from smc_mujoco.estimators import estimator_function
-
-
-@estimator_function()
-def measured(y, gains, memory):
-    return y.v

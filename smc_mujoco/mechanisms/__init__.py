@@ -1,0 +1,1 @@
+"""Physics without a controller: plants, and what makes them real."""

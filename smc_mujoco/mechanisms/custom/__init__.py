@@ -1,0 +1,1 @@
+"""Plants from a user's own MJCF."""

@@ -1,0 +1,135 @@
+"""The channels of an own model as its user names them, checked against the model."""
+
+import contextlib
+import contextvars
+import dataclasses
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import mujoco
+
+from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.mechanisms.custom.mjcf import pick
+
+BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
+SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
+
+RECORDED = contextvars.ContextVar("RECORDED", default=False)  # whether a run that has been is being read
+Range = tuple[str, float, float]  # joint, least and largest position, rad or m
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Channel:
+    """How a joint of an own model is driven.
+
+    Attributes:
+      actuator: name of the motor that drives it; None: the only one that does.
+      motor: whether an ideal motor takes the place of whatever actuators drive the joint, servos or none.
+      partner: a joint without an actuator that moves with it, as a pole on its cart: measured and scored as a channel
+        of its own, after the driven ones, and seen by this one's law in y.q, y.dq, y.fq, y.gq. An actuator that it has
+        nevertheless stays at ctrl = 0, where a motor does nothing, and a servo holds.
+      x0, partner_x0: rad or m, where it starts, and its partner; None: where the keyframe, or the model, has it.
+    """
+
+    actuator: str | None = None
+    motor: bool = False
+    partner: str | None = None
+    x0: float | None = None
+    partner_x0: float | None = None
+
+
+def given(channels: object) -> tuple[tuple[str, Channel], ...]:
+    """Joints with their Channels, from whatever the user gave."""
+    if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
+        raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
+    items = list(channels.items()) if isinstance(channels, Mapping) else [(joint, None) for joint in channels]
+    if not items:
+        raise ScenarioError("channels is empty: give at least one joint's name")
+    return tuple((joint, channel(joint, value)) for joint, value in items)
+
+
+def channel(joint: object, value: object) -> Channel:
+    """A Channel, from one, a dict of its fields, or None."""
+    if isinstance(value, Mapping):
+        for key in value:
+            find("field of a Channel", key, {field.name: None for field in dataclasses.fields(Channel)})
+    made = Channel() if value is None else Channel(**value) if isinstance(value, Mapping) else value
+    if not isinstance(made, Channel):
+        raise ScenarioError(f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None")
+    if not isinstance(made.motor, bool):
+        raise ScenarioError(f"motor of channel {joint!r} is {shown(made.motor)}: give True or False")
+    if made.partner is None and made.partner_x0 is not None:
+        raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
+    starts = {
+        name: number(f"{name} of channel {joint!r}", getattr(made, name), least=-1e6, most=1e6)
+        for name in ("x0", "partner_x0")
+        if getattr(made, name) is not None
+    }
+    return dataclasses.replace(made, **starts)
+
+
+def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
+    """Raise ScenarioError for joints that are not there or cannot be channels, and for flags that forbid control."""
+    joints = [*(joint for joint, _ in asked), *partners]
+    there = {model.joint(i).name: i for i in range(model.njnt) if model.joint(i).name}
+    for joint in joints:
+        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, there)])
+        if kind not in SIMPLE:
+            raise ScenarioError(
+                f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
+            )
+        if joints.count(joint) > 1:
+            raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
+    if partners and len(partners) < len(asked):
+        bare = next(joint for joint, channel in asked if channel.partner is None)
+        raise ScenarioError(f"channel {bare!r} has no partner and others have: give each one, or none")
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION.value:
+        raise ScenarioError(f'{label} has <flag actuation="disable"/>, so that nothing drives it: take it out')
+
+
+def starts(
+    plant: str, model: mujoco.MjModel, joints: list[str], asked: tuple[tuple[str, Channel], ...], keyframe: str | None
+) -> tuple[float, ...]:
+    """x0: as the channels say, else as the keyframe, else as the model has it.
+
+    The last alone may be outside a range, for nobody asked for it, and a scenario can have another.
+    """
+    qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
+    held = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints}
+    said = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
+    said |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
+    found = held | said
+    told = [one for one in ranges(model, joints) if keyframe is not None or one[0] in said]
+    within(plant, told, [found[joint] for joint, _, _ in told])
+    return tuple(found.values())
+
+
+def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
+    """Raise ScenarioError for a start outside a joint's range, in a run that is to be."""
+    for (joint, low, high), x in zip(ranges, x0, strict=False):
+        if not (low - BEYOND <= x <= high + BEYOND or RECORDED.get()):
+            raise ScenarioError(
+                f"x0 of joint {joint!r} of {plant} is {x:g}, outside its range from {low:g} to {high:g}: "
+                "give another x0"
+            )
+
+
+@contextlib.contextmanager
+def recorded() -> Iterator[None]:
+    """Within it, what is read was run already, and is not refused for what would be today."""
+    token = RECORDED.set(True)
+    try:
+        yield
+    finally:
+        RECORDED.reset(token)
+
+
+def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
+    """Joint, least and largest position of each channel, rad or m; empty where none has limits."""
+    found = []
+    for joint in map(model.joint, joints):
+        low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)
+        found.append((joint.name, float(low), float(high)))
+    flags = mujoco.mjtDisableBit
+    off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
+    return () if off or not any(math.isfinite(low) for _, low, _ in found) else tuple(found)

@@ -1,0 +1,111 @@
+"""Motors of an own model's channels: which of its actuators drives a joint, and a motor of gear 1 in its place."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.mechanisms.custom.mjcf import pick
+from smc_mujoco.mechanisms.hardware.part import PASSIVE
+
+MOTOR = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # what drives a single joint
+FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
+STILL = mujoco.mjtDyn.mjDYN_NONE.value
+GROUP = 31  # of motors: none that actuatorgroupdisable can turn off
+CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
+
+
+class Motor(NamedTuple):
+    """The motor of a channel: the bound on its force, N m or N, and the actuators whose place it takes."""
+
+    limit: float
+    replaced: tuple[int, ...]
+
+
+def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, ideal: bool) -> Motor:
+    """The motor that drives a joint.
+
+    Raises:
+      ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
+    """
+    number = model.joint(joint).id
+    held = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
+    own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
+    own = [i for i in own if model.actuator_trnid[i, 0] == number]
+    if ideal:
+        if wanted is not None:
+            raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
+        return Motor(_limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *held), tuple(own))
+    if wanted is not None:
+        every = {model.actuator(i).name: i for i in range(model.nactuator) if model.actuator(i).name}
+        chosen = pick(label, "actuator", wanted, every)
+        if chosen not in own:
+            raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
+        own = [chosen]
+    if not own:
+        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
+    names = [model.actuator(i).name or f"number {i}" for i in own]
+    if len(own) > 1:
+        raise ScenarioError(
+            f"joint {joint!r} of {label} has the actuators {', '.join(names)}: name one with smc.Channel(actuator=...)"
+        )
+    if why := _no_motor(model, own[0]):
+        raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
+    gives = f"actuator {names[0]!r} gives joint {joint!r} of {label}"
+    return Motor(_limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
+
+
+def _no_motor(model: mujoco.MjModel, i: int) -> str:
+    """What an actuator is, if it is no motor."""
+    if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
+        return "is a servo, a damper or a muscle"
+    if model.actuator_dyntype[i] != STILL or model.actuator_delay[i]:
+        return "has dynamics or a delay of its own"
+    if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
+        return "has armature or damping of its own"
+    if 0 <= model.actuator_group[i] <= 30 and model.opt.disableactuator >> int(model.actuator_group[i]) & 1:
+        return "is in a group that actuatorgroupdisable turns off"
+    if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
+        return "has gear or gain 0"
+    return ""
+
+
+def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
+    """The force that all ranges allow both ways, N m or N: that of the weaker way, so that |u| has one bound."""
+    low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
+    if not low < 0.0 < high:
+        raise ScenarioError(f"{who} {low:g} to {high:g}, and a law pushes both ways: {cure}")
+    return min(-low, high)
+
+
+def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
+    """The least and the largest force of an actuator at its joint."""
+    gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
+    low, high = -math.inf, math.inf
+    clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
+    if model.actuator_ctrllimited[i] and clamped:
+        low, high = sorted(float(gain * end) for end in model.actuator_ctrlrange[i])
+    if model.actuator_forcelimited[i]:
+        least, most = model.actuator_forcerange[i]
+        low, high = (float(min(max(end, least), most)) for end in (low, high))
+    low, high = sorted((float(gear * low), float(gear * high)))
+    return low, high
+
+
+def put(spec: mujoco.MjSpec, motors: Sequence[tuple[str, Motor]]) -> None:
+    """Put the channels' motors in, in this order, and keep the model's other actuators as parts without commands."""
+    replaced = {i for _, motor in motors for i in motor.replaced}
+    for i, actuator in enumerate(list(spec.actuators)):
+        if i in replaced:
+            spec.delete(actuator)
+        else:
+            actuator.name = f"{PASSIVE}smc:{i}"  # no joint is called so
+    for joint, motor in motors:  # named by joints, as actuators' names may be anything
+        made = spec.add_actuator(name=f"u:{joint}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        made.set_to_motor()
+        limit = motor.limit if math.isfinite(motor.limit) else 0.0
+        made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0
+        made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
+        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, GROUP

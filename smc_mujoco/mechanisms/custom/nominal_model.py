@@ -1,0 +1,186 @@
+"""The nominal model of a user's own MJCF: f and g of every channel from MuJoCo itself, at the measured state.
+
+With M the mass matrix and tau what gravity, gyration, springs, dampers and the model's other actuators exert, MuJoCo's
+x'' = M^-1 (tau + u), and channel i believes
+
+    x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
+
+with u_j the command that channel j was told last: in this sample where j < i, in the one before where j > i. So laws of
+single channels, run one after the other, solve M u = v - ... by the sweeps of Gauss and Seidel, a sweep a sample, which
+converge for every positive definite M. Of a joint that moves with channel i without an actuator, the g is (M^-1)_qi.
+
+MuJoCo's own functions do it, called by address from the compiled path, on a copy of the model with the nominal
+parameters and on an mjData which each simulation has for itself. Constraints are left out: contacts, limits, dry
+friction. A state that is not measured, in another kinematic tree, is taken to be the model's initial one.
+"""
+
+import ctypes
+import dataclasses
+import functools
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numba import carray
+
+from smc_mujoco.common import libmujoco
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.jit import Function, integers, pointer
+from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
+from smc_mujoco.mechanisms.plant import Coupled, Field, Native, Values, ready, write
+
+_DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+_SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
+_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM")
+_lock = threading.Lock()
+
+
+class Places(NamedTuple):
+    """Where the channels lie: addresses into qpos, qvel and ctrl, (n,) each; ctrl of those driven, (driven,)."""
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    ctrl: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Believed(Coupled):
+    """The nominal model of what `build` builds, with `fields` set by the parameters."""
+
+    build: Callable[[int], mujoco.MjSpec]
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
+    why_not: str = ""  # why there is none
+
+    def __call__(self, x, v, i, p, /, u=None):
+        """f and g of channel i; NaN where there is no nominal model."""
+        if self.why_not:
+            return np.nan, np.nan
+        model, places, data, _ = prepared(self, frozen(vars(p)))
+        with _lock:
+            data.qpos[:], data.qvel[:] = model.qpos0, 0.0
+            data.qpos[places.qpos], data.qvel[places.qvel] = x, v
+            data.ctrl[:] = 0.0
+            driven = len(places.ctrl)
+            data.ctrl[places.ctrl] = 0.0 if u is None else np.asarray(u)[:driven]
+            data.ctrl[places.ctrl[i % driven]] = 0.0
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_fwdVelocity(model, data)
+            mujoco.mj_fwdActuation(model, data)
+            mujoco.mj_fwdAcceleration(model, data)
+            unit, moved = np.zeros((1, model.nv)), np.zeros((1, model.nv))
+            unit[0, places.qvel[i % driven]] = 1.0
+            mujoco.mj_solveM(model, data, moved, unit)
+            return float(data.qacc_smooth[places.qvel[i]]), float(moved[0, places.qvel[i]])
+
+    def native(self, parameters: Mapping[str, float]) -> Native:
+        """The C function, and for one simulation the addresses of what it works on."""
+        if self.why_not:
+            return Native(unknown().address, (), ())
+        model, places, _, spare = prepared(self, frozen(parameters))
+        lent = lend(model, spare)
+        data, seen = lent.data, np.full(2 * len(places.qpos), np.nan)
+        table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
+        solved = np.zeros(2 * model.nv)
+        arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
+        addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
+        sizes = len(places.qpos), len(places.ctrl), model.nv
+        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, lent, *arrays))
+
+
+@dataclasses.dataclass(eq=False)
+class Lent:
+    """An mjData for one simulation, which the next takes over: freed and made anew, they leave holes in memory."""
+
+    data: mujoco.MjData
+    spare: list[mujoco.MjData]
+
+    def __del__(self):
+        self.spare.append(self.data)
+
+
+def lend(model: mujoco.MjModel, spare: list[mujoco.MjData]) -> Lent:
+    """A spare mjData, or else another: whoever had it wrote only what each simulation writes before it reads."""
+    try:
+        data = spare.pop()
+    except IndexError:
+        data = mujoco.MjData(model)
+    return Lent(data, spare)
+
+
+@functools.lru_cache(maxsize=32)
+def prepared(
+    nominal: Believed, parameters: Mapping[str, float]
+) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
+    """The model with nominal parameters, where its channels lie, an mjData for calls from Python, and spare ones."""
+    model = ready(nominal.build(0), 0)
+    model.opt.disableflags |= _DISABLED
+    model.opt.enableflags &= ~_SLEEP
+    write(model, iter(list(nominal.fields(model, Values(**parameters)))))
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    mujoco.mj_resetData(model, data)
+    joints = joint_ids(model)
+    places = Places(model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)])
+    return model, places, data, []
+
+
+@functools.cache
+def functions() -> tuple:
+    """MuJoCo's C functions that the nominal model calls, in the order of _FUNCTIONS."""
+    found = [getattr(libmujoco.library(), name) for name in _FUNCTIONS]
+    for name, function in zip(_FUNCTIONS, found, strict=True):
+        function.restype = None
+        function.argtypes = [ctypes.c_int64] * 2 if name != "mj_solveM" else [ctypes.c_int64] * 4 + [ctypes.c_int]
+    return tuple(found)
+
+
+@functools.cache
+def unknown() -> Function:
+    """A nominal model that knows nothing: NaN."""
+
+    def native(y, p, m, out):
+        output = carray(pointer(out), (2,))
+        output[0], output[1] = np.nan, np.nan
+        return 0
+
+    return Function(native)
+
+
+@functools.cache
+def native() -> Function:
+    """inputs: i, n, x, v, acceleration (unused) and u, (n,) each -> outputs: f and g of channel i."""
+    positions, velocities, actuation, accelerations, solve = functions()
+
+    def native(y, p, m, out):
+        head, own = carray(pointer(y), (2,)), carray(pointer(p), (12,))
+        i, n, driven, nv = int(head[0]), int(own[0]), int(own[1]), int(own[2])
+        model, data = int(own[3]), int(own[4])
+        state = carray(pointer(y + 16), (4 * n,))
+        qpos, qvel = carray(pointer(int(own[5])), (1 << 40,)), carray(pointer(int(own[6])), (1 << 40,))
+        ctrl, qacc = carray(pointer(int(own[7])), (1 << 40,)), carray(pointer(int(own[8])), (nv,))
+        table, seen = carray(integers(int(own[9])), (2 * n + driven,)), carray(pointer(int(own[10])), (2 * n,))
+        solved = carray(pointer(int(own[11])), (2 * nv,))
+        fresh = False
+        for j in range(2 * n):
+            if seen[j] != state[j]:  # so that NaN is never known already
+                fresh, seen[j] = True, state[j]
+        if fresh:  # the same for all channels of a sample
+            for j in range(n):
+                qpos[table[j]], qvel[table[n + j]] = state[j], state[n + j]
+            positions(model, data)
+            velocities(model, data)
+        for j in range(driven):
+            ctrl[table[2 * n + j]] = 0.0 if j == i % driven else state[3 * n + j]
+        actuation(model, data)
+        accelerations(model, data)
+        for j in range(nv):
+            solved[nv + j] = 0.0
+        solved[nv + table[n + i % driven]] = 1.0
+        solve(model, data, int(own[11]), int(own[11]) + 8 * nv, 1)
+        output = carray(pointer(out), (2,))
+        output[0], output[1] = qacc[table[n + i]], solved[table[n + i]]
+        return 0
+
+    return Function(native)

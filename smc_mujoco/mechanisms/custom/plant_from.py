@@ -1,0 +1,269 @@
+"""A plant from any MJCF: name the joints that are its channels, and the rest is found in the model.
+
+    arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
+    trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0), model="nominal"))
+
+A channel's command u is the force on its joint, N m or N: the joint's one motor is put there with gear 1, and what its
+ranges and the joint's actuatorfrcrange allow both ways bounds |u|, beside the scenario's u_max: laws are told so in
+y.limit. Position and velocity sensors are added; the model's own are taken off. Its
+other actuators stay, at ctrl = 0, and joints without a channel move as the model says. Integrator, step and start are
+the scenario's. Disturbances act on the joints themselves. Parameters are m, kg, the mass of all that moves, which
+scales all masses and inertias, and grav, m/s^2.
+"""
+
+import base64
+import dataclasses
+import functools
+import math
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.mechanisms.custom import mjcf
+from smc_mujoco.mechanisms.custom.channels import RECORDED, SIMPLE, Channel, check, given, ranges, starts
+from smc_mujoco.mechanisms.custom.mjcf import Source
+from smc_mujoco.mechanisms.custom.model_check import check_model
+from smc_mujoco.mechanisms.custom.motors import MOTOR, Motor, motor_of, put
+from smc_mujoco.mechanisms.custom.nominal_model import Believed
+from smc_mujoco.mechanisms.hardware.part import ROTOR, START
+from smc_mujoco.mechanisms.plant import DIRECTLY, Field, Plant, catalogue
+
+if TYPE_CHECKING:
+    from dm_control.mjcf import RootElement
+
+LONGEST = 86_400.0  # s, of a timeout
+SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+WITHOUT = "give a law without a model"
+CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
+
+
+class Drive(NamedTuple):
+    """A channel as found in the model."""
+
+    joint: str
+    motor: Motor
+    partner: str | None
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnModel:
+    """What builds the mechanism: n is not looked at, as the channels say it."""
+
+    source: Source
+    keyframe: str | None
+    channels: tuple[tuple[str, Channel], ...]
+    drives: tuple[Drive, ...]
+
+    def __call__(self, n: int) -> mujoco.MjSpec:
+        """The model with a motor and two sensors a channel.
+
+        Raises:
+          ScenarioError: the file is gone, or another than it was.
+        """
+        spec = self.source.read()
+        while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that go
+            spec.delete(named[0])  # from MuJoCo 4 on with the tuples that name it: ask again for what is left
+        put(spec, [(drive.joint, drive.motor) for drive in self.drives])
+        partners = [drive.partner for drive in self.drives if drive.partner]
+        for joint in [*(drive.joint for drive in self.drives), *partners]:
+            for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
+                spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
+        for key in list(spec.keys):
+            if key.name != self.keyframe or self.keyframe is None:
+                spec.delete(key)
+            else:
+                key.name, key.ctrl, key.act = START, [], []
+        spec.add_text(name=DIRECTLY, data="disturbances act on the joints")
+        spec.option.disableflags &= ~SENSORS
+        return spec
+
+    def about(self) -> dict:
+        """All that plant_from needs to make it again, as plain data."""
+        channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
+        data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
+        return data if self.source.path else data | _inside(self.source)
+
+
+@functools.lru_cache(maxsize=32)
+def _inside(source: Source) -> dict:
+    """A model's text and the files that it names, as JSON holds them."""
+    assets = {name: base64.b64encode(content).decode() for name, content in source.assets}
+    return {"text": source.text, "assets": assets}
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnFields:
+    """The model fields that m and grav set: all masses and inertias, and gravity, in proportion to the model's."""
+
+    mass: float
+    gravity: float
+
+    def __call__(self, model, p):
+        scale = np.ones(model.nbody)
+        scale[[not model.body(i).name.startswith(ROTOR) for i in range(model.nbody)]] = p.m / self.mass
+        yield Field("body_mass", slice(None), model.body_mass * scale)
+        yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
+        if self.gravity:
+            yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
+
+
+def plant_from(
+    path: "str | os.PathLike | mujoco.MjSpec | RootElement",
+    channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
+    name: str | None = None,
+    keyframe: str | None = None,
+    assets: Mapping[str, bytes] | None = None,
+    timeout: float = 20.0,
+) -> Plant:
+    """An MJCF model as a plant.
+
+    Args:
+      path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
+      channels: joint -> Channel, or a dict of its fields, or None for what is found; or joints' names alone. Their
+        order is that of the plant's channels.
+      name: of the plant; default: the file's, or the model's.
+      keyframe: one of the model's, by name, at whose positions runs start, at rest but for the scenario's v0; default:
+        the model's initial positions.
+      assets: name -> content of the files that a text names.
+      timeout: s that MuJoCo may take to compile the model, which is tried in a process of its own first.
+
+    Raises:
+      ScenarioError: a model that cannot be read, that ends MuJoCo or takes more than its time or 4 GiB; numbers in it
+        that are NaN, infinite or beyond 1e15; a joint, actuator or keyframe that is not there or does not serve; or a
+        start that is asked for and outside its joint's range.
+
+    Laws may have model="nominal" where all joints that move with the channels are channels or partners, and no equality
+    constraint holds any; `plant.unmodelled` says why not. Films show the model plainly, in its own colours.
+    """
+    source = mjcf.source(path, assets)
+    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
+    label, model = source.label, source.compiled(source.read())
+    if not RECORDED.get():
+        check_model(label, model)
+    asked = given(channels)
+    partners = [channel.partner for _, channel in asked if channel.partner is not None]
+    check(label, model, asked, partners)
+    if keyframe is not None:
+        mjcf.pick(label, "keyframe", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name})
+    drives = tuple(Drive(joint, motor_of(label, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
+    build = OwnModel(source, keyframe, asked, drives)
+    joints = [*(joint for joint, _ in asked), *partners]
+    mass = float(model.body_mass[model.body_weldid != 0].sum())
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    fields, limits = OwnFields(mass, gravity), tuple(drive.motor.limit for drive in drives)
+    units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
+    why_not, called = missing(model, joints, drives), named(name, label)
+    return Plant(
+        name=called,
+        parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
+        mass="m",
+        unit=units[0],
+        mixed=units if len(set(units)) > 1 else (),
+        x0=starts(called, model, joints, asked, keyframe),
+        n=len(joints),
+        sizes=(len(joints), len(joints)),
+        build=build,
+        fields=fields,
+        nominal=Believed(build, fields, why_not),
+        lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
+        underactuated=bool(partners),
+        direct=True,
+        smooth=smooth(model),
+        unmodelled=why_not,
+        limits=limits if any(limit < math.inf for limit in limits) else (),
+        ranges=ranges(model, joints),
+    )
+
+
+def named(name: str | None, label: str) -> str:
+    """The plant's name; none of the library's, as laws, gains and conditions go by them."""
+    if name is None:
+        name = label.removesuffix(".xml")
+        name = name if name not in catalogue() else label
+    if RECORDED.get():
+        return name
+    if errors.name("name", name) in catalogue():
+        raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
+    return name
+
+
+def smooth(model: mujoco.MjModel) -> bool:
+    """Whether the model can have no constraint: no limits, no dry friction, no contacts, nothing held together."""
+    flags = mujoco.mjtDisableBit
+    if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
+        return True
+    touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
+    limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
+    dry = np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss)
+    return not (
+        (touching and not model.opt.disableflags & flags.mjDSBL_CONTACT.value)
+        or (limited and not model.opt.disableflags & flags.mjDSBL_LIMIT.value)
+        or dry
+        or model.neq
+    )
+
+
+def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...]) -> str:
+    """Why there is no nominal model of the channels, or ""."""
+    if np.any(model.eq_active0):
+        return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT
+    if model.nplugin or model.nflex:
+        return "it has plugins or flexible bodies: " + WITHOUT
+    ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
+    idle = np.ones(model.nactuator, bool)
+    idle[[a for drive in drives for a in drive.motor.replaced]] = False
+    if np.any(model.actuator_dyntype[idle] == CURRENT):
+        return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT
+    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
+    near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
+    loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in ours))
+    return unmeasured(model, loose, drives) if loose else ""
+
+
+def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...]) -> str:
+    """What there is to say of joints, by number, that move with the channels and are none."""
+    for number in loose:
+        kind = mujoco.mjtJoint(model.jnt_type[number])
+        if kind not in SIMPLE:
+            return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: {WITHOUT}"
+        if not model.joint(number).name:
+            return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
+    moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, MOTOR), 0].tolist())
+    bare = [number for number in loose if number not in moved]
+    partners = len(bare) + sum(drive.partner is not None for drive in drives)
+    driven = len(drives) + len(loose) - len(bare)
+    first = model.joint(loose[0]).name
+    said = f"joint {first!r} moves with its channels and is not measured"
+    if partners not in (0, driven):
+        return (
+            f"{said}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take one "
+            f"partner each or none: {WITHOUT}"
+        )
+    cure = f"a partner with smc.Channel(partner={first!r})" if loose[0] in bare else "a channel"
+    return f"{said}: make it {cure}, or {WITHOUT}"
+
+
+def restored(data: Mapping, name: str) -> Plant:
+    """The plant that `OwnModel.about` tells of.
+
+    Raises:
+      ScenarioError: the file is gone, or another than it was.
+    """
+    if "text" in data:
+        model = data["text"]
+        assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
+    else:
+        model, assets = Path(data["path"]), None
+        if not model.is_file():
+            raise ScenarioError(f"its model {model} is not there: put it back")
+        if mjcf.digest(model) != data["sha256"]:
+            raise ScenarioError(
+                f"its model {model}, or a file that it names, is another than in the run: put that one back"
+            )
+    return plant_from(model, data["channels"], name=name, keyframe=data["keyframe"], assets=assets)

@@ -1,0 +1,51 @@
+"""How far a mechanism that is built by other means departs from its plant's equation."""
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import find, number
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.plant import Plant, write
+from smc_mujoco.mechanisms.plant import plant as find_plant
+
+GRID = 41  # positions and velocities of one channel
+STATES = 500  # random states of a network
+SEED = 0
+
+
+def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) -> float:
+    """The largest |x'' - f| over the largest |f|, of states with |x| and |v| up to `reach`, without a command.
+
+    x'' is the mechanism's, f the plant's equation with the same parameters. One channel takes a grid of states, a
+    network random ones.
+
+    Args:
+      plant: the plant with its parameters, or its name.
+      mechanism: one of plant.mechanisms.
+      reach: m or rad, and the same number a second. Default: the farthest of plant.x0.
+    """
+    plant = find_plant(plant) if isinstance(plant, str) else plant
+    variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
+    most = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
+    spec = plant.spec()
+    variant.edit(spec)
+    model = compiled(spec)
+    values = plant.values({})
+    write(model, variant.fields(model, values))
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    error = size = 0.0
+    for x, v in _states(plant.n, most):
+        f = np.array([plant.nominal(x, v, i, values)[0] for i in range(plant.n)])
+        data.qpos[:], data.qvel[:] = x, v
+        mujoco.mj_forward(model, data)
+        error, size = max(error, np.abs(data.qacc - f).max()), max(size, np.abs(f).max())
+    return error / size
+
+
+def _states(n: int, reach: float) -> np.ndarray:
+    """States (m, 2, n) of n channels."""
+    if n > 1:
+        return np.random.default_rng(SEED).uniform(-reach, reach, (STATES, 2, n))
+    line = np.linspace(-reach, reach, GRID)
+    return np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2, 1)

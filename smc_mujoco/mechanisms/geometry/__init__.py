@@ -1,0 +1,1 @@
+"""Bodies, springs and obstacles that plants share."""

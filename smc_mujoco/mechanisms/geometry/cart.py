@@ -1,0 +1,76 @@
+"""What a cart on a rail runs into or slides over: end stops, a post on the rail, a rough bed under its block.
+
+The cart carries rubber buffers at its ends, above the two rails: blows go straight along x. On the bed it has no
+wheels: its block lies on a lining, pressed by its weight through the joint `lift`, and slides by Coulomb's law.
+"""
+
+import mujoco
+
+from smc_mujoco.mechanisms.hardware.contact import SOLREF_RUB, SPRINGY, bar, box, hit, rub, solid
+
+STOPPING = 0.5  # restitution of rubber buffers: chosen
+FRICTION = 0.1  # of the block on its bed: chosen, so that 1 N stands against springs of 1 to 3 N and commands of 6 N
+GRAVITY = 9.81  # m/s^2
+
+RAIL = 0.26  # m, the rails' and the cart's height, and
+SIDES = {"front": -0.10, "back": 0.10}  # where they lie across
+END = 0.20  # m, half the block's length
+LOW, MIDDLE, HIGH = 0.292, 0.342, 0.392  # m, heights of the block
+BUFFER = 0.030  # m, radius
+DEEP = 1.0  # m, a stop behind its face: holds 100 m/s
+REACH = END + BUFFER  # m, from the cart's middle to where it hits
+PIN = 0.020  # m, radius of the post
+SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, the block in its bed at rest, on the four corners of a box
+
+
+def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
+    """End stops that let the cart's middle reach -x and x."""
+    machine = spec.body("machine")
+    for side, sign in (("left", -1), ("right", 1)):
+        buffers(spec, side, sign)
+        face = x + REACH
+        for rail, y in SIDES.items():
+            name = f"{side}_{rail}"
+            near, far = sorted((sign * face, sign * (face + 0.02)))
+            box(machine, f"{name}_pad", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384), "ink")
+            near, far = sorted((sign * (face + 0.02), sign * (face + 0.10)))
+            box(machine, f"{name}_stop", (near, y - 0.042, 0.224), (far, y + 0.042, 0.390), "graphite")
+            near, far = sorted((sign * face, sign * (face + DEEP)))
+            solid(machine, f"{name}_solid", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384))
+            hit(spec, (f"{name}_solid", f"{name}_buffer"), restitution)
+
+
+def peg(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
+    """A post on the front rail that lets a cart coming from the right get to x."""
+    machine, place, y = spec.body("machine"), x - REACH - PIN, SIDES["front"]
+    buffers(spec, "left", -1)
+    box(machine, "peg_clamp", (place - 0.045, y - 0.042, 0.224), (place + 0.020, y + 0.042, 0.300), "graphite")
+    bar(machine, "peg", ((place, y, 0.29), (place, y, 0.43)), PIN, "brass", round_ends=True)
+    hit(spec, ("peg", "left_front_buffer"), restitution)
+
+
+def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
+    """Two rubber buffers at one end of the cart."""
+    cart = spec.body("cart")
+    for rail, y in SIDES.items():
+        cart.add_geom(
+            name=f"{side}_{rail}_buffer",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=(sign * END, y, MIDDLE - RAIL),
+            size=(BUFFER, 0, 0),
+            material="ink",
+        )
+
+
+def bed(spec: mujoco.MjSpec, length: float, friction: float = FRICTION) -> None:
+    """A rough bed of half a length, m, in place of the rails, on which the block lies."""
+    for geom in [g for g in spec.geoms if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")]:
+        spec.delete(geom)
+    machine, cart = spec.body("machine"), spec.body("cart")
+    box(machine, "bed", (-length, -0.150, 0.225), (length, 0.150, LOW - 0.012), "graphite")
+    box(machine, "lining", (-length, -0.150, LOW - 0.012), (length, 0.150, LOW + SUNK), "ink")
+    cart.add_joint(name="lift", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(0, 0, 1), stiffness=0, damping=0)
+    for key in spec.keys:
+        key.qpos = [*key.qpos, 0.0]
+    spec.option.gravity = (0.0, 0.0, -GRAVITY)
+    rub(spec, ("lining", "block"), friction)

@@ -1,0 +1,1 @@
+"""What makes a mechanism real: friction, contact, drives, backlash, encoder."""

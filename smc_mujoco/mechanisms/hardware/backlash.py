@@ -1,0 +1,102 @@
+"""Backlash: play between what an actuator drives and the channel's joint, as a rotor of its own and MuJoCo's limits."""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import number
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR, Actuator, driven, driven_ids, drives
+from smc_mujoco.mechanisms.plant import LARGEST, Field
+
+SOLREF = (1e-9, 1.0)  # of its limit, s and damping ratio: less than two steps means two steps, MuJoCo's hardest
+SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # as hard, at all depths
+BRASS = (0.80, 0.62, 0.28, 1.0)
+LEAST_INERTIA = 1e-9  # kg m^2 (kg): below, the rotor is lighter than rounding
+
+
+@dataclasses.dataclass(frozen=True)
+class Backlash(Actuator):
+    """Play between a rotor, which the actuator drives, and the joint: |rotor - joint| <= gap/2.
+
+    The stops of the play are limits of MuJoCo's, as hard as it takes and critically damped: the flanks meet without
+    bounce. At first the rotor stands in the middle of the play. With no gap the rotor is rigid on the joint, and adds
+    its inertia and damping to it.
+
+    Attributes:
+      gap: rad (m), the whole play; 0 or more.
+      rotor_inertia: kg m^2 (kg) at the joint, greater than 0, without a DCMotor's own. The default is chosen: 1 % of
+        the pendulums' 0.125.
+      rotor_damping: N m s/rad (N s/m), 0 or more.
+    """
+
+    drives = False
+
+    gap: float
+    rotor_inertia: float = 1e-3
+    rotor_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, least in (("gap", 0.0), ("rotor_inertia", LEAST_INERTIA), ("rotor_damping", 0.0)):
+            value = number(f"Backlash's {name}", getattr(self, name), least=least, most=LARGEST)
+            object.__setattr__(self, name, value)
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        rigid = compiled(spec.copy())
+        pose = mujoco.MjData(rigid)
+        mujoco.mj_kinematics(rigid, pose)
+        for actuator, joint in list(zip(drives(spec), driven(spec), strict=True)):
+            _add_rotor(spec, joint, rigid, pose)
+            play = spec.add_tendon(
+                name=PLAY + joint.name, limited=True, range=(-1.0, 1.0), solref_limit=SOLREF, solimp_limit=SOLIMP
+            )
+            play.wrap_joint(ROTOR + joint.name, 1.0)
+            play.wrap_joint(joint.name, -1.0)
+            actuator.target = ROTOR + joint.name
+        for key in spec.keys:
+            if len(key.qpos) == rigid.nq:
+                start = {rigid.joint(i).name: key.qpos[rigid.jnt_qposadr[i]] for i in range(rigid.njnt)}
+                key.qpos = [start[joint.name.removeprefix(ROTOR)] for joint in spec.joints]
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        names = [model.joint(i).name for i in driven_ids(model)]
+        rotors = [model.joint(ROTOR + name).dofadr[0] for name in names]
+        yield Field("tendon_range", [model.tendon(PLAY + name).id for name in names], (-self.gap / 2, self.gap / 2))
+        yield Field("dof_armature", rotors, self.rotor_inertia, adds=True)
+        yield Field("dof_damping", rotors, self.rotor_damping)
+
+
+def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData) -> None:
+    """A body on the joint's own axis, beside the joint's body, with a pointer that tells where in the play it is."""
+    i = rigid.joint(joint.name).id
+    body = rigid.jnt_bodyid[i]
+    parent = rigid.body_parentid[body]
+    frame = pose.xmat[parent].reshape(3, 3)
+    anchor, axis = frame.T @ (pose.xanchor[i] - pose.xpos[parent]), frame.T @ pose.xaxis[i]
+    rotor = joint.parent.parent.add_body(
+        name=ROTOR + joint.name,
+        pos=anchor,
+        mass=1e-9,  # all inertia is in the joint's armature, so that it weighs nothing
+        inertia=(1e-13, 1e-13, 1e-13),
+        explicitinertial=True,
+    )
+    rotor.add_joint(name=ROTOR + joint.name, type=joint.type, axis=axis)
+    if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
+        arm = frame.T @ (pose.xipos[body] - pose.xanchor[i])
+        away = arm / max(float(np.linalg.norm(arm)), 1e-9)
+        face = axis * math.copysign(0.045, -axis[1])  # in front of the hub, towards the camera at -y
+        ends = (*face, *(face + 0.16 * away))
+    else:
+        ends = (0.0, -0.05, 0.155, 0.0, 0.05, 0.155)  # across the cart's top
+    rotor.add_geom(
+        name=ROTOR + joint.name,
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=ends,
+        size=(0.008, 0.0, 0.0),
+        rgba=BRASS,
+        contype=0,
+        conaffinity=0,
+    )

@@ -1,0 +1,215 @@
+"""Contact: what a mechanism runs into, falls on or slides over, with its friction and its restitution.
+
+A plant offers kinds of contact; each is an edit of its MjSpec that brings obstacles and explicit contact pairs, made
+with the helpers below. Two sorts of pair:
+
+- `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and dashpot that push and
+  never pull: r'' = -2 zeta w r' - w^2 r while that pushes. What leaves it at the instant the force is zero keeps
+  e = exp(-2 a cot a) of its speed, with cos a = zeta (zeta > 1: cosh instead): T. Schwager and T. Poeschel,
+  Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9, 2007. It goes sqrt(e)/w deep for
+  each m/s. e chooses zeta; w is chosen for 5 mm per m/s, 1.5 mm between bobs, whatever e is.
+- `rub:...`: sliding under a normal force, by Coulomb's law, with the elliptic cone. MuJoCo's cone pushes what slides
+  also away, with an acceleration mu b v where it sticks by b v: beyond g (1 - d) / d the block hops. So the normal is
+  soft (d = 0.01), and friction is made stiff by impratio: the force then is mu m g within 1 % up to mu v = 0.4 m/s,
+  and within 4 % up to 1 m/s. A stuck block creeps at 2.5e-7 s of the acceleration held back. Under mu g / b, 5 mm/s
+  for mu = 0.1, friction is viscous.
+
+MuJoCo's spring is one of acceleration: its stiffness is that of the mass which the blow meets. Where this mass changes
+during the blow, as between two swinging bobs that graze each other, such a spring would give more than it took; a low
+impedance makes it a spring of force.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Hashable, Iterator, Sequence
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.plant import Field, Plant
+
+HIT, RUB = "hit:", "rub:"
+DEPTH = 0.005  # m for each m/s of a blow: chosen, so that 2 m/s goes 1 cm deep, and e is met within 4 % at 0.25 ms
+# m: chosen, so that no rod of a falling chain slips through a bob. So short a blow meets e within 5 % from 0.5 on; at
+# 0.2 and 0.25 ms it keeps up to 9 % less, at 0.1 up to 12 %.
+DEPTH_OF_BOBS = 0.0015
+LIVELIEST = 0.98  # restitution: above, the steps' own error, 1e-3 of a blow's energy, could outdo what the blow loses
+DEAD = 0.01  # restitution below which the dashpot would be too stiff for a step of 1 ms; less is taken as this
+MOST_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
+# Constant impedances d: of blows against what stands still; of blows between bobs, and of sliding. 1 - d of a steady
+# load remains for the spring to carry: enough that what leans on an obstacle lies still, within 0.1 mm; at 0.99 it
+# rattles.
+FIRM, SPRINGY = 0.95, 0.01
+REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # without effect where d is constant
+SOLREF_RUB = (0.008, 1.0)  # s and damping ratio of the normal: 8 steps of 1 ms, without which the block trembles
+STICKING = 200.0  # 1/s, b: chosen; half of it creeps twice as much, twice of it makes friction waver 4 times as much
+SOLREF_SLIDE = (2.0 / (SPRINGY * STICKING), 1.0)  # s and damping ratio across the normal
+IMPRATIO = 5e3 / SPRINGY  # how much stiffer friction is than the normal
+UNTWISTED = (0.005, 0.0001, 0.0001)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
+SLIDING = slice(0, 2)  # of a pair's five friction coefficients
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact(Part):
+    """One of the contacts that a plant offers.
+
+    Attributes:
+      kind: its name, or "none".
+      friction: Coulomb's coefficient of what slides, 0 or more. None: the plant's own.
+      restitution: the speed after a blow over that before, 0 .. 0.98; less than 0.01 is taken as 0.01. None: the
+        plant's own.
+    """
+
+    kind: str
+    friction: float | None = None
+    restitution: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.kind, str):
+            raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
+        for name, most in (("friction", MOST_FRICTION), ("restitution", LIVELIEST)):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, number(f"Contact's {name}", value, least=0.0, most=most))
+
+    def check(self, plant: Plant) -> None:
+        """Whether the plant offers it, and takes the numbers that were given.
+
+        Raises:
+          ScenarioError: an unknown kind, or a number that nothing of this kind takes.
+        """
+        if self.kind != "none" and self.kind not in plant.contacts:
+            raise unknown(f"contact of {plant.name}", self.kind, ["none", *plant.contacts])
+        given = [name for name in ("friction", "restitution") if getattr(self, name) is not None]
+        for name in given:
+            if self.kind == "none" or name not in _takes(plant.build, plant.sizes[0], plant.contacts[self.kind]):
+                raise ScenarioError(f"contact {self.kind!r} of {plant.name} has no {name}: leave it out")
+
+    def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
+        """Add to the plant's mechanism the obstacles and contact pairs of this kind."""
+        if self.kind != "none":
+            plant.contacts[self.kind](spec)
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        if self.friction is not None:
+            yield Field("pair_friction", (_pairs(model, RUB), SLIDING), self.friction)
+        if self.restitution is not None:
+            bouncing = _pairs(model, HIT)
+            impedances = model.pair_solimp[bouncing, 0]
+            yield Field("pair_solref", bouncing, [solref(self.restitution, d) for d in impedances])
+
+    def structure(self) -> Hashable:
+        return type(self), self.kind
+
+
+def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
+    return [i for i in range(model.npair) if model.pair(i).name.startswith(sort)]
+
+
+@functools.cache
+def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco.MjSpec], None]) -> set[str]:
+    """Which numbers the pairs of a contact take."""
+    spec = build(n)
+    edit(spec)
+    sorts = {pair.name.partition(":")[0] + ":" for pair in spec.pairs}
+    return {name for name, sort in (("friction", RUB), ("restitution", HIT)) if sort in sorts}
+
+
+def damping_ratio(restitution: float) -> float:
+    """zeta of the spring and dashpot that give a restitution, 0.01 .. 1."""
+    aim = -0.5 * math.log(max(restitution, DEAD))  # of zeta a / sin a, which grows with zeta: 0 at 0, 1 at 1
+    low, high = 0.0, 1.0 + aim
+    high *= high
+    while high - low > 1e-12 * high:
+        zeta = 0.5 * (low + high)
+        low, high = (zeta, high) if _loss(zeta) < aim else (low, zeta)
+    return 0.5 * (low + high)
+
+
+def _loss(zeta: float) -> float:
+    """-ln(e) / 2 of a damping ratio."""
+    if abs(zeta - 1.0) < 1e-6:
+        return 1.0 + 2.0 / 3.0 * (zeta - 1.0)
+    if zeta < 1.0:
+        return zeta * math.acos(zeta) / math.sqrt(1.0 - zeta * zeta)
+    return zeta * math.acosh(zeta) / math.sqrt(zeta * zeta - 1.0)
+
+
+def solref(restitution: float, impedance: float) -> tuple[float, float]:
+    """MuJoCo's time constant in s, and damping ratio, of a restitution between bodies that move along a line.
+
+    In a = a0 + A f, A the inverse mass that the blow meets, MuJoCo makes f = (aref - a0) / (A + R), R = A' (1 - d) / d
+    and A' its own guess of A, the mean over three directions: A / 3. Spring and dashpot act by A / (d A + (1 - d) A').
+    """
+    e = max(restitution, DEAD)
+    zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
+    share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
+    depth = DEPTH_OF_BOBS if impedance == SPRINGY else DEPTH
+    return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
+
+
+# for plants: pairs and obstacles
+
+
+def hit(spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False) -> None:
+    """Let two geoms hit each other, without friction."""
+    impedance = SPRINGY if both_move else FIRM
+    _pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
+
+
+def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
+    """Let two geoms slide on each other under a normal force."""
+    _pair(spec, RUB, geoms, SOLREF_RUB, SPRINGY, friction)
+
+
+def _pair(
+    spec: mujoco.MjSpec,
+    sort: str,
+    geoms: tuple[str, str],
+    normal: tuple[float, float],
+    impedance: float,
+    friction: float,
+) -> None:
+    spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+    if sort == RUB:
+        spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
+    spec.add_pair(
+        name=f"{sort}{geoms[0]}:{geoms[1]}",
+        geomname1=geoms[0],
+        geomname2=geoms[1],
+        condim=3 if sort == RUB else 1,
+        friction=(friction, friction, *UNTWISTED),
+        solref=normal,
+        solreffriction=SOLREF_SLIDE,
+        solimp=(impedance, impedance, *REST_OF_SOLIMP),
+    )
+
+
+def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
+    """A box that is felt and not seen: what lies behind a face, deep enough that no blow goes through."""
+    block = box(body, name, low, high, "ink")
+    block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
+
+
+def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:
+    """A box between two corners, m in the body's frame."""
+    a, b = np.array(low, float), np.array(high, float)
+    return body.add_geom(
+        name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=(a + b) / 2, size=(b - a) / 2, material=material
+    )
+
+
+def bar(
+    body: mujoco.MjsBody,
+    name: str,
+    ends: tuple[Sequence[float], Sequence[float]],
+    radius: float,
+    material: str,
+    round_ends: bool = False,
+) -> mujoco.MjsGeom:
+    """A round bar between two points, m in the body's frame."""
+    kind = mujoco.mjtGeom.mjGEOM_CAPSULE if round_ends else mujoco.mjtGeom.mjGEOM_CYLINDER
+    return body.add_geom(name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material)

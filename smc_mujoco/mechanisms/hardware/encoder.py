@@ -1,0 +1,110 @@
+"""Sensors: an encoder between the mechanism and the controller.
+
+Of a channel's position x the controller reads, j counting the readings,
+
+    x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
+
+every `period`, each `delay` later; a reading that gets lost leaves the one before it in place. MuJoCo's sensors do the
+period and the delay; what a lost reading and the rounding do to the control is the controller's side of the wire, and
+the callback's. An encoder gives no velocity: without another choice the controller differentiates what it reads.
+"""
+
+import dataclasses
+import math
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, whole
+from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
+from smc_mujoco.mechanisms.plant import Field
+
+# Of a physics step, by which readings are due and taken early: MuJoCo compares sums of steps, which drift by rounding.
+EARLY = 0.5
+MOST_READINGS = 100_000  # under way at once: chosen, 6 MB a channel
+
+
+@dataclasses.dataclass(frozen=True)
+class Encoder(Part):
+    """A position encoder on every channel.
+
+    Attributes:
+      counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
+      bias: rad or m, added to every reading: the error of its zero.
+      dropout: probability that a reading gets lost, 0 .. 1; the first arrives.
+      period: s between readings, a whole number of physics steps; None: one at every control sample.
+      delay: s until a reading arrives, a whole number of physics steps. Before the first arrives it reads x0.
+
+    With the velocity estimator "measured" there is a tachometer beside it, read, delayed and lost with it.
+    """
+
+    counts: float = 4096
+    bias: float = 0.0
+    dropout: float = 0.0
+    period: float | None = None
+    delay: float = 0.0
+
+    def __post_init__(self):
+        if not (isinstance(self.counts, float) and self.counts == math.inf):
+            object.__setattr__(self, "counts", whole("Encoder's counts", self.counts, 2, 2**32))
+        object.__setattr__(self, "bias", number("Encoder's bias", self.bias))
+        object.__setattr__(self, "dropout", number("Encoder's dropout", self.dropout, least=0.0, most=1.0))
+        if self.period is not None:
+            object.__setattr__(self, "period", number("Encoder's period", self.period, above=0.0))
+        object.__setattr__(self, "delay", number("Encoder's delay", self.delay, least=0.0))
+
+    def quantum(self, hinge: bool) -> float:
+        """One count in rad of a hinge, or m of a slide; 0 without quantisation."""
+        return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
+
+    def readings(self, step: float) -> int:
+        """How many readings MuJoCo must remember, with one a physics step of `step` s; 0 where none is late."""
+        if not self.delay and not self.period:
+            return 0
+        return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
+
+    def check(self, step: float) -> None:
+        """Raise ScenarioError for times that are no whole number of physics steps, or too many to remember."""
+        number("step", step, above=0.0)
+        if self.delay / (self.period or step) > MOST_READINGS:
+            raise ScenarioError(
+                f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"
+            )
+        for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
+            if abs(time / step - round(time / step)) > 1e-6 or 0.0 < time < 0.5 * step:
+                raise ScenarioError(
+                    f"Encoder's {name} {time:g} s is no whole number of physics steps of {step:g} s: "
+                    "give a physics_step that divides it"
+                )
+
+    def fields(self, model):
+        """Delay and period of every channel's two sensors."""
+        if model.nhistory:
+            at = sensor_ids(model)
+            yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
+            yield Field("sensor_interval", (at, 0), self.period or 0.0)
+
+
+def buffer(spec: mujoco.MjSpec, readings: int) -> None:
+    """Give every position and velocity sensor a history of so many readings."""
+    for sensor in spec.sensors:
+        sensor.nsample = readings
+
+
+def sensor_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The channels' position and velocity sensors, (2n,)."""
+    kinds = np.isin(model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL])
+    return np.flatnonzero(kinds & np.isin(model.sensor_objid, joint_ids(model)))
+
+
+def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Fill the histories with what the sensors read now, so that a late sensor starts at the initial state."""
+    for sensor in sensor_ids(model):
+        count = int(model.sensor_history[sensor, 0])
+        gap = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
+        joint, position = model.sensor_objid[sensor], mujoco.mjtSensor.mjSENS_JOINTPOS
+        value = data.qpos[model.jnt_qposadr[joint]]
+        if model.sensor_type[sensor] != position:
+            value = data.qvel[model.jnt_dofadr[joint]]
+        times, values = gap * np.arange(-count, 0.0), np.full((count, 1), value)
+        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -gap - EARLY * model.opt.timestep)

@@ -1,0 +1,103 @@
+"""Parts: what makes a mechanism realistic, as edits of its model and numbers in its fields.
+
+A part is frozen data. `edit` adds to an MjSpec what it is made of - a rotor, a stop, an actuator that is a friction -
+and `fields` says which fields of the compiled model its numbers set, so that simulations with other numbers share one
+model in a Batch. What the parts do in motion, MuJoCo does.
+
+Names that parts go by: an actuator `passive:<joint>` belongs to a part and takes no command; `rotor:<joint>` is the
+joint that a channel's actuator drives where that is not the channel's own.
+"""
+
+import dataclasses
+from collections.abc import Hashable, Iterator
+from typing import ClassVar
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.mechanisms.plant import Field
+
+PASSIVE, ROTOR = "passive:", "rotor:"
+PLAY = "play:"  # the tendon of length rotor - joint
+START = "smc:start"  # a keyframe in which the joints without a channel start
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Base of all parts."""
+
+    stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Add to a mechanism, once for every channel, what the part is made of."""
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        """The fields of the edited, compiled model that the part's numbers set."""
+        del model
+        yield from ()
+
+    def structure(self) -> Hashable:
+        """What simulations must have in common to share a model: equal where `edit` does the same."""
+        return type(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class Friction(Part):
+    """Base of frictions: what resists a channel's joint, beside the plant's own damping."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Actuator(Part):
+    """Base of actuators: what stands between a command u, the force asked of the joint, and the joint."""
+
+    drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after what does
+
+    @property
+    def scale(self) -> float:
+        """What the model's actuator takes per unit of u."""
+        return 1.0
+
+    @property
+    def delay(self) -> float:
+        """The time constant in s with which the force follows a held u; 0: at once."""
+        return 0.0
+
+
+def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
+    """The actuators that take commands, one a channel that is driven."""
+    return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
+
+
+def driven(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+    """The joints of the channels that have an actuator, in the order of `drives`."""
+    return [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
+
+
+def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
+    """The channels' joints: the driven ones, and after them those that are only measured."""
+    names = [joint.name for joint in driven(spec)]
+    measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
+    return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
+
+
+def drive_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The actuators that take commands."""
+    return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
+
+
+def driven_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The joints of the channels that have an actuator."""
+    names = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
+    return np.array([model.joint(name.removeprefix(ROTOR)).id for name in names], int)
+
+
+def joint_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The channels' joints, (n,): the driven ones, and after them those that are only measured."""
+    found = driven_ids(model)
+    measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
+    return np.array([*found, *(joint for joint in measured if joint not in found)], int)
+
+
+def dof_ids(model: mujoco.MjModel) -> np.ndarray:
+    """The channels' degrees of freedom, (n,)."""
+    return model.jnt_dofadr[joint_ids(model)]

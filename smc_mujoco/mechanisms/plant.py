@@ -1,0 +1,248 @@
+"""A plant: a MuJoCo mechanism, its equation x'' = f(x, v) + g u, and the map between them.
+
+A plant file states the mechanism's parameters once, in three readings that tests hold together:
+the MJCF beside it (what MuJoCo simulates), `fields` (which model fields a parameter sets) and
+`nominal` (the f and g that a model-based law believes). A channel is one actuated degree of
+freedom: its actuator, its two sensors and its body are read off the compiled model.
+"""
+
+import abc
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Protocol
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.files import shipped
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.registry import modules
+
+DIRECTLY = "smc:direct"  # a text in the MJCF of own models: disturbances act on their joints, not on bodies
+EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
+LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
+
+Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
+
+
+class Field(NamedTuple):
+    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option), or += where it adds."""
+
+    name: str
+    at: Any
+    value: Any
+    adds: bool = False  # to what the fields before it have written
+
+
+class Variant(NamedTuple):
+    """Another build of a plant's mechanism: an edit of its MjSpec, and the fields its parameters then set."""
+
+    edit: Callable[[mujoco.MjSpec], None]
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
+
+
+class Nominal(Protocol):
+    """f and g of channel i from all channels' x and v, (n,) each; p: the nominal parameters."""
+
+    def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
+
+
+class Native(NamedTuple):
+    """A nominal model as a C function; what lies at the addresses among its values is kept alive."""
+
+    address: int
+    values: tuple[float, ...]
+    kept: tuple
+
+
+class Coupled(abc.ABC):
+    """Base of nominal models that come compiled, and in which what the other channels were told last counts too."""
+
+    @abc.abstractmethod
+    def __call__(
+        self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
+    ) -> tuple[float, float]:
+        """As Nominal, with the last commands u, (n,), of which that of channel i does not count; None: 0."""
+
+    @abc.abstractmethod
+    def native(self, parameters: Mapping[str, float]) -> Native:
+        """The same for the compiled path, for one simulation."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Plant:
+    """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d).
+
+    Attributes:
+      name: as in `smc.plants()`.
+      parameters: name -> value, SI units; the nominal ones, which laws may know.
+      mass: which parameter the name `mass` stands for in a mismatch or a jump.
+      unit: unit of x, "rad" or "m"; of its first channel where they differ.
+      mixed: units of all channels where they differ, (n,), else (); `units` has them in either case.
+      x0: initial positions of the paper study, (n,), recycled when n is larger.
+      n: number of channels.
+      sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
+      build: n -> MjSpec of the ideal mechanism with the default parameters.
+      fields: (model, parameters) -> the model fields which the parameters set.
+      nominal: the plant's own f and g.
+      lane: offset in metres between machines that stand side by side in a film, (3,).
+      contacts: kind of contact -> the edit of the MjSpec that brings its obstacles and contact pairs.
+      mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
+      underactuated: whether channels without an actuator come after those with one.
+      placed: parameter -> the value for which the obstacles of its contacts stand.
+      direct: whether disturbances act on its joints themselves, and not on the bodies that they carry.
+      smooth: whether its equation is without limits, contacts and dry friction of its own.
+      unmodelled: why there is no nominal model, or "".
+      limits: what the motors of the driven channels give at most, N m or N each; empty: no limits of their own.
+      ranges: joint, least and largest position of each channel, rad or m; empty: none has limits of its own.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    mass: str
+    unit: str
+    x0: tuple[float, ...]
+    n: int = 1
+    sizes: tuple[int, int] = (1, 1)
+    build: Callable[[int], mujoco.MjSpec]
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
+    nominal: Nominal
+    lane: tuple[float, float, float]
+    contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
+    mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
+    mixed: tuple[str, ...] = ()
+    underactuated: bool = False
+    placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    direct: bool = False
+    smooth: bool = True
+    unmodelled: str = ""
+    limits: tuple[float, ...] = ()
+    ranges: tuple[tuple[str, float, float], ...] = ()
+
+    def __post_init__(self):
+        for name in ("parameters", "contacts", "mechanisms", "placed"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        values = [f"{name}={value:g}" for name, value in self.parameters.items()]
+        return f"plant({', '.join([repr(self.name), *([f'n={self.n}'] if self.n > 1 else []), *values])})"
+
+    @property
+    def positive(self) -> frozenset[str]:
+        """Parameters without which there is no mechanism."""
+        return frozenset({self.mass, "M", "m", "l"}) & frozenset(self.parameters)
+
+    @property
+    def driven(self) -> int:
+        """How many channels have an actuator: the first ones. Each has at most one joint that moves with it."""
+        return self.n // 2 if self.underactuated else self.n
+
+    @property
+    def free(self) -> int:
+        """How many channels are joints that are only measured: the last ones."""
+        return self.n - self.driven
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of x of each channel, (n,)."""
+        return self.mixed or (self.unit,) * self.n
+
+    @property
+    def network(self) -> bool:
+        """Whether several channels have an actuator, and one unit: then they can be compared with each other."""
+        return self.driven > 1 and len(set(self.units[: self.driven])) == 1
+
+    def spec(self) -> mujoco.MjSpec:
+        """The mechanism as an editable MjSpec, with default parameters."""
+        return self.build(self.n)
+
+    def load(self, factors: Mapping[str, float] | None = None, nuserdata: int = 0) -> mujoco.MjModel:
+        """The compiled ideal plant.
+
+        Args:
+          factors: parameter name -> factor on its value (the true plant's mismatch).
+          nuserdata: length of mjData.userdata.
+        """
+        model = ready(self.spec(), nuserdata)
+        write(model, self.fields(model, self.values(factors or {})))
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model
+
+    def values(self, factors: Mapping[str, float]) -> Values:
+        """The parameters, each times its factor; `mass` stands for the plant's mass."""
+        values = dict(self.parameters)
+        for key, factor in factors.items():
+            name = self.mass if key == "mass" else key
+            if name not in values:
+                raise unknown(f"parameter of {self.name}", key, [*values, "mass"])
+            if factor <= 0.0 and name in self.positive:
+                raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
+            values[name] *= factor
+        for name, value in values.items():
+            if not math.isfinite(value) or (value <= 0.0 and name in self.positive):
+                raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
+        return Values(**values)
+
+
+def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
+    """The compiled model of a spec, for runs with userdata of that length."""
+    spec.nuserdata = nuserdata
+    # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+    return compiled(spec)
+
+
+def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
+    """Write fields into a model."""
+    for name, at, value, adds in fields:
+        held = array(model, name)
+        held[at] = held[at] + value if adds else value
+
+
+def array(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The array of a model or option field that a Field names."""
+    owner = model.opt if name.startswith("opt.") else model
+    return getattr(owner, name.removeprefix("opt."))
+
+
+def model_path(name: str) -> Path:
+    """The MJCF file models/<name>."""
+    return shipped("models") / name
+
+
+@functools.cache
+def catalogue() -> dict[str, Plant]:
+    """Every plant found in smc_mujoco.mechanisms.plants, by name."""
+    found: list[Plant] = []
+    for module in modules("smc_mujoco.mechanisms.plants"):
+        found += [value for value in vars(module).values() if isinstance(value, Plant)]
+    return {p.name: p for p in sorted(found, key=lambda p: p.name)}
+
+
+def plant(name: str, **parameters: float) -> Plant:
+    """The plant `name`, with some of its parameters (or its size n) changed.
+
+    Raises:
+      ScenarioError: unknown name, or a parameter out of its range.
+    """
+    base = find("plant", name, catalogue())
+    n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
+    values = dict(base.parameters)
+    for key, value in parameters.items():
+        if key not in values:
+            raise unknown(f"parameter of {name}", key, [*values, "n"])
+        above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -LARGEST)
+        values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=LARGEST)
+    x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
+    return dataclasses.replace(base, parameters=values, n=n, x0=x0)
+
+
+def plants() -> list[str]:
+    """Names that `plant` knows."""
+    return list(catalogue())

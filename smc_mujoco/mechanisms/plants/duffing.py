@@ -1,0 +1,112 @@
+"""Duffing oscillator: M x'' = -delta x' - alpha x - beta x^3 + u + d  (alpha < 0: two wells).
+
+The joint's polynomial spring is the restoring force, exactly. Wells at +-sqrt(-alpha/beta).
+Source: G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918. Numbers: chosen for the
+paper study, so that the wells lie at +-1 m.
+
+Mechanism `springs`: two springs k of rest length L from the cart to anchors a to either side, V = k (sqrt(x^2 + a^2) -
+L)^2, which snaps through. L^2 = a^2 - alpha/beta and k = beta L^2 give the wells their place and their stiffness
+-2 alpha; the hill between them is 19 % too high for a = 1.5 m.
+"""
+
+import mujoco
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.geometry import cart, coil
+from smc_mujoco.mechanisms.hardware.contact import bar
+from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
+
+ASIDE = 1.5  # m, a: chosen, so that the springs are seen and the wells' shape is nearly the equation's
+HEIGHT = 0.45  # m, the springs above the floor: over the block and the landscape
+STOPS, POST = 1.7, 0.5  # m, where the cart stops: chosen, outside x0 and between x0 and 0
+HALF = 2.07  # m, half the rail between its posts
+
+
+def build(n):
+    return mujoco.MjSpec.from_file(str(model_path("duffing.xml")))
+
+
+def fields(model, p):
+    joint = model.joint("slide").id
+    yield from body_fields(model, p)
+    yield Field("jnt_stiffness", joint, p.alpha)
+    yield Field("jnt_stiffnesspoly", joint, (0.0, p.beta))
+
+
+def body_fields(model, p):
+    body = model.body("cart")
+    yield Field("body_mass", body.id, p.M)
+    yield Field("dof_M0", model.dof_bodyid == body.id, p.M)  # MuJoCo reads a lone slide's inertia here
+    yield Field("dof_damping", model.joint("slide").dofadr[0], p.delta)
+
+
+def nominal(x, v, i, p):
+    return (-p.delta * v[i] - p.alpha * x[i] - p.beta * x[i] ** 3) / p.M, 1.0 / p.M
+
+
+def on_floor(spec):
+    cart.bed(spec, HALF)
+    stops(spec)
+
+
+def stops(spec):
+    cart.stops(spec, STOPS)
+
+
+def peg(spec):
+    cart.peg(spec, POST)
+
+
+def add_springs(spec):
+    machine, body = spec.body("machine"), spec.body("cart")
+    joint, up = spec.joint("slide"), HEIGHT - body.pos[2]
+    joint.stiffness = [0.0, 0.0, 0.0]
+    bar(body, "spring_post", ((0, 0, 0.13), (0, 0, up + 0.03)), 0.022, "steel")
+    body.add_site(name="snap", pos=(0, 0, up), group=5, rgba=(0, 0, 0, 0))
+    for side, y in (("front", -ASIDE), ("back", ASIDE)):
+        bar(machine, f"{side}_anchor_foot", ((0, y, 0), (0, y, 0.028)), 0.13, "graphite")
+        bar(machine, f"{side}_anchor", ((0, y, 0.028), (0, y, HEIGHT + 0.03)), 0.028, "graphite")
+        machine.add_site(name=f"{side}_anchor", pos=(0, y, HEIGHT), group=5, rgba=(0, 0, 0, 0))
+        spring = spec.add_tendon(name=f"{side}_spring", group=5, rgba=(0, 0, 0, 0))
+        spring.wrap_site(f"{side}_anchor")
+        spring.wrap_site("snap")
+        coil.draw(
+            spec,
+            f"{side}_coil",
+            start=("machine", (0, 0, 0), (0, y, HEIGHT)),
+            end=("cart", body.pos, (0, 0, HEIGHT)),
+            radius=0.04,
+            turns=24,
+            wire=0.008,
+            material="brass",
+        )
+
+
+def spring_fields(model, p):
+    rest = ASIDE**2 - p.alpha / p.beta if p.beta > 0.0 else 0.0
+    if rest <= 0.0:
+        asked = f"alpha {p.alpha:g} with beta {p.beta:g}"
+        raise ScenarioError(f"duffing has no springs for {asked}: give beta > 0 and alpha < {ASIDE**2:g} beta")
+    springs = [model.tendon("front_spring").id, model.tendon("back_spring").id]
+    yield from body_fields(model, p)
+    yield Field("tendon_stiffness", springs, p.beta * rest)
+    yield Field("tendon_lengthspring", springs, rest**0.5)
+
+
+DUFFING = Plant(
+    name="duffing",
+    parameters={"M": 1.0, "delta": 0.2, "alpha": -1.0, "beta": 1.0},  # kg, N s/m, N/m, N/m^3
+    mass="M",
+    unit="m",
+    x0=(1.5,),
+    build=build,
+    fields=fields,
+    nominal=nominal,
+    lane=(0.0, 1.0, 0.0),
+    contacts={
+        "floor": on_floor,
+        "stops": stops,
+        "peg": peg,
+    },
+    mechanisms={"springs": Variant(add_springs, spring_fields)},
+)

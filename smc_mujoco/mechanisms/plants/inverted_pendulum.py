@@ -1,0 +1,112 @@
+"""Inverted pendulum: m l^2 x'' = m grav l sin x - b x' + u + d, x the angle from upright.
+
+A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear Systems, 2002,
+section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
+
+Contacts, placed for l = 0.5 m: the `floor` that a failed pendulum falls on, padded `stops`, a hard `wall` on the right,
+and a `peg` on the dial that the rod meets on its way up from the right.
+"""
+
+from math import asin, cos, sin
+
+import mujoco
+
+from smc_mujoco.mechanisms.hardware.contact import bar, box, hit, solid
+from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+
+DEEP = 0.4  # m, stops and wall behind their faces: no blow of 80 m/s goes through
+L, BOB, ROD, AXLE = 0.5, 0.065, 0.012, 0.8  # m: the pendulum's length, radii of bob and rod, height of the hinge
+
+FALLEN, FALL = 2.44, 0.3  # rad (140 degrees) where the bob lies, and the restitution of the floor, chosen
+STOP, PAD = 1.0, 0.4  # rad, and the restitution of its rubber, chosen
+WALL, CLANG = 0.7, 0.8  # rad, and the restitution of a hard wall, chosen
+PEG, PEG_AT, PIN, CLICK = 0.2, 0.30, 0.020, 0.4  # rad; m from the hinge; m, radius; restitution, chosen
+
+
+def build(n):
+    return mujoco.MjSpec.from_file(str(model_path("inverted_pendulum.xml")))
+
+
+def fields(model, p):
+    body = model.body("pendulum").id
+    yield Field("body_mass", body, p.m)
+    yield Field("body_ipos", body, (0.0, 0.0, p.l))
+    yield Field("dof_damping", model.joint("hinge").dofadr[0], p.b)
+    yield Field("opt.gravity", 2, -p.grav)
+    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, p.l / 2))
+    yield Field("geom_size", (model.geom("rod").id, 1), p.l / 2)
+    yield Field("geom_pos", model.geom("bob").id, (0.0, 0.0, p.l))
+
+
+def nominal(x, v, i, p):
+    inertia = p.m * p.l**2
+    return (p.m * p.grav * p.l * sin(x[i]) - p.b * v[i]) / inertia, 1.0 / inertia
+
+
+def on_floor(spec):
+    """The machine lower, so that the bob reaches the floor."""
+    machine, down = spec.body("machine"), AXLE + L * cos(FALLEN) - BOB
+    machine.pos = (0.0, 0.0, -down)
+    for name in ("foot", "step"):
+        spec.geom(name).pos[2] += down
+    column = spec.geom("column")
+    bottom, top = 0.03 + down, column.pos[2] + column.size[1]
+    column.pos[2], column.size[1] = (bottom + top) / 2, (top - bottom) / 2
+    spec.stat.center[2] -= down
+    hit(spec, ("floor", "bob"), FALL)
+
+
+def stops(spec):
+    machine = spec.body("machine")
+    outer = asin(0.110 / L)  # rad, from where the bob is stopped to the arm that holds the pad
+    for side, sign in (("left", -1), ("right", 1)):
+        stop = machine.add_body(name=f"{side}_stop", pos=(0, 0, AXLE), quat=turned(sign * STOP))
+        face = sorted((sign * BOB, sign * (BOB + 0.022)))
+        plate = sorted((sign * (BOB + 0.022), sign * (BOB + 0.032)))
+        box(stop, f"{side}_pad", (face[0], -0.045, L - 0.045), (face[1], 0.045, L + 0.045), "ink")
+        box(stop, f"{side}_plate", (plate[0], -0.055, L - 0.055), (plate[1], 0.055, L + 0.055), "steel")
+        bar(stop, f"{side}_finger", ((sign * 0.110, -0.02, L), (sign * 0.110, 0.12, L)), 0.018, "steel")
+        arm = machine.add_body(name=f"{side}_arm", pos=(0, 0, AXLE), quat=turned(sign * (STOP + outer)))
+        box(arm, f"{side}_beam", (-0.018, 0.080, 0.0), (0.018, 0.110, L + 0.04), "graphite")
+        deep = sorted((sign * BOB, sign * (BOB + DEEP)))
+        solid(stop, f"{side}_solid", (deep[0], -0.045, L - 0.20), (deep[1], 0.045, L + 0.10))
+        hit(spec, (f"{side}_solid", "bob"), PAD)
+
+
+def wall(spec):
+    machine, face = spec.body("machine"), L * sin(WALL) + BOB
+    box(machine, "wall_foot", (face - 0.02, -0.20, 0.0), (face + 0.16, 0.20, 0.028), "graphite")
+    box(machine, "wall", (face, -0.15, 0.0), (face + 0.05, 0.15, 1.36), "ivory")
+    for y in (-0.11, 0.11):
+        edge = "front" if y < 0 else "back"
+        box(machine, f"wall_{edge}_rib", (face + 0.05, y - 0.02, 0.0), (face + 0.09, y + 0.02, 1.30), "graphite")
+    solid(machine, "wall_solid", (face, -0.15, 0.0), (face + DEEP, 0.15, 1.36))
+    hit(spec, ("wall_solid", "bob"), CLANG)
+
+
+def peg(spec):
+    machine, angle = spec.body("machine"), PEG - asin((ROD + PIN) / PEG_AT)
+    x, z = PEG_AT * sin(angle), AXLE + PEG_AT * cos(angle)
+    bar(machine, "peg", ((x, 0.045, z), (x, -0.055, z)), PIN, "brass", round_ends=True)
+    bar(machine, "peg_collar", ((x, 0.045, z), (x, 0.028, z)), 0.032, "graphite")
+    hit(spec, ("peg", "rod"), CLICK)
+
+
+def turned(angle):
+    """The quaternion that turns up towards x by an angle, rad."""
+    return cos(angle / 2), 0.0, sin(angle / 2), 0.0
+
+
+INVERTED_PENDULUM = Plant(
+    name="inverted_pendulum",
+    parameters={"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81},  # kg, m, N m s/rad, m/s^2
+    mass="m",
+    unit="rad",
+    x0=(0.5,),
+    build=build,
+    fields=fields,
+    nominal=nominal,
+    lane=(1.3, 0.0, 0.0),
+    contacts={"floor": on_floor, "stops": stops, "wall": wall, "peg": peg},
+    placed={"l": L},
+)

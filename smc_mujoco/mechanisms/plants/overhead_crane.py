@@ -1,0 +1,73 @@
+"""Overhead crane: a load that hangs from a trolley, which u pushes: two joints, one force.
+
+    (M + m) x'' - m l cos(q) q'' + m l sin(q) q'^2 = u + d - b x'
+    -m l cos(q) x'' + m l^2 q'' + m grav l sin(q) = -bq q'
+
+Channel 0 is the trolley's place x in m. Channel 1, which is only measured, is the angle q in rad of the rope from
+hanging; it turns as cart_pole's does, so that q > 0 puts the load to the left of the trolley, at x - l sin(q). The rope
+is a massless rod and the load a point. b and bq, the viscous friction of rail and hinge, are 0.
+Source: Y. Fang, W. E. Dixon, D. M. Dawson and E. Zergeroglu, Nonlinear coupling control laws for an underactuated
+overhead crane system, IEEE/ASME Trans. Mechatronics 8(3):418, 2003: its equation in a plane, and numbers of the size of
+its testbed.
+"""
+
+from math import cos, sin
+
+import mujoco
+
+from smc_mujoco.mechanisms.geometry import cart
+from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+
+HOOK = 0.095  # m, the hook above the load's middle
+STOPS = 1.7  # m, where the trolley stops: chosen, short of the bridge's ends
+
+
+def build(n):
+    return mujoco.MjSpec.from_file(str(model_path("overhead_crane.xml")))
+
+
+def fields(model, p):
+    load = model.body("load").id
+    yield Field("body_mass", model.body("cart").id, p.M)
+    yield Field("body_mass", load, p.m)
+    yield Field("body_ipos", load, (0.0, 0.0, -p.l))
+    yield Field("dof_damping", model.joint("slide").dofadr[0], p.b)
+    yield Field("dof_damping", model.joint("hinge").dofadr[0], p.bq)
+    yield Field("opt.gravity", 2, -p.grav)
+    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, -p.l / 2))
+    yield Field("geom_size", (model.geom("rod").id, 1), p.l / 2)
+    yield Field("geom_pos", model.geom("bob").id, (0.0, 0.0, -p.l))
+    yield Field("geom_pos", model.geom("hook").id, (0.0, 0.0, HOOK - p.l))
+
+
+def nominal(x, v, i, p):
+    lever, inertia = -p.m * p.l * cos(x[1]), p.m * p.l * p.l
+    whole = (p.M + p.m) * inertia - lever * lever
+    along = -p.m * p.l * sin(x[1]) * v[1] * v[1] - p.b * v[0]
+    about = -p.m * p.grav * p.l * sin(x[1]) - p.bq * v[1]
+    if i == 0:
+        return (inertia * along - lever * about) / whole, inertia / whole
+    return ((p.M + p.m) * about - lever * along) / whole, -lever / whole
+
+
+def stops(spec):
+    cart.stops(spec, STOPS)
+
+
+OVERHEAD_CRANE = Plant(
+    name="overhead_crane",
+    # kg, kg, m, N s/m, N m s/rad, m/s^2
+    parameters={"M": 1.06, "m": 0.73, "l": 0.7, "b": 0.0, "bq": 0.0, "grav": 9.81},
+    mass="m",
+    unit="m",
+    mixed=("m", "rad"),
+    x0=(1.0, 0.0),
+    n=2,
+    sizes=(2, 2),
+    build=build,
+    fields=fields,
+    nominal=nominal,
+    lane=(0.0, 1.0, 0.0),
+    contacts={"stops": stops},
+    underactuated=True,
+)

@@ -1,0 +1,129 @@
+"""Van der Pol oscillator: M x'' = mu (1 - x^2) x' - k x + u + d  (a limit cycle of amplitude 2 m).
+
+The joint gives -k x + mu x', a damper across the rail gives -mu x^2 x' to 4e-12: see models/van_der_pol.xml.
+Source: B. van der Pol, On relaxation-oscillations, 1926. Numbers: chosen for the paper study.
+
+Mechanism `springs`: two springs k/2 along the rail, a motor in the cart that pushes by +mu x', and a damper c to an
+anchor h to the side, which takes c x^2/(x^2 + h^2) x'. c = mu (1 + h^2) puts the change of sign at |x| = 1; further
+out the damper is weaker than mu x^2, by 23 % of it at 2 m for h = 3 m, and the limit cycle reaches 2.12 m.
+"""
+
+import mujoco
+
+from smc_mujoco.mechanisms.geometry import cart, coil
+from smc_mujoco.mechanisms.hardware.contact import bar
+from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
+
+ASIDE = 3.0  # m, h: chosen, so that the limit cycle stays inside the stops
+HEIGHT = 0.45  # m, the damper above the floor: over the block
+ENDS, EDGE = 2.57, 0.175  # m, where the springs' ends are on the posts and on the cart
+RELAXED = 0.35  # m, their rest length: chosen, so that both pull while |x| < 2.045 m
+SPRINGS = (("left_spring", -1), ("right_spring", 1))
+STOPS, POST = 2.2, 0.5  # m, where the cart stops: chosen, outside the limit cycle and between x0 and 0
+
+
+def build(n):
+    spec = mujoco.MjSpec.from_file(str(model_path("van_der_pol.xml")))
+    draw_springs(spec, spec.body("cart").pos[2], 0.05)
+    return spec
+
+
+def draw_springs(spec, height, radius):
+    for name, side in SPRINGS:
+        coil.draw(
+            spec,
+            name,
+            start=("machine", (0, 0, 0), (side * ENDS, 0, height)),
+            end=("cart", (0, 0, cart.RAIL), (side * EDGE, 0, height)),
+            radius=radius,
+            turns=20,
+            wire=0.010,
+            material="brass",
+        )
+
+
+def fields(model, p):
+    far = model.site("far")
+    yield from body_fields(model, p)
+    yield Field("jnt_stiffness", model.joint("slide").id, p.k)
+    yield Field("dof_damping", model.joint("slide").dofadr[0], -p.mu)
+    yield Field("tendon_damping", model.tendon("across").id, p.mu * model.site_pos[far.id, 1] ** 2)
+
+
+def body_fields(model, p):
+    body = model.body("cart")
+    yield Field("body_mass", body.id, p.M)
+    yield Field("dof_M0", model.dof_bodyid == body.id, p.M)  # MuJoCo reads a lone slide's inertia here
+
+
+def nominal(x, v, i, p):
+    return (p.mu * (1.0 - x[i] ** 2) * v[i] - p.k * x[i]) / p.M, 1.0 / p.M
+
+
+def on_floor(spec):
+    cart.bed(spec, ENDS)
+    for name, _ in SPRINGS:
+        spec.delete(next(skin for skin in spec.skins if skin.name == name))
+    draw_springs(spec, cart.MIDDLE, 0.040)
+    stops(spec)
+
+
+def stops(spec):
+    cart.stops(spec, STOPS)
+
+
+def peg(spec):
+    cart.peg(spec, POST)
+
+
+def add_springs(spec):
+    machine, body, joint = spec.body("machine"), spec.body("cart"), spec.joint("slide")
+    joint.stiffness, joint.damping = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    for name, side in SPRINGS:
+        machine.add_site(name=f"{name}_post", pos=(side * ENDS, 0, cart.RAIL), group=5, rgba=(0, 0, 0, 0))
+        body.add_site(name=f"{name}_cart", pos=(side * EDGE, 0, 0), group=5, rgba=(0, 0, 0, 0))
+        spring = spec.add_tendon(name=name, springlength=(RELAXED, RELAXED), group=5, rgba=(0, 0, 0, 0))
+        spring.wrap_site(f"{name}_post")
+        spring.wrap_site(f"{name}_cart")
+    spec.site("far").pos, spec.site("near").pos = (0, ASIDE, HEIGHT), (0, 0, HEIGHT - cart.RAIL)
+    motor = spec.add_actuator(
+        name="passive:active_damper",
+        target="slide",
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    motor.gainprm[0] = 0.0  # takes no command
+    bar(body, "damper_post", ((0, 0, 0.13), (0, 0, HEIGHT - cart.RAIL + 0.03)), 0.022, "steel")
+    bar(machine, "damper_foot", ((0, ASIDE, 0), (0, ASIDE, 0.028)), 0.13, "graphite")
+    bar(machine, "damper_anchor", ((0, ASIDE, 0.028), (0, ASIDE, HEIGHT + 0.03)), 0.028, "graphite")
+    ends = ("machine", (0, 0, 0), (0, ASIDE, HEIGHT)), ("cart", body.pos, (0, 0, HEIGHT))
+    coil.tube(spec, "damper_rod", *ends, span=(0.0, 1.0), radius=0.010, material="steel")
+    coil.tube(spec, "damper_barrel", *ends, span=(0.12, 0.55), radius=0.034, material="graphite")
+
+
+def spring_fields(model, p):
+    springs = [model.tendon(name).id for name, _ in SPRINGS]
+    yield from body_fields(model, p)
+    yield Field("tendon_stiffness", springs, 0.5 * p.k)
+    yield Field("tendon_damping", model.tendon("across").id, p.mu * (1.0 + ASIDE**2))
+    yield Field("actuator_biasprm", (model.actuator("passive:active_damper").id, 2), p.mu)
+
+
+VAN_DER_POL = Plant(
+    name="van_der_pol",
+    parameters={"M": 1.0, "mu": 1.0, "k": 1.0},  # kg, N s/m, N/m
+    mass="M",
+    unit="m",
+    x0=(2.0,),
+    build=build,
+    fields=fields,
+    nominal=nominal,
+    lane=(0.0, 0.9, 0.0),
+    contacts={
+        "floor": on_floor,
+        "stops": stops,
+        "peg": peg,
+    },
+    mechanisms={"springs": Variant(add_springs, spring_fields)},
+)

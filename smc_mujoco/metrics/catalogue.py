@@ -1,0 +1,261 @@
+"""Metrics: numbers that say how well a run went, each a function Trace -> float.
+
+Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
+`measure.py`. A metric is one decorated function here; `score` and every table find it by themselves. Each is of the
+driven channels, and refuses a trace that diverged or holds NaN (ScenarioError); "never" is inf.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.conventions import (
+    BAND,
+    CATALOGUE,
+    Metric,
+    approaches,
+    error,
+    last,
+    last_exit,
+    metric,
+    refuse,
+    scale,
+)
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
+HIGH = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
+CONSTANT = 1e-12  # of max |u|: a range of u that is rounding
+
+
+def metrics() -> tuple[Metric, ...]:
+    """Every metric, in the order of tables."""
+    return tuple(CATALOGUE.values())
+
+
+def score(trace: Trace) -> dict[str, float]:
+    """Every metric by name that has one value for the plant; those that compare channels only of a network.
+
+    Of a cart with a pole: times and percentages of the motion are the worst of both, what has a unit is the cart's.
+
+    Raises:
+      ScenarioError: the run diverged, failed or holds NaN.
+    """
+    refuse(trace)
+    return {m.name: m.of(trace) for m in metrics() if not m.refusal(trace.scenario.plant)}
+
+
+def scores(trace: Trace) -> dict[str, dict[str, float]]:
+    """The metrics of each group of channels by itself: {"driven": {...}, "free": {...}} of a cart with a pole.
+
+    Joints without an actuator are free; a kind in several units has a group of each: "driven m". Raises as `score`.
+    """
+    refuse(trace)
+    return {
+        group.name: {m.name: float(m.formula(part)) for m in metrics() if m.fits(group)}
+        for group, part in conventions.parts(trace).items()
+    }
+
+
+@metric("s")
+def settling_time(trace: Trace) -> float:
+    """Time from which every channel stays in the settling band.
+
+    Last exit of max_i |e_i| from 2 % of the scale, in s since t[0]; a late step of r counts from t[0] too.
+    """
+    return last_exit(trace.t, conventions.largest(np.abs(error(trace))), BAND * scale(trace))
+
+
+@metric("s")
+def rise_time(trace: Trace) -> float:
+    """Time from 10 % to 90 % of the way to the reference, slowest channel.
+
+    On a channel's first approach with e != 0 at its begin b: first sample with 1 - e/e_b >= 0.9 minus first
+    with >= 0.1 (Ogata, Modern Control Engineering, transient response); inf if it does not get there. A
+    channel without such an approach is left out; 0 if all are.
+    """
+    e, t = error(trace), trace.t
+    times = [0.0]
+    for i, parts in enumerate(approaches(trace)):
+        part = next((p for p in parts if e[p.start, i] != 0), None)
+        if part is not None:
+            done = 1 - e[part, i] / e[part.start, i]
+            low, high = (np.flatnonzero(done >= level) for level in RISE)
+            times.append(float(t[part][high[0]] - t[part][low[0]]) if high.size else np.inf)
+    return max(times)
+
+
+@metric("%")
+def overshoot(trace: Trace) -> float:
+    """How far a channel goes beyond its reference, in percent of the scale.
+
+    100 max(0, -sign(e_b) e) / scale over all channels and approaches, b an approach's begin: only the far
+    side from where it began counts. An approach that begins with e_b = 0 has no near side: there it is |e|.
+    """
+    e, worst = error(trace), 0.0
+    for i, parts in enumerate(approaches(trace)):
+        for part in parts:
+            side = np.sign(e[part.start, i])
+            beyond = -side * e[part, i] if side else np.abs(e[part, i])
+            worst = max(worst, beyond.max())
+    return 100 * worst / scale(trace)
+
+
+@metric("{x}")
+def peak(trace: Trace) -> float:
+    """Largest |x| of the run (x, not e)."""
+    return np.abs(trace.x).max()
+
+
+@metric("{x}")
+def steady_error(trace: Trace) -> float:
+    """|mean of e over the samples of the last part|, worst channel."""
+    return np.abs(error(trace)[last(trace)].mean(axis=0)).max()
+
+
+@metric("{x}")
+def ultimate_bound(trace: Trace) -> float:
+    """Largest |e| in the last part, worst channel."""
+    return np.abs(error(trace)[last(trace)]).max()
+
+
+@metric("{x}")
+def ripple(trace: Trace) -> float:
+    """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""
+    return np.ptp(error(trace)[last(trace)], axis=0).max()
+
+
+@metric("({x})^2 s")
+def ise(trace: Trace) -> float:
+    """Integral of e^2 dt, summed over the channels (trapezoid)."""
+    return np.trapezoid((error(trace) ** 2).sum(axis=1), trace.t)
+
+
+@metric("{x} s")
+def iae(trace: Trace) -> float:
+    """Integral of |e| dt, summed over the channels (trapezoid)."""
+    return np.trapezoid(np.abs(error(trace)).sum(axis=1), trace.t)
+
+
+@metric("{x} s^2")
+def itae(trace: Trace) -> float:
+    """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
+    since = trace.t - trace.t[0]
+    return np.trapezoid(since * np.abs(error(trace)).sum(axis=1), trace.t)
+
+
+@metric("s", command=True)
+def reaching_time(trace: Trace) -> float:
+    """Time from which |s| stays within 2 % of its start.
+
+    Last exit of max_i |s_i| from 2 % of max_i |s_i(0)|: permanent entry, not first touch. A run that starts
+    on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout, as for a law
+    without a surface. s is what the law computed from its measurement: under noise it may never stay.
+    """
+    size = conventions.largest(np.abs(trace.s))
+    return last_exit(trace.t, size, BAND * (size[0] or size.max()))
+
+
+@metric("{u}", command=True)
+def max_u(trace: Trace) -> float:
+    """Largest |u|, worst channel."""
+    return np.abs(trace.u).max()
+
+
+@metric("{u}", command=True)
+def max_step(trace: Trace) -> float:
+    """Largest |u[k+1] - u[k]|, worst channel; 0 for a single sample."""
+    return np.abs(np.diff(trace.u, axis=0)).max(initial=0.0)
+
+
+@metric("{u}", command=True)
+def tv(trace: Trace) -> float:
+    """Total variation of u: sum of |u[k+1] - u[k]| over the run, worst channel."""
+    return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
+
+
+@metric("{u}/s", command=True)
+def tv_rate(trace: Trace) -> float:
+    """Total variation of u per second in the last part, worst channel.
+
+    Sum of |u[k+1] - u[k]| over the steps between samples of the last part, over the time they span; 0 if
+    the last part is a single sample.
+    """
+    part = last(trace)
+    u, t = trace.u[part], trace.t[part]
+    if t.size < 2:
+        return 0.0
+    return np.abs(np.diff(u, axis=0)).sum(axis=0).max() / (t[-1] - t[0])
+
+
+@metric("({u})^2 s", command=True)
+def energy(trace: Trace) -> float:
+    """Integral of u^2 dt, summed over the channels.
+
+    Sum of u[k]^2 (t[k+1] - t[k]), k < K: exact for the held command. Control effort, not mechanical work.
+    """
+    return (trace.u[:-1] ** 2).sum(axis=1) @ np.diff(trace.t)
+
+
+@metric("1", command=True)
+def hf_share(trace: Trace) -> float:
+    """Share of the variance of u above 50 Hz, 0 to 1.
+
+    From the discrete Fourier transform U of u[0..K-1], no window: sum of |U(f)|^2 at |f| > 50 Hz over the sum
+    at all f but zero (by Parseval, K^2 times the variance). Powers are pooled over the channels, so that a
+    channel at rest does not count. 0 if u is constant, and if half the sampling rate is 50 Hz or less.
+    """
+    u, t = trace.u[:-1], trace.t
+    if u.size == 0 or np.ptp(u, axis=0).max() <= CONSTANT * np.abs(u).max():
+        return 0.0
+    k = len(u)
+    power = (np.abs(np.fft.rfft(u, axis=0)) ** 2).sum(axis=1)
+    power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
+    frequency = np.arange(power.size) / (t[-1] - t[0])
+    return power[frequency > HIGH * (1 + CONSTANT)].sum() / power[1:].sum()
+
+
+@metric("s", realistic=True)
+def stick_time(trace: Trace) -> float:
+    """Time for which a channel is at rest, with a reaction of friction or contact; longest channel."""
+    rest = conventions.at_rest(trace)  # and a reaction is that of the step which ends at its sample
+    return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
+
+
+@metric("{u}", realistic=True)
+def peak_reaction(trace: Trace) -> float:
+    """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the samples."""
+    return np.abs(trace.reaction).max()
+
+
+@metric("1/s", realistic=True)
+def reversal_rate(trace: Trace) -> float:
+    """How often e turns back in the last part, per second, worst channel: twice the frequency of a limit cycle.
+
+    After swings of at least half the ripple; 0 for a ripple up to 1e-6 of the scale. It sees no cycle beyond that part.
+    """
+    part, least = last(trace), 1e-6 * scale(trace)
+    return max(conventions.turns(e, least) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
+
+
+@metric("s", network=True)
+def mean_settling_time(trace: Trace) -> float:
+    """Time from which |mean of e over the channels| stays in the settling band."""
+    return last_exit(trace.t, np.abs(error(trace).mean(axis=1)), BAND * scale(trace))
+
+
+@metric("s", network=True)
+def spread_settling_time(trace: Trace) -> float:
+    """Time from which max_i x_i - min_i x_i stays within 2 % of the scale."""
+    return last_exit(trace.t, conventions.largest(trace.x) - conventions.smallest(trace.x), BAND * scale(trace))
+
+
+@metric("{x}", network=True)
+def spread_bound(trace: Trace) -> float:
+    """Largest max_i x_i - min_i x_i in the last part."""
+    return np.ptp(trace.x[last(trace)], axis=1).max()

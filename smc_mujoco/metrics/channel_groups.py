@@ -1,0 +1,58 @@
+"""Groups: the channels of a plant of which one number can be told.
+
+The driven channels are one group, the free joints, which are only measured, another; each is divided further where its
+units differ. A cart's metres and its pole's radians have no largest among them, and no sum.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from smc_mujoco.simulation.state import LOGGED
+
+if TYPE_CHECKING:
+    from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.trace import Trace
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Group:
+    """Channels of one kind and one unit.
+
+    Attributes:
+      name: "driven" or "free", with the unit behind it, "driven rad", where there are several of that kind.
+      unit: of their x, "rad" or "m".
+      driven: whether they have actuators.
+      channels: which they are, ascending.
+    """
+
+    name: str
+    unit: str
+    driven: bool
+    channels: tuple[int, ...]
+
+
+def groups(plant: Plant) -> tuple[Group, ...]:
+    """The plant's groups: first the driven ones, in each kind as their units come first."""
+    found: dict[tuple[bool, str], list[int]] = {}
+    for i, unit in enumerate(plant.units):
+        found.setdefault((i < plant.driven, unit), []).append(i)
+    kinds = [driven for driven, _ in found]
+    return tuple(
+        Group(
+            name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
+            unit=unit,
+            driven=driven,
+            channels=tuple(channels),
+        )
+        for (driven, unit), channels in found.items()
+    )
+
+
+def cut(trace: Trace, group: Group) -> Trace:
+    """The trace with the channels of a group alone; the same one where these are all. Its scenario stays whole."""
+    if len(group.channels) == trace.x.shape[1]:
+        return trace
+    columns = list(group.channels)
+    return dataclasses.replace(trace, **{name: getattr(trace, name)[:, columns] for name in LOGGED})

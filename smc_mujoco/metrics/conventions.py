@@ -1,0 +1,238 @@
+"""What every metric shares: the conventions, the refusal of broken traces, and `@metric`.
+
+Groups: a metric is of channels that are alike, those of one of the plant's `groups`. Driven channels and free
+joints, which no actuator drives, are scored apart, even where their units agree: what the one is told to do, the other
+only suffers. Of several groups, `score` and each metric tell a time, a percentage or a share of the motion as the worst
+of them: a law that drops the pole has settled nothing. What has x's unit, or is of the command, they tell of the driven
+channels; where these have several units, a metric with x's or u's unit is refused. `scores` has every group by itself.
+
+Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
+sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
+
+- scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over them
+  where that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
+- settling band: |e| <= 2 % of the scale.
+- settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
+  signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
+- last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
+- approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
+  sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
+- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s where that is larger. Coulomb friction and
+  contacts creep by 1e-6 or less while they hold; LuGre friction bends its bristles meanwhile.
+- channels: errors and efforts that are integrals over time are summed over the group's channels; every other
+  metric takes its worst channel, so that it does not grow with n.
+- commands are held between samples; states are not, their integrals use the trapezoid rule.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import itertools
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.metrics.channel_groups import Group, cut, groups
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+BAND = 0.02  # of the scale
+LAST = 0.2  # of the run's duration
+ROUNDING = 1e-9  # of the duration: a sample that rounding put this much before the last part is in it
+REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above what stuck joints creep, see friction.py
+
+CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A metric's entry in the catalogue.
+
+    Attributes:
+      name: the function's name.
+      unit: may contain {x} and {u}, see `unit_for`.
+      summary: first line of the docstring.
+      network: True if it compares channels and so needs several of a kind.
+      realistic: True if it says something of a mechanism that is more than its plant's equation.
+      command: True if it says something of u or s, which free joints have none of.
+      formula: Trace of one group's channels -> float, without the checks.
+    """
+
+    name: str
+    unit: str
+    summary: str
+    network: bool
+    realistic: bool
+    command: bool
+    formula: Callable[[Trace], float]
+
+    def refusal(self, plant: Plant) -> str:
+        """Why this has no one value for the plant, or ""."""
+        driven = [group for group in groups(plant) if group.driven]
+        if not any(map(self.fits, driven)):
+            return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
+        if "{" in self.unit and len(driven) > 1:
+            each = " and ".join(group.unit for group in driven)
+            return f"{self.name} has no one value where channels are in {each}, as in {plant.name}: use smc.scores"
+        return ""
+
+    @property
+    def shared(self) -> bool:
+        """Whether free joints count in its one value: it is of the motion, and has no unit of x."""
+        return not self.command and "{" not in self.unit
+
+    def of(self, trace: Trace) -> float:
+        """The one value of a trace that `refuse` and `refusal` let pass: the worst of the groups that count."""
+        plant = trace.scenario.plant
+        found = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
+        return max(float(self.formula(cut(trace, group))) for group in found)
+
+    def fits(self, group: Group) -> bool:
+        """Whether this is a metric of a group by itself."""
+        return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
+
+    def unit_for(self, x: str) -> str:
+        """The unit where positions have the unit x, "rad" or "m" (as `plant.unit`)."""
+        u = EFFORT[x]
+        return self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u).format(x=x, u=u)
+
+
+def metric(
+    unit: str, *, network: bool = False, realistic: bool = False, command: bool = False
+) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
+    """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
+
+    Args:
+      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
+      network: True if the metric compares channels.
+      realistic: True if it is told only of realistic mechanisms.
+      command: True if it is of the command or the sliding variable.
+    """
+
+    def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
+        name, doc = formula.__name__, inspect.getdoc(formula) or ""
+
+        @functools.wraps(formula)
+        def checked(trace: Trace) -> float:
+            refuse(trace)
+            if why := entry.refusal(trace.scenario.plant):
+                raise ScenarioError(why)
+            return entry.of(trace)
+
+        entry = CATALOGUE[name] = Metric(
+            name=name,
+            unit=unit,
+            summary=doc.partition("\n")[0],
+            network=network,
+            realistic=realistic,
+            command=command,
+            formula=formula,
+        )
+        return checked
+
+    return enter
+
+
+def label(trace: Trace) -> str:
+    """Plant and law, for messages."""
+    return f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
+
+
+def refuse(trace: Trace) -> None:
+    """Raise ScenarioError if it is no trace, or the run diverged, failed, or holds a NaN or an infinity."""
+    if not hasattr(trace, "scenario"):
+        raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
+    signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r, trace.reaction)
+    whole = np.isfinite(trace.t).all() and all(np.isfinite(signal).all() for signal in signals)
+    if trace.failure is not None:
+        why = trace.failure  # names its time
+    elif trace.diverged_at is not None:
+        why = f"it diverged at t = {trace.diverged_at:g} s"
+    elif not whole:
+        finite = np.all([np.isfinite(trace.t), *(np.isfinite(signal).all(axis=1) for signal in signals)], axis=0)
+        why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
+    else:
+        return
+    fault = trace.failure is not None and "left the finite world" not in trace.failure  # of a law or a signal
+    cure = "mend that" if fault else "change the gains or u_max, or end the run earlier"
+    raise ScenarioError(f"{label(trace)} has no score, {why}: {cure}")
+
+
+def error(trace: Trace) -> np.ndarray:
+    """e = x - r, (K+1, n)."""
+    return trace.x - trace.r
+
+
+def parts(trace: Trace) -> dict[Group, Trace]:
+    """The trace of each group's channels alone: what the functions below take."""
+    return {group: cut(trace, group) for group in groups(trace.scenario.plant)}
+
+
+def scale(trace: Trace) -> float:
+    """The yardstick of a group's trace in x's unit, never zero; see the module's conventions."""
+    start, travel = np.abs(trace.x[0] - trace.r[0]).max(), max(np.ptp(r) for r in trace.r.T)
+    return float(max(start, travel)) or 1.0
+
+
+def at_rest(trace: Trace) -> np.ndarray:
+    """Where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
+    return np.abs(trace.v) <= max(REST * float(np.abs(trace.v).max()), STILL)
+
+
+def last(trace: Trace) -> slice:
+    """The samples of the last part."""
+    t = trace.t
+    begin = t[-1] - LAST * (1 + ROUNDING) * (t[-1] - t[0])
+    return slice(int(np.searchsorted(t, begin)), None)
+
+
+def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
+    """Seconds since t[0] from which size (K+1,) stays <= band; 0 if always, inf if not at the end."""
+    outside = np.flatnonzero(size > band)
+    if outside.size == 0:
+        return 0.0
+    if outside[-1] == t.size - 1:
+        return math.inf
+    return float(t[outside[-1] + 1] - t[0])
+
+
+def approaches(trace: Trace) -> list[list[slice]]:
+    """The samples of each approach in order, channel by channel."""
+    band = BAND * scale(trace)
+    channels = []
+    for r in trace.r.T:
+        jumps = np.flatnonzero(np.abs(np.diff(r)) > band) + 1
+        channels.append([slice(*ends) for ends in itertools.pairwise([0, *jumps.tolist(), r.size])])
+    return channels
+
+
+def largest(a: np.ndarray) -> np.ndarray:
+    """The largest channel at each sample: a.max(axis=1) of (K, n), much faster for few channels."""
+    return functools.reduce(np.maximum, a.T)
+
+
+def smallest(a: np.ndarray) -> np.ndarray:
+    """The smallest channel at each sample, as `largest`."""
+    return functools.reduce(np.minimum, a.T)
+
+
+def turns(y: np.ndarray, least: float) -> int:
+    """How often y (K,) turns back, each time by half its range from its last extreme; 0 for a range up to `least`."""
+    count, going, low, high = 0, 0, y[0], y[0]
+    swing = float(np.ptp(y)) / 2
+    slopes = np.diff(y)
+    peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # between them y is monotonic: it turns at no other
+    for value in y[[0, *peaks, -1]].tolist() if 2 * swing > least else ():
+        low, high = min(low, value), max(high, value)
+        if going >= 0 and value <= high - swing:
+            count, going, low, high = count + (going > 0), -1, value, value
+        elif going <= 0 and value >= low + swing:
+            count, going, low, high = count + (going < 0), 1, value, value
+    return count

@@ -1,0 +1,107 @@
+"""Grids: plants x laws x conditions x seeds, as scenarios that are compared on equal terms.
+
+    scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
+
+Plants may be the suite's, by name, or models of your own; so may laws and conditions.
+"""
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import Condition, find_condition
+from smc_mujoco.simulation.initial_states import SEEDS, Starts
+from smc_mujoco.simulation.scenario import Scenario
+
+DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
+NOTHING: Mapping[str, Any] = frozen({})
+MOST = 1_000_000  # runs of a grid, some kB each; chosen
+
+
+def grid(
+    plants: str | Plant | Sequence[str | Plant],
+    laws: str | Law | Template | Sequence[str | Law | Template],
+    conditions: str | Condition | Sequence[str | Condition] = "nominal",
+    seeds: int | Iterable[int] = 1,
+    gains: str = "tuned",
+    duration: float = DURATION,
+    starts: Starts | None = None,
+) -> list[Scenario]:
+    """Every plant in every condition under every law from every seed; plant varies slowest, seed fastest.
+
+    Args:
+      plants: names or Plants, one or several.
+      laws: names, with gains from the set `gains`, or laws with gains of their own.
+      conditions: names, such as "noise" or "noise + coulomb", or conditions of your own, see `condition`.
+      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise, the same in every
+        condition and under every law; see `starts`. Where a law was tuned from several seeds, it also says which of
+        its gains are taken.
+      gains: "study", "tuned", "tracking" or "default", see `gains`.
+      duration: of each run, s.
+      starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
+
+    Raises:
+      ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
+    """
+    numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
+    numbers = listed("seeds", itertools.islice(numbers, MOST + 1))
+    plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
+    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
+        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
+    return [
+        case(plant, law, condition, duration, gains, seed, starts)
+        for plant in plants
+        for condition in conditions
+        for law in laws
+        for seed in numbers
+    ]
+
+
+def case(
+    plant: str | Plant,
+    law: str | Law | Template,
+    condition: str | Condition = "nominal",
+    duration: float = DURATION,
+    gains: str = "tuned",
+    seed: int = 0,
+    starts: Starts | None = None,
+    changes: Mapping[str, Any] = NOTHING,
+) -> Scenario:
+    """One run of a grid; arguments as of `grid`.
+
+    Args:
+      changes: Scenario field -> value, over what the condition has.
+    """
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(machine, Plant):
+        raise ScenarioError(f"plant is {shown(plant)}: give a name, smc.plant(...) or smc.plant_from(...)")
+    asked, seed = find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
+    fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
+    if machine.name in sets.STUDY:
+        fields |= {"control_period": CONTROL_PERIOD, "u_max": coerce.U_MAX}
+    scenario = Scenario(**fields | asked.on(machine, duration) | dict(changes))
+    return (starts or Starts()).place(scenario, seed).named(asked.name)
+
+
+def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
+    """A law as given, or one of that name with its gains for the plant."""
+    if not isinstance(law, str):
+        return coerce.component(law, "law")
+    return sets.law(plant.name, law, "default" if law == "none" else gains, seed)
+
+
+def listed(what: str, values: object) -> list:
+    """Several values as a list, from one or several."""
+    if isinstance(values, str | Plant | Component | Template | Condition):
+        return [values]
+    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := list(values)):
+        raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
+    return found

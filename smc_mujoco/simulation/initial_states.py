@@ -1,0 +1,77 @@
+"""Initial states of the runs of a grid, one for each seed.
+
+    around = smc.starts(spread=0.2)                    # within 20 % of the plant's own x0, the default of a grid
+    around = smc.starts(x0=0.0, by=0.3)                # within 0.3 rad (or m) of 0
+
+A seed gives every law and every condition the same start. Seed 0 is the start x0 itself. Seed s starts channel i from
+
+    x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
+
+A plant with contacts must start clear of its obstacles: there z_i is -|z_i|, which moves the start inwards, and
+pendulums that may touch each other ("bobs") start in order from left to right.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from smc_mujoco.common.errors import number
+from smc_mujoco.simulation.scenario import Scenario
+
+SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
+SEEDS = 2**52  # seeds from here on are those of tuning, which no grid takes
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Where runs begin, by seed; see `starts`.
+
+    Attributes:
+      x0: the middle, one number or one for each channel; None: the plant's own, or what the condition gives.
+      spread: by how much of itself a channel's start moves to either side.
+      by: by how much it moves besides, rad or m.
+    """
+
+    x0: tuple[float, ...] | None = None
+    spread: float = SPREAD
+    by: float = 0.0
+
+    def __post_init__(self):
+        number("spread", self.spread, least=0.0)
+        number("by", self.by, least=0.0)
+
+    def reach(self, scenario: Scenario) -> float:
+        """The largest distance from 0 of any channel at a start, rad or m."""
+        middle = scenario.x0 if self.x0 is None else self.x0
+        return max(abs(x) for x in middle) or self.by
+
+    def place(self, scenario: Scenario, seed: int) -> Scenario:
+        """The scenario with a seed, from the start that belongs to it."""
+        if self.x0 is not None:
+            scenario = dataclasses.replace(scenario, x0=self.x0)
+        if seed == 0:
+            return dataclasses.replace(scenario, seed=0)
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
+        kind = scenario.contact.kind
+        moves = z if kind == "none" else [-abs(factor) for factor in z]
+        x0 = [
+            x * (1.0 + self.spread * move) + (self.by if x >= 0.0 else -self.by) * move
+            for x, move in zip(scenario.x0, moves, strict=True)
+        ]
+        return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
+
+
+def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by: float = 0.0) -> Starts:
+    """Where the runs of a grid begin, by seed.
+
+    Args:
+      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's own.
+      spread: by how much of itself a channel's start moves to either side, 0 or more.
+      by: by how much it moves besides, rad or m, 0 or more; for a plant that rests at 0.
+
+    Raises:
+      ScenarioError: a number out of its range.
+    """
+    items = x0 if isinstance(x0, Sequence) and not isinstance(x0, str) else (x0,)
+    return Starts(x0=None if x0 is None else tuple(number("x0", item) for item in items), spread=spread, by=by)

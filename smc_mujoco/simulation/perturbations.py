@@ -1,0 +1,38 @@
+"""Conditions of a run that are no signals: measurement noise, and parameters that change in mid-run."""
+
+import dataclasses
+from collections.abc import Mapping
+
+from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.frozen import Frozen, frozen
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """Zero-mean Gaussian measurement noise: standard deviations of position and velocity, in their SI units."""
+
+    position: float = 0.0
+    velocity: float = 0.0
+
+    def __post_init__(self):
+        for name in ("position", "velocity"):
+            object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), least=0.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Jump:
+    """The plant's parameters multiplied by `factors` (parameter name -> factor) from `time` on, s."""
+
+    time: float
+    factors: Mapping[str, float]
+
+    def __post_init__(self):
+        object.__setattr__(self, "time", number("Jump's time", self.time, least=0.0))
+        object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
+
+
+def parameter_factors(name: str, value: object) -> Frozen[float]:
+    """Parameter name -> factor, checked; `name` is what errors call it."""
+    if not isinstance(value, Mapping):
+        raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
+    return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})

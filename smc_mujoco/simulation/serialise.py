@@ -1,0 +1,180 @@
+"""A scenario as JSON data and back."""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import TypeVar
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.fingerprint import arithmetic
+from smc_mujoco.common.version import __version__
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.custom.channels import recorded
+from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
+from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation import references  # noqa: F401  # so that a file finds their parts
+from smc_mujoco.simulation.perturbations import Jump, Noise
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Recorded, Signal
+from smc_mujoco.simulation.time_series import TimeSeries  # noqa: F401  # so that it is among the signals
+
+PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
+PARTS = ("friction", "contact", "actuator", "sensor")
+T = TypeVar("T")
+
+
+def describe(scenario: Scenario) -> dict:
+    """The scenario as plain data that JSON holds without loss."""
+    return (
+        {name: getattr(scenario, name) for name in PLAIN}
+        | {
+            "plant": _plant(scenario.plant),
+            "versions": dict(_versions()),
+            "law": _component(scenario.law),
+            "velocity": _component(scenario.velocity),
+            "surface": scenario.surface and _component(scenario.surface),
+            "model": scenario.model,
+            "reference": _signal(scenario.reference),
+            "disturbance": [_signal(d) for d in scenario.disturbance],
+            "noise": dataclasses.asdict(scenario.noise),
+            "mismatch": dict(scenario.mismatch),
+            "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
+            "mechanism": scenario.mechanism,
+            "condition": scenario.condition,
+            "left_out": scenario.left_out,
+        }
+        | {name: _parts(getattr(scenario, name)) for name in PARTS}
+    )
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    """Of what a trace depends on: the packages, and how the machine rounds; reading them takes 5 ms."""
+    packages = {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
+    return packages | {"arithmetic": arithmetic()}
+
+
+def restore(data: dict) -> Scenario:
+    """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code.
+
+    A run that has been is not refused for a start or a mismatch that would be today.
+    """
+    with recorded():
+        return _restore(data)
+
+
+def _restore(data: dict) -> Scenario:
+    fields = {name: data[name] for name in PLAIN}
+    fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
+    fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
+    scenario = Scenario(
+        **fields,
+        plant=_restore_plant(data["plant"]),
+        law=_find(data["law"], "law", laws()),
+        velocity=_find(data["velocity"], "estimator", estimators()),
+        surface=data.get("surface") and _find(data["surface"], "surface", surfaces()),
+        reference=_restore_signal(data["reference"]),
+        disturbance=tuple(_restore_signal(d) for d in data["disturbance"]),
+        noise=Noise(**data["noise"]),
+        mismatch=data["mismatch"],
+        jump=data["jump"] and Jump(**data["jump"]),
+    )
+    again = dataclasses.replace(scenario, **dict.fromkeys(data.get("left_out", ())))
+    found = again if again == scenario else scenario  # the defaults of another version stay what they were
+    return found.named(data.get("condition"))
+
+
+def _plant(plant: Plant) -> dict:
+    data = {"name": plant.name, "n": plant.n, "module": plant.build.__module__} | dict(plant.parameters)
+    return data | ({"mjcf": plant.build.about()} if isinstance(plant.build, OwnModel) else {})
+
+
+def _restore_plant(data: dict) -> Plant:
+    plant = dict(data)
+    name, module = plant.pop("name"), plant.pop("module")
+    if mjcf := plant.pop("mjcf", None):
+        del plant["n"]
+        return dataclasses.replace(restored(mjcf, name), parameters=plant)
+    if module != find_plant(name).build.__module__:
+        raise ScenarioError(f"plant {name!r} is not the library's: run it where it is defined")
+    return find_plant(name, **plant)
+
+
+def _component(c: Component) -> dict:
+    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
+        "degree": c.degree,
+        "module": getattr(c.function, "__module__", ""),
+    }
+
+
+def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
+    template = known.get(data["name"])
+    if template is not None and template.function.__module__ == data["module"]:
+        return template.bind(data["gains"])
+    return Component(
+        kind=kind,
+        name=data["name"],
+        gains=dict(data["gains"]),
+        memory=data["memory"],
+        degree=data.get("degree", 1),
+        function=None,
+    )
+
+
+def _signal(signal: Signal) -> dict:
+    if isinstance(signal, Recorded):
+        return {"kind": signal.kind, "module": signal.module, "values": signal.parameters()}
+    return _thing(signal)
+
+
+def _restore_signal(data: dict) -> Signal:
+    kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
+    return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
+
+
+def _parts(value: Part | Sequence[Part] | None) -> dict | list[dict] | None:
+    if value is None or isinstance(value, Part):
+        return value and _thing(value)
+    return [_thing(part) for part in value]
+
+
+def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...] | None:
+    if data is None or isinstance(data, dict):
+        return None if data is None else _restore_part(data)
+    return tuple(_restore_part(part) for part in data)
+
+
+def _restore_part(data: dict) -> Part:
+    kind = _kinds(Part).get((data["kind"], data["module"]))
+    if kind is None:
+        raise ScenarioError(f"part {data['kind']!r} of {data['module']} is not at hand: import what defines it first")
+    return kind(**_values(data))
+
+
+def _thing(thing: Signal | Part) -> dict:
+    """What made it: its class by name, and the values of its fields."""
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
+    return dict(zip(("kind", "module"), _home(type(thing)), strict=True)) | {"values": values}
+
+
+def _values(data: dict) -> dict:
+    """The values of a thing's fields; JSON made lists of the tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
+
+
+def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
+    """Every class of the base's, users' own included, by its home."""
+    found = base.__subclasses__()
+    for kind in found:
+        found.extend(kind.__subclasses__())
+    return {_home(kind): kind for kind in found}
+
+
+def _home(kind: type) -> tuple[str, str]:
+    return kind.__name__, kind.__module__

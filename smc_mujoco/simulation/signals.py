@@ -1,0 +1,243 @@
+"""References r(t) and disturbances d(t): frozen data plus one pure function of time.
+
+A signal is a frozen dataclass whose float fields are its parameters p and whose `value` is compiled. Deterministic
+signals read `value(t, p) -> (r, r', r'')`; as a disturbance only the first is used. Process noise depends on the
+channel, the seed and its own past, and reads `value(t, p, memory, seed, channel, stream)`: memory is its per-channel
+state, stream tells it from the run's other noises. A series reads `value(t, p, data)`, the array that it holds.
+Times in seconds, values in the unit of what the signal is added to (reference: m or rad; disturbance: N or N m).
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+
+from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.simulation import philox
+
+EARLY = 1.0 - 1e-15  # sums and products of decimal times miss a sample's time by an ulp or two, to either side
+TERMS = 32  # sinusoids of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below a Gaussian's
+
+
+@dataclasses.dataclass(frozen=True)
+class Signal:
+    """Base of all signals: checks that every parameter is a finite number."""
+
+    memory: ClassVar[int] = 0  # floats of per-channel state
+    positive: ClassVar[tuple[str, ...]] = ()  # parameters that must exceed 0
+    natural: ClassVar[tuple[str, ...]] = ()  # parameters that must not be below 0
+    random: ClassVar[bool] = False  # whether value takes memory, seed, channel and stream
+    series: ClassVar[bool] = False  # whether value takes data
+    cartesian: ClassVar[bool] = False  # as a disturbance: a horizontal force in N on the body, not one on the joint
+    data: ClassVar[np.ndarray]  # of a series: what it holds, (2, N) float64, C-contiguous
+
+    def __post_init__(self):
+        for name, value in self.parameters().items():
+            above = 0.0 if name in self.positive else -math.inf
+            least = 0.0 if name in self.natural else -math.inf
+            checked = number(f"{type(self).__name__}'s {name}", value, above=above, least=least)
+            object.__setattr__(self, name, checked)
+
+    def parameters(self) -> dict[str, float]:
+        """Parameter name -> value."""
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+
+    value: ClassVar[Callable[..., tuple[float, float, float]]]  # a static method: value, first and second derivative
+
+
+@dataclasses.dataclass(frozen=True)
+class Constant(Signal):
+    """r(t) = amplitude."""
+
+    amplitude: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        return p.amplitude, 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Sine(Signal):
+    """r(t) = amplitude sin(omega t + phase); omega in rad/s."""
+
+    amplitude: float
+    omega: float
+    phase: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        angle = p.omega * t + p.phase
+        r = p.amplitude * math.sin(angle)
+        return r, p.amplitude * p.omega * math.cos(angle), -p.omega * p.omega * r
+
+
+@dataclasses.dataclass(frozen=True)
+class Step(Signal):
+    """0 before `time`, amplitude from then on."""
+
+    amplitude: float
+    time: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        return (p.amplitude if t >= p.time * EARLY else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Pulse(Signal):
+    """amplitude for time <= t < time + width, else 0."""
+
+    amplitude: float
+    time: float
+    width: float
+
+    positive = ("width",)
+
+    @staticmethod
+    def value(t, p):
+        on = p.time * EARLY <= t < (p.time + p.width) * EARLY
+        return (p.amplitude if on else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Impulse(Signal):
+    """impulse / width for time <= t < time + width, else 0: a blow with the time integral `impulse`, N s or N m s.
+
+    The integral is exact where width is a whole number of physics steps; 5 ms (chosen) is, of the usual ones.
+    """
+
+    impulse: float
+    time: float
+    width: float = 5e-3
+
+    positive = ("width",)
+
+    def __post_init__(self):
+        super().__post_init__()
+        number("Impulse's force, impulse / width,", self.impulse / self.width)
+
+    @staticmethod
+    def value(t, p):
+        on = p.time * EARLY <= t < (p.time + p.width) * EARLY
+        return (p.impulse / p.width if on else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Gust(Signal):
+    """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a horizontal force, N.
+
+    The discrete gust of 14 CFR 25.341(a)(2) and EASA CS-25.341(a)(2), U = U_ds/2 (1 - cos(pi s/H)) for 0 <= s <= 2H,
+    in time and as a force: 2H passes in width. (MIL-F-8785C builds up in the same way, then holds.) It acts on the
+    centre of mass of every channel's body: on a slide its generalised force is F, on a pendulum F l cos x.
+    """
+
+    amplitude: float
+    time: float
+    width: float
+
+    cartesian = True
+    positive = ("width",)
+
+    @staticmethod
+    def value(t, p):
+        part = (t - p.time) / p.width
+        if not 0.0 <= part <= 1.0:
+            return 0.0, 0.0, 0.0
+        return p.amplitude / 2.0 * (1.0 - math.cos(2.0 * math.pi * part)), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class OrnsteinUhlenbeck(Signal):
+    """Process noise with standard deviation sigma and correlation time tau, independent in every channel.
+
+    d_(k+1) = a d_k + sigma sqrt(1 - a^2) n_k, a = exp(-dt/tau), on knots dt apart and linear between them: the exact
+    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. The knots are its own, so
+    the path is the same under every physics step and control period. `dt` defaults to 1 ms.
+    """
+
+    sigma: float
+    tau: float
+    dt: float = 1e-3
+
+    memory = 3  # next knot, value at the last knot, value at the next
+    positive = ("tau", "dt")
+    natural = ("sigma",)
+    random = True
+
+    @staticmethod
+    def value(t, p, memory, seed, channel, stream):
+        return _ornstein_uhlenbeck(t, p.sigma, p.tau, p.dt, memory, seed, channel, stream), 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
+    knot = t / dt
+    if memory[0] == 0.0:
+        memory[2] = sigma * philox.normals(seed, channel, stream, 0)[0]
+    a = math.exp(-dt / tau)
+    while memory[0] <= knot:
+        memory[1] = memory[2]
+        memory[0] += 1.0
+        memory[2] = a * memory[1] + sigma * math.sqrt(1.0 - a * a) * philox.normals(seed, channel, stream, memory[0])[0]
+    return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
+
+
+@dataclasses.dataclass(frozen=True)
+class BandLimited(Signal):
+    """Process noise of standard deviation sigma between the frequencies low and high, Hz, independent in every channel.
+
+    d(t) = sigma sqrt(2/N) sum cos(2 pi f_i t + phi_i), N = 32, phi_i uniform: the spectral representation of a flat
+    spectrum (Shinozuka & Deodatis 1991, Appl. Mech. Rev. 44:191). f_i is uniform in the i-th of N equal parts of the
+    band, so that the path does not repeat after N/(high - low) seconds (Shinozuka & Jan 1972, J. Sound Vib. 25:111).
+    The path is the same under every physics step and control period.
+    """
+
+    sigma: float
+    low: float
+    high: float
+
+    memory = 2 * TERMS  # angular frequencies, phases
+    natural = ("sigma", "low")
+    random = True
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.high <= self.low:
+            raise ScenarioError(f"BandLimited's high is {self.high:g} Hz: give more than low, {self.low:g} Hz")
+
+    @staticmethod
+    def value(t, p, memory, seed, channel, stream):
+        return _band_limited(t, p.sigma, p.low, p.high, memory, seed, channel, stream), 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
+    if memory[TERMS - 1] == 0.0:
+        for i in range(TERMS):
+            part = (i + philox.uniform(seed, channel, stream, 2 * i)) / TERMS
+            memory[i] = 2.0 * math.pi * (low + part * (high - low))
+            memory[TERMS + i] = 2.0 * math.pi * philox.uniform(seed, channel, stream, 2 * i + 1)
+    total = 0.0
+    for i in range(TERMS):
+        total += math.cos(memory[i] * t + memory[TERMS + i])
+    return sigma * math.sqrt(2.0 / TERMS) * total
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded(Signal):
+    """A signal that a file names and that is not at hand: its parameters without its function; it cannot run."""
+
+    kind: str
+    module: str
+    values: Mapping[str, float]
+
+    def __post_init__(self):
+        object.__setattr__(self, "values", frozen(self.values))
+
+    def parameters(self) -> dict[str, float]:
+        """Parameter name -> value, as recorded."""
+        return dict(self.values)

@@ -1,0 +1,198 @@
+"""A user's time series as a signal: given as numbers, or read from a CSV file, which is checked cell by cell."""
+
+import csv
+import dataclasses
+import math
+import os
+import re
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.simulation.signals import EARLY, Signal
+
+GAP = 1.5  # median steps; chosen: jitter of a logger's clock stays below, one row that is missing does not
+WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # a column's name
+SECONDS = ("s", "sec", "second", "seconds")
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class TimeSeries(Signal):
+    """Straight lines between the points (times, values), and 0 before the first and after the last.
+
+    Attributes:
+      times: s, increasing, N >= 2 of them.
+      values: as many, in the unit of what the signal is added to.
+      data: both, (2, N) float64, read-only.
+
+    Raises:
+      ScenarioError: for numbers that are not finite, or times that do not increase, in one sentence.
+    """
+
+    times: Sequence[float]
+    values: Sequence[float]
+
+    series = True
+
+    def __post_init__(self):
+        for name in ("times", "values"):
+            object.__setattr__(self, name, _floats(f"TimeSeries's {name}", getattr(self, name)))
+        if len(self.times) != len(self.values):
+            raise ScenarioError(
+                f"TimeSeries has {len(self.times)} times and {len(self.values)} values: give as many of each"
+            )
+        _check("TimeSeries", self.times, self.values, "item {}".format)
+        object.__setattr__(self, "data", np.array([self.times, self.values]))
+        self.data.flags.writeable = False
+
+    def __repr__(self) -> str:
+        return f"TimeSeries({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
+
+    def __reduce__(self):  # so that a copy holds data of its own, as read-only as these
+        return type(self), (self.times, self.values)
+
+    def parameters(self) -> dict[str, float]:
+        """None: all its numbers are data."""
+        return {}
+
+    @classmethod
+    def from_csv(cls, path: str | os.PathLike, column: str | None = None, time: str | None = None) -> "TimeSeries":
+        """The series in a CSV file: numbers separated by commas, a row for each time, at a nearly constant rate.
+
+        Args:
+          path: the file. Its first row may name the columns; where it does not, they are time and value. A name may
+            have a unit, "d [N m]", as in what Trace.export writes, and is found with and without it.
+          column: the column of the values. Default: the first besides time.
+          time: the column of the times, s. Default: "t" or "time", else the first.
+
+        Raises:
+          ScenarioError: no such file or column, times that are not in s, a cell that is empty or no finite number,
+            times that do not increase, or a step between them beyond 1.5 median steps; each with its line.
+        """
+        rows = _rows(path)
+        if not rows:
+            raise ScenarioError(f"{path} is empty: give a CSV file with the columns t and a value")
+        at, of, body = _columns(path, rows, column, time)
+        names = {i: rows[0][1][i] if body is not rows else f"column {i + 1}" for i in (at, of)}
+        times, values = ([_cell(path, line, names[i], row[i]) for line, row in body] for i in (at, of))
+
+        def where(i: int) -> str:
+            return f"line {body[i][0]}"
+
+        _check(str(path), times, values, where)
+        steps = np.diff(times)
+        usual = np.quantile(steps, 0.5, method="lower")  # of two steps the shorter: the other has the gap
+        for i in np.flatnonzero(steps > GAP * usual)[:1]:
+            raise ScenarioError(
+                f"{path} has a gap after {where(i)}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
+                f"{usual:g} s apart: fill it in, or cut the file there"
+            )
+        return cls(times, values)
+
+    @staticmethod
+    def value(t, p, data):
+        last = data.shape[1] - 1
+        if t < data[0, 0] * EARLY or t > data[0, last] / EARLY:
+            return 0.0, 0.0, 0.0
+        low, high = 0, last
+        while high - low > 1:
+            middle = (low + high) // 2
+            if t < data[0, middle] * EARLY:
+                high = middle
+            else:
+                low = middle
+        slope = (data[1, high] - data[1, low]) / (data[0, high] - data[0, low])
+        return data[1, low] + slope * (t - data[0, low]), slope, 0.0
+
+
+def _floats(what: str, items: object) -> tuple[float, ...]:
+    if isinstance(items, np.ndarray):
+        items = items.tolist()
+    if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
+        raise ScenarioError(f"{what} are {shown(items)}: give a sequence of numbers")
+    return tuple(x if type(x) is float and math.isfinite(x) else number(f"{what}[{i}]", x) for i, x in enumerate(items))
+
+
+def _check(what: str, times: Sequence[float], values: Sequence[float], where: Callable[[int], str]) -> None:
+    """Enough points, times that increase, and slopes that a float holds."""
+    if len(times) < 2:
+        raise ScenarioError(f"{what} has {len(times)} points: give at least two")
+    for i in range(1, len(times)):
+        if times[i] <= times[i - 1]:
+            raise ScenarioError(
+                f"{what}, {where(i)}: {times[i]:.12g} s comes after {times[i - 1]:.12g} s: give times that increase"
+            )
+    with np.errstate(all="ignore"):
+        slopes = np.diff(values) / np.diff(times)
+    for i in np.flatnonzero(~np.isfinite(slopes))[:1]:
+        raise ScenarioError(
+            f"{what}, {where(i + 1)}: from {values[i]:g} to {values[i + 1]:g} within {times[i + 1] - times[i]:g} s is "
+            "too steep for a float: give a smaller step of the value or a longer one of time"
+        )
+
+
+def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
+    """The rows of a CSV file that are not blank, each with its line."""
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"cannot read a series from {shown(path)}: give the path of a CSV file")
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file, strict=True)
+            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if len(row) > 1 or any(row)]
+    except FileNotFoundError:
+        raise ScenarioError(f"no file at {path}: give the path of a CSV file") from None
+    except (OSError, ValueError, csv.Error) as error:
+        why = "it is no text" if isinstance(error, UnicodeError) else getattr(error, "strerror", None) or error
+        raise ScenarioError(f"cannot read {str(path)!r} as CSV ({why}): give a file of cells between commas") from None
+    if any("\0" in cell for _, row in rows for cell in row):
+        raise ScenarioError(f"cannot read {str(path)!r} as CSV (it is no text): give a file of cells between commas")
+    return rows
+
+
+def _columns(
+    path: str | os.PathLike, rows: list[tuple[int, list[str]]], column: str | None, time: str | None
+) -> tuple[int, int, list[tuple[int, list[str]]]]:
+    """Where times and values stand, and the rows below the header."""
+    names = rows[0][1]
+    if len(names) < 2:
+        raise ScenarioError(f"{path} has one column in its first line: give two, time and value, separated by commas")
+    for line, row in rows:
+        if len(row) != len(names):
+            raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give one for each")
+    if all(not name or _is_number(name) for name in names):
+        if wanted := column or time:
+            raise ScenarioError(
+                f"{path} has no header to find {shown(wanted)} in: write the columns' "
+                "names in its first line, or leave out column and time"
+            )
+        return 0, 1, rows
+    places = {WITH_UNIT.sub(r"\1", name): i for i, name in reversed([*enumerate(names)])}
+    places |= {name: i for i, name in reversed([*enumerate(names)])}
+    if time is None:
+        time = next((name for name in ("t", "time") if name in places), names[0])
+    if not isinstance(time, str) or time not in places:
+        raise unknown(f"time column of {path}", time, names)
+    if column is not None and (not isinstance(column, str) or column not in places):
+        raise unknown(f"column of {path}", column, names)
+    at = places[time]
+    if (unit := WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECONDS:
+        raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
+    return at, int(at == 0) if column is None else places[column], rows[1:]
+
+
+def _cell(path: str | os.PathLike, line: int, name: str, cell: str) -> float:
+    if not cell:
+        raise ScenarioError(f"{path}, line {line}: {name} is empty: fill it in, or cut the file there")
+    if not _is_number(cell) or not math.isfinite(float(cell)):
+        raise ScenarioError(f"{path}, line {line}: {name} is {shown(cell)}: give a finite number")
+    return float(cell)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

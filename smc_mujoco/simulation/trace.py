@@ -1,0 +1,245 @@
+"""A trace: what one run did at its control samples, with the scenario that made it."""
+
+import dataclasses
+import math
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from numpy.lib import format as npy
+
+from smc_mujoco.common.errors import ScenarioError, find, one_line
+from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.mechanisms.plant import EFFORT
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.state import LOGGED
+
+ARRAYS = ("t", *LOGGED)
+LONGEST_FAILURE = 500  # characters; chosen
+MOST_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
+NEWER = ("force", "reaction")  # which the oldest files lack: they hold ideal runs
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """One run at control samples t_k = k * control_period, k = 0 .. K. The arrays are read-only; NaN from a failure on.
+
+    Attributes:
+      t: times, (K + 1,), s.
+      x, v: true positions and velocities, (K + 1, n), each channel in its own of `plant.units`, and per second.
+      u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m.
+      applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
+      s: sliding variable as the law returns it, (K + 1, n).
+      d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
+      r: reference, (K + 1, n).
+      force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
+      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
+        over the control period that ends at t_k, of the values at its physics steps, so that no blow is missed; at
+        t = 0 they are 0.
+      scenario: the Scenario of the run.
+      diverged_at: time in s at which the run failed, or None.
+      failure: what happened then, in a sentence, or None.
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    u: np.ndarray
+    applied: np.ndarray
+    s: np.ndarray
+    d: np.ndarray
+    r: np.ndarray
+    force: np.ndarray
+    reaction: np.ndarray
+    scenario: Scenario
+    diverged_at: float | None = None
+    failure: str | None = None
+
+    def __post_init__(self):
+        for name in ARRAYS:
+            getattr(self, name).flags.writeable = False
+
+    def __reduce__(self):  # so that a copy is as read-only as this
+        return _trace, ({f.name: getattr(self, f.name) for f in dataclasses.fields(self)},)
+
+    def __repr__(self) -> str:
+        end = "" if self.diverged_at is None else f", {self.failure}"
+        return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write a .npz file that `smc.load` reads back, making folders; an old file is replaced whole or not at all."""
+        path = _suffixed(path, ".npz")
+        about = to_json(serialise.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
+        if len(about) > MOST_TEXT:
+            raise ScenarioError(
+                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MOST_TEXT:,} "
+                "are not read back: give it shorter time series"
+            )
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        with replacing(path) as file:
+            np.savez_compressed(file, about=np.array(about), **arrays)
+        return path
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The arrays by channel: t, x, v, ... of a single one, t, x0, x1, ..., v0, ... of several; see `units`."""
+        n = self.x.shape[1]
+        return {"t": self.t} | {
+            f"{name}{i}" if n > 1 else name: getattr(self, name)[:, i] for name in ARRAYS[1:] for i in range(n)
+        }
+
+    def units(self) -> dict[str, str]:
+        """The unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, which is what the law makes of it."""
+        found, channels = {"t": "s"}, self.scenario.plant.units
+        for column in list(self.columns())[1:]:
+            name = column.rstrip("0123456789")
+            x = channels[int(column[len(name) :] or 0)]
+            found[column] = {"x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
+        return found
+
+    def export(self, path: str | os.PathLike) -> Path:
+        """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), every number to the last bit.
+
+        CSV: a line of headers with units, "t [s]", "x [rad]", ..., then a line a sample, of the fewest digits that tell
+        a number from its neighbours (0.1, not 0.10000000000000001); nan after a failure. Parquet: the `columns` under
+        their plain names; the metadata of each has its "unit", those of the schema "scenario", as JSON. MAT: the arrays
+        by name, (K + 1, n), a struct `units` with a unit for each (a cell array where channels differ), and `scenario`.
+
+        Raises:
+          ScenarioError: another ending.
+        """
+        path = Path(path)
+        if path.suffix not in _WRITERS:
+            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat or .parquet")
+        with replacing(path) as file:
+            _WRITERS[path.suffix](self, file)
+        return path
+
+
+def _write_csv(trace: Trace, file: Path) -> None:
+    heads = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(f"{','.join(heads)}\n")
+        for row in np.column_stack(list(trace.columns().values())):
+            stream.write(f"{','.join(map(repr, row.tolist()))}\n")
+
+
+def _write_mat(trace: Trace, file: Path) -> None:
+    from scipy.io import savemat
+
+    about, units = to_json(serialise.describe(trace.scenario)), trace.units()
+    listed = {name: [units[c] for c in units if c.rstrip("0123456789") == name] for name in ARRAYS}
+    alike = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in listed.items()}
+    arrays = {name: getattr(trace, name) for name in ARRAYS}
+    savemat(file, arrays | {"units": alike, "scenario": about}, oned_as="column")
+
+
+def _write_parquet(trace: Trace, file: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    about = to_json(serialise.describe(trace.scenario))
+    fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in trace.units().items()]
+    with file.open("wb") as stream:  # whose errors say what is wrong as those of other files do
+        parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
+
+
+_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}
+FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
+
+
+def formats(listed: str) -> tuple[str, ...]:
+    """The formats of Trace.export that a list such as "csv,mat" names.
+
+    Raises:
+      ScenarioError: it names none, or another one.
+    """
+    names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in listed.split(","))
+    for name in names:
+        find("format to export", name, dict.fromkeys(FORMATS))
+    return tuple(names)
+
+
+def _trace(fields: dict) -> Trace:
+    return Trace(**fields)
+
+
+def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
+    """The Trace of a log (LOGS, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure.
+
+    What it holds before its end is finite: a sample that is not is a failure, and the end.
+    """
+    t = np.arange(scenario.samples + 1) * scenario.control_period
+    diverged_at = None
+    end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
+    finite = np.all(np.isfinite(log[:, :end]), axis=2)
+    if not np.all(finite):
+        k = int(np.argmin(np.all(finite, axis=0)))
+        name = LOGGED[int(np.argmin(finite[:, k]))]
+        failed_step, failure = k * scenario.steps, f"{name} became NaN or inf"
+    if failure is not None:
+        log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
+        diverged_at = failed_step * scenario.physics_step
+        failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
+    arrays = dict(zip(LOGGED, log, strict=True))
+    return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
+
+
+def load(path: str | os.PathLike) -> Trace:
+    """The trace that `Trace.save` wrote.
+
+    Raises:
+      ScenarioError: no such file, or not a trace.
+    """
+    if isinstance(path, str | os.PathLike) and not os.path.exists(path) and os.path.exists(f"{os.fspath(path)}.npz"):
+        path = f"{os.fspath(path)}.npz"
+    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+        about = from_json(str(_member(archive, "about")))
+        end = {key: about.pop(key) for key in ("diverged_at", "failure")}
+        older = "mechanism" not in about
+    try:
+        scenario = serialise.restore(about)
+    except ScenarioError as error:  # which names a cure of its own
+        raise ScenarioError(f"the scenario of {path} cannot be brought back, {error}") from None
+    except Exception as error:  # of JSON that is no scenario
+        why = f"{type(error).__name__}, {error}"
+        raise ScenarioError(
+            f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
+        ) from None
+    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+        names = [name for name in ARRAYS if not (older and name in NEWER)]
+        arrays = {name: _member(archive, name, scenario) for name in names}
+    arrays.setdefault("force", arrays["applied"].copy())
+    arrays.setdefault("reaction", np.where(np.isfinite(arrays["applied"]), 0.0, np.nan))
+    return Trace(**arrays, scenario=scenario, **end)
+
+
+_KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
+
+
+def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
+    """An array out of a file: one that fits the scenario, or else a text. Its size is known before it is read."""
+    with archive.open(f"{name}.npy") as stream:
+        headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+        shape, _, dtype = headers[npy.read_magic(stream)](stream)
+    if scenario is None:
+        fits = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MOST_TEXT
+    else:
+        fits = dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
+    if not fits:
+        raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
+    with archive.open(f"{name}.npy") as stream:
+        found = npy.read_array(stream, allow_pickle=False)
+        if stream.read(1):  # at its end the checksum is compared
+            raise ScenarioError(f"its {name} is longer than it says")
+    return found
+
+
+def _suffixed(path: str | os.PathLike, suffix: str) -> Path:
+    path = Path(path)
+    if not path.name or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
+    if path.suffix not in ("", suffix):
+        raise ScenarioError(f"cannot save to {path.name!r}: end the name in {suffix}")
+    return path.with_suffix(suffix)

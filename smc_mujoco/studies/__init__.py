@@ -1,0 +1,1 @@
+"""Many questions, whose answers are kept."""

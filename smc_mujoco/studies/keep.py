@@ -1,0 +1,61 @@
+"""Which traces of a study are saved, and where."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.progress import counter
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.studies.executor import batches
+from smc_mujoco.studies.scene import slug
+from smc_mujoco.studies.table import Table
+
+CHOICES = ("none", "worst", "all")
+
+
+def folder(out: str | os.PathLike) -> Path:
+    """Where a study keeps traces."""
+    return Path(out) / "traces"
+
+
+def path(folder: Path, row: Mapping[str, Any]) -> Path:
+    """The file of a row's trace."""
+    names = "-".join(slug(row[column]) for column in ("plant", "condition", "law"))
+    return folder / f"{names}-{row['seed']}-{row['hash'][:8]}.npz"
+
+
+def worst(table: Table) -> list[int]:
+    """For every plant and condition the first row that failed, else of those that never settle, else of all, the one
+    with the largest ultimate bound, or where channels of two units have none, with the largest overshoot.
+    """
+    failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
+    ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
+    lost = table.column("settling_time") == np.inf
+    badness = list(zip(failed, lost & ~failed, np.where(failed, 0.0, ends), strict=True))
+    found: dict[tuple, int] = {}
+    for i, place in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
+        if place not in found or badness[i] > badness[found[place]]:
+            found[place] = i
+    return list(found.values())
+
+
+def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
+    """Save the chosen traces that are not there, by running them again.
+
+    Raises:
+      ScenarioError: the folder cannot be written.
+    """
+    chosen = {"none": [], "worst": worst(table), "all": range(len(table))}[choice]
+    files = {}
+    for i in chosen:
+        row = table.data.slice(int(i), 1).to_pylist()[0]
+        if not (file := path(folder, row)).exists():
+            files[table.scenario(int(i))] = file
+    with counter(len(files), sum(s.work for s in files), progress) as counts:
+        for batch in batches(files, threads):
+            for i, trace in stream(batch, threads, counts.stepped):
+                trace.save(files[batch[i]])
+                counts.finished(1)

@@ -1,0 +1,255 @@
+"""Leaderboards: a study's laws compared on equal runs, with the uncertainty of every number.
+
+    boards = leaderboard(table)                        # a Board for each plant and metric
+    boards[0].winner                                   # a law's name, or None inside the noise
+    rich.print(leaderboard_table(boards))              # of `leaderboard_table`
+
+What intervals, ranks and winners mean: `statistics`, `ranking`. A board is one metric in one group of runs; laws are
+compared in each of its blocks, a plant in a condition, and the correction for many comparisons is over all pairs of
+laws in all blocks of the board. Over several blocks a board tells what holds in each of them: its winner wins in every
+one. The conclusions hold for the plants and conditions of the table, over starts and noise; `Board.friedman` says how
+they would carry over to other conditions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from smc_mujoco.analysis import paired_runs as cells
+from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
+from smc_mujoco.analysis.friedman import Friedman, friedman
+from smc_mujoco.analysis.paired_runs import SETTLES, Columns
+from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank, compare, ranks
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+
+METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A law's line: its median, or the share of its runs that settle, and its place."""
+
+    law: str
+    interval: Interval
+    rank: Rank
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Block:
+    """Laws compared on one plant in one condition.
+
+    Attributes:
+      plant: its name.
+      condition: its name.
+      medians: law -> median over the seeds; of "settles" the share of runs that do not.
+      best: the laws that none is better than.
+      seeds: how many every law ran from.
+      runs: how many of these are distinct: in the others every law does what it does in an earlier one.
+    """
+
+    plant: str
+    condition: str
+    medians: Mapping[str, float]
+    best: tuple[str, ...]
+    seeds: int
+    runs: int
+
+    @property
+    def winner(self) -> str | None:
+        """The law that is better than every other, among several."""
+        return self.best[0] if len(self.best) == 1 < len(self.medians) else None
+
+    @property
+    def sample(self) -> str:
+        """The size of the sample in words, such as "20 seeds, 1 distinct run"."""
+        seeds = f"{self.seeds} seed{'s' * (self.seeds > 1)}"
+        return seeds if self.runs == self.seeds else f"{seeds}, {self.runs} distinct run{'s' * (self.runs > 1)}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Board:
+    """Laws compared in one metric within one group of runs.
+
+    Attributes:
+      group: what the runs have in common, such as {"plant": "duffing"}.
+      metric: a metric's name, or "settles".
+      unit: of the medians, with {x} and {u} as in `measure.Metric.unit`; "" for "settles", which is 0 to 1.
+      entries: lowest mean rank first. A median over several plants is NaN where its unit depends on the plant.
+      blocks: the same laws on each plant in each condition by itself.
+      cells: how many runs each law has here: those that all laws have, and equal ones once.
+      seeds: in how many seeds, equal ones included.
+      pairs: how many comparisons the tests are corrected for: of every two laws, in every block.
+      level: of intervals and tests.
+      friedman: None of one law, or one plant in one condition.
+    """
+
+    group: Mapping[str, str]
+    metric: str
+    unit: str
+    entries: tuple[Entry, ...]
+    blocks: tuple[Block, ...]
+    cells: int
+    seeds: int
+    pairs: int
+    level: float
+    friedman: Friedman | None
+
+    @property
+    def best(self) -> tuple[str, ...]:
+        """The laws that none is better than, in any block; there may be none over several blocks."""
+        return tuple(entry.law for entry in self.entries if entry.rank.best)
+
+    @property
+    def winner(self) -> str | None:
+        """The law that wins in every block, if there is one."""
+        winners = {block.winner for block in self.blocks}
+        return winners.pop() if len(winners) == 1 else None
+
+    def wins(self, law: str) -> list[str]:
+        """The names of the blocks in which a law wins, see `name`."""
+        return [self.name(block) for block in self.blocks if block.winner == law]
+
+    def losses(self, law: str) -> list[str]:
+        """The names of the blocks in which another law is better."""
+        return [self.name(block) for block in self.blocks if law not in block.best]
+
+    def name(self, block: Block) -> str:
+        """What tells a block from the others of the board: its condition, its plant, or both."""
+        own = {"plant": block.plant, "condition": block.condition}
+        return ", ".join(value for what, value in own.items() if what not in self.group)
+
+    @property
+    def kind(self) -> str:
+        """What the blocks are: "conditions", "plants", or "cells" where they differ in both."""
+        return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
+
+    @property
+    def verdict(self) -> str:
+        """In words: "winner: classical", "classical wins under noise, loses under sine", or "no winner: ..."."""
+        if self.winner:
+            return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+        told = []
+        for entry in self.entries:
+            if wins := self.wins(entry.law):
+                losses = self.losses(entry.law)
+                told.append(
+                    f"{entry.law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
+                )
+        if told:
+            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(told)}"
+        return f"no winner: {self.why or _listed(self.best)}"
+
+    @property
+    def why(self) -> str:
+        """Why there is no winner, "" if there is one, or if several laws are the best."""
+        if len(self.entries) == 1:
+            return "one law"
+        return self.too_few or ("" if self.best else "each loses to another")
+
+    @property
+    def too_few(self) -> str:
+        """The size of the sample in words, if no block has enough runs for a winner; else ""."""
+        most = max(self.blocks, key=lambda block: block.runs)
+        if most.runs < SEEDS:
+            return most.sample + ", too few" * (most.runs == most.seeds)
+        if 2.0 ** (1 - most.runs) * self.pairs > 1 - self.level:  # the least p-value of the sign test
+            return f"{most.sample}, too few for {self.pairs} comparisons"
+        return ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a row; those of blocks, if these are cells, have a comma in them already."""
+    return ("; " if any("," in name for name in names) else ", ").join(names)
+
+
+def leaderboard(
+    table: Columns,
+    metrics: Sequence[str] = METRICS,
+    by: Sequence[str] = ("plant",),
+    level: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> list[Board]:
+    """The laws of a table, compared in each metric within each group.
+
+    Only cells - plant, condition, seed - that every law of the group has are compared; a run that failed is inf in all
+    metrics. Seeds in which every law does the same are one sample. A metric that does not apply to a group has no board
+    there.
+
+    Args:
+      metrics: names of metrics, lower being better, or "settles".
+      by: what makes a group, of "plant" and "condition"; () is all runs together.
+
+    Raises:
+      ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
+    """
+    units, boards = _units(metrics), []
+    by_row = {name: cells.values(table, name) for name in units}
+    for group in cells.groups(table, by):
+        ran = cells.scenarios(table, group)
+        for metric, unit in units.items():
+            there, scores = group.scores(by_row[metric])
+            if not scores:
+                continue
+            floors = [cells.floor(ran[k], unit) for k in there]
+            found = compare(scores, floors, metric == SETTLES, level)
+            blocks = tuple(_block(group, found, at, k) for at, k in enumerate(there))
+            mixed = "{" in unit and len({block.plant for block in blocks}) > 1
+            board = Board(
+                group=group.name,
+                metric=metric,
+                unit=unit,
+                entries=_entries(found, mixed, resamples, seed),
+                blocks=blocks,
+                cells=sum(block.runs for block in blocks),
+                seeds=max(block.seeds for block in blocks),
+                pairs=found.pairs,
+                level=found.level,
+                friedman=friedman(found),
+            )
+            boards.append(board)
+    return boards
+
+
+def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
+    """Block k of a group, which is number `at` of those compared."""
+    plant, condition = group.blocks[k]
+    return Block(
+        plant=plant,
+        condition=condition,
+        medians=dict(zip(found.laws, found.centres[:, at].tolist(), strict=True)),
+        best=found.best[at],
+        seeds=group.seeds[k],
+        runs=int(found.seeds[at]),
+    )
+
+
+def _units(metrics: Sequence[str]) -> dict[str, str]:
+    """Name -> unit, of the metrics asked for."""
+    from smc_mujoco.metrics.catalogue import metrics as catalogue
+
+    known = {SETTLES: ""} | {m.name: m.unit for m in catalogue()}
+    if isinstance(metrics, str) or not metrics:
+        raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
+    for name in metrics:
+        if name not in known:
+            raise unknown("metric", name, known)
+    return {name: known[name] for name in metrics}
+
+
+def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
+    """The laws' lines; `mixed` if there is no median, of values in several units."""
+    lines, scores = [], dict(zip(found.laws, found.cells, strict=True))
+    for rank in ranks(found, resamples, seed):
+        by_cell = scores[rank.law]
+        n = by_cell.shape[1]
+        if found.shares:
+            interval = share_interval(float(1 - np.nanmean(by_cell, axis=1).mean()), n, found.level)
+        elif mixed:
+            interval = Interval(math.nan, math.nan, math.nan, n)
+        else:
+            interval = median_of(by_cell, found.level, resamples, seed)
+        lines.append(Entry(law=rank.law, interval=interval, rank=rank))
+    return tuple(lines)

@@ -1,0 +1,1 @@
+"""The study that ships: one paper, its plants and its claims."""

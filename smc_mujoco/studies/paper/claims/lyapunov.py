@@ -1,0 +1,78 @@
+"""The paper's Lyapunov function along its own closed loop, exactly: V = s^2 / 2, s = alpha - u / g, and its rate.
+
+    x, v = plane(plant, k1)                                    # a grid of states
+    rate = vdot(plant, lam, k1, x, v)                          # V' at each; the paper says V' < 0 wherever s != 0
+
+With alpha = v + k1 x and u = -lam tanh(alpha), on x'' = f(x, v) + g u,
+
+    s       = alpha + (lam / g) tanh(alpha)
+    alpha'  = f - lam g tanh(alpha) + k1 v                                                                  (1)
+    s'      = (1 + (lam / g) / cosh(alpha)^2) alpha'            for a constant g, as all of the study's plants have
+    V'      = s s'                                                                                          (2)
+
+The paper asserts V' <= -eps s^2 without expanding s'. For g > 0, s has the sign of alpha and the bracket is positive,
+so V' has the sign of alpha alpha'. On alpha = 0, where v = -k1 x, (1) leaves alpha' = f(x, -k1 x) - k1^2 x: wherever
+that is not 0, V' is positive on one side of the line, arbitrarily near it, whatever lam is.
+
+A network is taken synchronised: with equal angles and rates its springs are relaxed and each channel is one pendulum.
+A state in which V' > 0 there is a state of the whole network.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", stability analysis; (1) and (2)
+derived here.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from smc_mujoco.mechanisms.plant import Plant
+
+POINTS = 201  # of a grid along each axis: odd, so that it has the origin
+REACH = 2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
+
+
+def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The paper's s = alpha - u / g in the states (x, v), arrays of one shape; m/s or rad/s, though u / g is not."""
+    alpha = v + k1 * x
+    return alpha + lam / _model(plant, x, v)[1] * np.tanh(alpha)
+
+
+def value(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """V = s^2 / 2 in the states (x, v)."""
+    return surface(plant, lam, k1, x, v) ** 2 / 2.0
+
+
+def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """V' by (2) in the states (x, v), in the unit of s, squared, per s.
+
+    Args:
+      plant: with its nominal f and g; a network is taken synchronised.
+      lam, k1: gains of the paper's law, not saturated.
+      x, v: positions and velocities, arrays of one shape, SI units.
+    """
+    x, v = np.asarray(x, float), np.asarray(v, float)
+    f, g = _model(plant, x, v)
+    alpha = v + k1 * x
+    bend = np.tanh(alpha)
+    s = alpha + lam / g * bend
+    return s * (1.0 + lam / g * (1.0 - bend**2)) * (f - lam * g * bend + k1 * v)
+
+
+def plane(plant: Plant, k1: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """A grid of states: x up to REACH times the largest |x0|, v up to k1 times that, so alpha = 0 is its diagonal."""
+    reach = REACH * max(map(abs, plant.x0))
+    x = np.linspace(-reach, reach, points)
+    grid = np.meshgrid(x, k1 * x)
+    return grid[0], grid[1]
+
+
+def input_gain(plant: Plant) -> float:
+    """g at rest, which on the study's plants is g everywhere; x'' = f + g u."""
+    return float(_model(plant, np.zeros(1), np.zeros(1))[1][0])
+
+
+def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """f and g of the first channel, with every channel in the same state."""
+    p = SimpleNamespace(**plant.parameters)
+    pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)
+    both = np.array([plant.nominal(np.full(plant.n, a), np.full(plant.n, b), 0, p) for a, b in pairs])
+    return both[:, 0].reshape(np.shape(x)), both[:, 1].reshape(np.shape(x))

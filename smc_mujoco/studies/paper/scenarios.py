@@ -1,0 +1,89 @@
+"""The study of the paper: its plants' gains and the conditions under which its laws are compared.
+
+The paper (J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition") states d(t) = 0.2 sin(5t), five
+pendulums and Gaussian noise on x and v; it states no gain and no other parameter. Those here were chosen for this
+study: every law is bounded by the same |u| <= 6, and its gains are those of a set in `gains`. Its conditions are named
+in `named_conditions`. The plants' parameters stand in their files.
+
+    scenario("duffing", "classical", "noise", seed=3)      # one Scenario
+    comparison("duffing", "noise")                         # the four laws: name -> Scenario
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.coerce import U_MAX
+from smc_mujoco.simulation.conditions import (
+    NAMED,
+    REAL,
+    Condition,
+    find_condition,
+)
+from smc_mujoco.simulation.grid import CONTROL_PERIOD, DURATION, NOTHING
+from smc_mujoco.simulation.scenario import Scenario
+
+# The four laws that the paper compares; its higher-order one is the last.
+LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
+GAINS = sets.STUDY
+PLANTS = tuple(GAINS)
+FIELDS = [field.name for field in dataclasses.fields(Scenario) if field.init]
+
+CONDITIONS = NAMED  # of the whole suite
+REALISTIC = REAL
+
+
+def fields(condition: str | Condition, plant: str | Plant, duration: float = DURATION) -> dict[str, Any]:
+    """The Scenario fields that a condition sets, in runs of that duration; what happens once does so at half time.
+
+    Raises:
+      ScenarioError: an unknown condition or plant, or a condition that has no numbers for the plant.
+    """
+    return find_condition(condition).on(find_plant(plant) if isinstance(plant, str) else plant, duration)
+
+
+def scenario(
+    plant: str,
+    law_name: str,
+    condition: str | Condition = "nominal",
+    seed: int = 0,
+    duration: float = DURATION,
+    changes: Mapping[str, Any] = NOTHING,
+    gains: str = "study",
+) -> Scenario:
+    """The scenario of one plant under one law in one condition.
+
+    Args:
+      changes: Scenario field -> value, over what the study and the condition have, such as {"friction": Coulomb(0.1)}.
+      gains: a set of `gains`: "study", "tuned", "tracking", or "default".
+
+    Raises:
+      ScenarioError: a name that the study does not have, or that is no field of a Scenario.
+    """
+    if not isinstance(changes, Mapping):
+        raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
+    for name in changes:
+        if name not in FIELDS:
+            raise unknown("field of a Scenario", name, FIELDS)
+    sets.paper_plant(plant)
+    found = sets.law(plant, law_name, "default" if law_name == "none" else gains)
+    common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
+    conditioned = fields(condition, plant, duration)
+    return Scenario(**({"plant": plant, "law": found} | common | conditioned | dict(changes)))
+
+
+def comparison(
+    plant: str,
+    condition: str | Condition = "nominal",
+    laws: Sequence[str] = LAWS,
+    seed: int = 0,
+    duration: float = DURATION,
+    changes: Mapping[str, Any] = NOTHING,
+    gains: str = "study",
+) -> dict[str, Scenario]:
+    """Law name -> scenario: one plant in one condition under several laws; arguments as of `scenario`."""
+    return {name: scenario(plant, name, condition, seed, duration, changes, gains) for name in laws}

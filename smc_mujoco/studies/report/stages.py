@@ -1,0 +1,200 @@
+"""The stages of a report: grid, claims, margins, maps, fronts, scenes; each kept in the report's folder when done.
+
+    findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
+
+Killed and called again, nothing that was finished is computed again: the grid goes on within itself, the others with
+the first plant, map, film or list of claims that is missing.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco.analysis.tuning import result
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.grid import grid as make_grid
+from smc_mujoco.studies.report import about, films, scores
+from smc_mujoco.studies.report.bars import Bars
+from smc_mujoco.studies.report.findings import Field, Findings, Front
+from smc_mujoco.studies.report.kept import kept
+from smc_mujoco.studies.report.plan import GAINS, Plan
+from smc_mujoco.studies.report.scenes import all_scenes
+from smc_mujoco.studies.report.work import Work, part
+from smc_mujoco.studies.study import study
+from smc_mujoco.studies.table import Table
+
+PAPER = "observer_free"
+FIELD_POINTS = 121  # of a map of V', along each axis
+
+
+def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
+    """Everything that a report tells, computed or read from the folder."""
+    work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
+    table = grid(work)
+    judged = claims(work, table)
+    margins = all_margins(work)
+    compared, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
+    with bars.stage("statistics"):
+        return Findings(
+            scores=scores.scores(table),
+            places=scores.places(table),
+            claims=judged,
+            fields=fields(plan),
+            fronts=fronts(plan),
+            margins=margins,
+            by_set=compared,
+            basins=basins,
+            scenes=scenes,
+            about=about.about(plan, table, bars.spent, _no_film(plan)),
+        )
+
+
+def _no_film(plan: Plan) -> str | None:
+    why = films.missing() if plan.filmed else None
+    return why and why.removeprefix("no film: ")
+
+
+def grid(work: Work) -> Table:
+    """The table of runs."""
+    plan = work.plan
+    scenarios = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
+    with work.bars.stage("grid", f"{len(scenarios)} runs", bar=False):
+        return study(scenarios, work.folder / "study", threads=work.threads, progress=work.bars.shown)
+
+
+def claims(work: Work, table: Table) -> tuple[Any, ...]:
+    """The claims, judged; the table's runs are not made again."""
+    from smc_mujoco.studies.paper.claims.audit import claims as judge
+    from smc_mujoco.studies.paper.claims.audit import evaluations
+    from smc_mujoco.studies.paper.claims.verdict import Claim
+
+    plan = work.plan
+    total = evaluations(plan.claims, None, plan.quick)
+    with work.bars.stage("claims", f"{total} judgements") as report:
+        done = [0]
+
+        def told(n: int) -> None:
+            done[0] += n
+            report(done[0], total)
+
+        return kept(
+            work.folder / "claims.json",
+            [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
+            lambda: tuple(judge(table, plan.claims, None, plan.quick, None, work.threads, told)),
+            lambda found, path: write_json(path, [dataclasses.asdict(claim) for claim in found]),
+            lambda path: tuple(Claim(**entry) for entry in read_json(path)),
+        )
+
+
+def all_margins(work: Work) -> tuple[Any, ...]:
+    """Every law's margins, plant by plant."""
+    plan = work.plan
+    plants = plan.plants if plan.kinds else ()
+    return _margins(work, "margins", GAINS, [(plant, plan.laws) for plant in plants], plan.kinds)
+
+
+def margins_by_set(work: Work, found: Sequence[Any]) -> dict[str, tuple[Any, ...]]:
+    """Set of gains -> margins of the kinds that are compared, of the laws that it has gains for."""
+    plan = work.plan
+    if not plan.compared:
+        return {}
+    by_set = {GAINS: tuple(margin for margin in found if margin.kind in plan.compared)}
+    for name in (name for name in sets.SETS if name != GAINS):
+        laws = [(plant, tuple(law for law in plan.laws if _has(plant, law, name))) for plant in plan.plants]
+        by_set[name] = _margins(work, f"margins-{name}", name, [one for one in laws if one[1]], plan.compared)
+    return by_set
+
+
+def _has(plant: str, law: str, gains: str) -> bool:
+    try:
+        sets.law(plant, law, gains)
+    except ScenarioError:
+        return False
+    return True
+
+
+def _margins(
+    work: Work, stage: str, gains: str, laws: Sequence[tuple[str, Sequence[str]]], kinds: Sequence[str]
+) -> tuple[Any, ...]:
+    """Margins of kinds under a set of gains, of each plant's laws."""
+    from smc_mujoco.analysis.margins import load, margins, save
+
+    plan, found = work.plan, []
+    with work.bars.stage(stage, f"{len(laws)} plants") as report:
+        for k, (plant, names) in enumerate(laws):
+            told = part(report, k, len(laws))
+            found += kept(
+                work.folder / f"{stage}-{plant}.json",
+                [names, kinds, plan.quick, gains],
+                lambda plant=plant, names=names, told=told: margins(
+                    [plant], names, kinds, gains=gains, quick=plan.quick, threads=work.threads, report=told
+                ),
+                save,
+                load,
+            )
+            report(k + 1, len(laws))
+    return tuple(found)
+
+
+def all_basins(work: Work) -> tuple[Any, ...]:
+    """The maps, one a plant and law."""
+    from smc_mujoco.analysis.region_of_attraction import Basin, basin, load
+
+    plan, found = work.plan, []
+    pairs = [(plant, law) for plant in plan.basins for law in plan.basin_laws]
+    with work.bars.stage("regions", f"{len(pairs)} maps") as report:
+        for k, (plant, law) in enumerate(pairs):
+            told = part(report, k, len(pairs))
+            found.append(
+                kept(
+                    work.folder / f"region-{plant}-{law}.json",
+                    [plan.points, plan.region, GAINS],
+                    lambda plant=plant, law=law, told=told: basin(
+                        plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=told
+                    ),
+                    Basin.save,
+                    load,
+                )
+            )
+            report(k + 1, len(pairs))
+    return tuple(found)
+
+
+def fields(plan: Plan) -> tuple[Field, ...]:
+    """V' of the paper's law on the state plane of every plant."""
+    from smc_mujoco.studies.paper.claims import lyapunov
+
+    found = []
+    for name in plan.plants if PAPER in plan.laws else ():
+        plant, law = find_plant(name), sets.law(name, PAPER, GAINS)
+        lam, k1 = law.gains["lam"], law.gains["k1"]
+        x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
+        rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)
+        found.append(Field(plant=name, law=PAPER, x=x[0], v=v[:, 0], vdot=rate, s=s))
+    return tuple(found)
+
+
+def fronts(plan: Plan) -> tuple[Front, ...]:
+    """Error against effort, of the tunings that come with the package; none where it has none."""
+    found = []
+    for plant in plan.plants:
+        for law in plan.laws:
+            try:
+                its = result.shipped(plant, law)
+            except ScenarioError:
+                continue
+            best = min(its.history, key=lambda e: e.objective)
+            found.append(
+                Front(
+                    plant=plant,
+                    law=law,
+                    tracking=tuple(e.tracking for e in its.front),
+                    variation=tuple(e.variation for e in its.front),
+                    chosen=(best.tracking, best.variation),
+                )
+            )
+    return tuple(found)

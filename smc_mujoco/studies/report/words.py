@@ -1,0 +1,166 @@
+"""How a report calls things and writes numbers: laws, plants, conditions, metrics, kinds of margin.
+
+Colours and names are those of `draw.style`; numbers those of the terminal's tables, three significant digits.
+"""
+
+import functools
+import html
+import inspect
+import math
+import re
+
+from smc_mujoco.common.text import number as written
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.metrics import catalogue
+
+# What the overview compares, and what each asks for; the tables' columns.
+HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
+COLUMNS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
+METRICS = {
+    "settling_time": "settling time",
+    "ise": "ISE",
+    "iae": "IAE",
+    "itae": "ITAE",
+    "tv": "TV",
+    "tv_rate": "TV rate",
+    "max_u": "max |u|",
+    "ultimate_bound": "ultimate bound",
+    "steady_error": "steady error",
+    "overshoot": "overshoot",
+    "settles": "settles",
+}
+RANKED = ("settles", *HEADLINE)  # columns of the ranking by plant
+ASKS = {
+    "settling_time": "fast",
+    "itae": "accurate on the way",
+    "ultimate_bound": "accurate in the end",
+    "tv_rate": "calm",
+}
+KINDS = {
+    "delay": "input delay",
+    "disturbance": "constant disturbance",
+    "friction": "dry friction",
+    "mass": "mass",
+    "noise": "position noise",
+}
+MARKS = {"supported": "●", "partly supported": "◐", "refuted": "○", "not testable": "–"}
+ABBREVIATIONS = {"pid": "PID", "lqr": "LQR"}
+PROPER = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
+
+__all__ = ["style"]
+
+
+def number(value: float) -> str:
+    """Three significant digits; "never" for inf, "none" for NaN."""
+    return "none" if math.isnan(value) else written(value)
+
+
+def law(name: str) -> str:
+    """A law's name as people write it; one of your own is called as you call it."""
+    from smc_mujoco.control.law import laws
+
+    named = style.law_name(name)
+    plain = ABBREVIATIONS.get(name, name.replace("_", " "))
+    return named if named != name or name not in laws() else plain[0].upper() + plain[1:]
+
+
+def colour(name: str) -> str:
+    """The colour that a law has in figures and films; no two laws of the short list have the same."""
+    return _colours().get(name, style.law_colour(name))
+
+
+@functools.cache
+def _colours() -> dict[str, str]:
+    return dict(zip(gains.LAWS, style.law_colours(gains.LAWS), strict=True))
+
+
+def plant(name: str) -> str:
+    """A plant's name as people write it."""
+    words = " ".join(PROPER.get(word, word) for word in name.split("_"))
+    return words[:1].upper() + words[1:]
+
+
+def condition(name: str) -> str:
+    """A condition's name with spaces."""
+    return name.replace("_", " ")
+
+
+def kind(name: str) -> str:
+    """A kind of margin as people write it."""
+    return KINDS.get(name, name.replace("_", " "))
+
+
+def metric(name: str) -> str:
+    """A metric's name as people write it."""
+    return METRICS.get(name, name.replace("_", " "))
+
+
+def unit(name: str, plant_name: str | None = None) -> str:
+    """A metric's unit on a plant, or on all of those that differ: "rad or m"."""
+    known = {m.name: m for m in catalogue.metrics()}
+    if name not in known:
+        return ""
+    xs = [plants()[plant_name].unit] if plant_name in plants() else ["rad", "m"]
+    units = dict.fromkeys(typeset(known[name].unit_for(x)) for x in xs)
+    return " or ".join(u for u in units if u != "1")
+
+
+def typeset(unit: str) -> str:
+    """A unit with its dots and powers: "rad s^2" as "rad·s²"."""
+    return re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²")).replace(" ", "·")
+
+
+def definition(name: str) -> str:
+    """What a metric is: its docstring, whole."""
+    known = {m.name: m for m in catalogue.metrics()}
+    return inspect.getdoc(known[name].formula) or ""
+
+
+def short(law_name: str) -> str:
+    """A law in two or three letters, for where there is room for no more."""
+    given = {
+        "observer_free": "OF",
+        "classical": "CL",
+        "adaptive": "AD",
+        "super_twisting": "ST",
+        "conditioned_super_twisting": "CS",
+        "boundary_layer": "BL",
+        "adaptive_leak": "AL",
+        "twisting": "TW",
+        "terminal": "TE",
+        "integral": "IN",
+        "dynamic": "DY",
+    } | ABBREVIATIONS
+    return given.get(law_name, "".join(word[:1] for word in law_name.split("_")).upper()[:3] or "?")
+
+
+def interval(median: float, low: float, high: float) -> str:
+    """The interval about a median, "" where it is unknown, or too narrow to be seen in three digits."""
+    if math.isnan(low) or math.isnan(high) or number(low) == number(median) == number(high):
+        return ""
+    return f"{number(low)} – {number(high)}"
+
+
+SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′", "alpha": "α", "lambda": "λ", "eps": "ε"}
+SIGNS |= {"Vdot": "V′", "xdot": "x′"}
+
+
+def pretty(text: str) -> str:
+    """A sentence of the audit, which is written in letters of a keyboard, with signs and names as people write them."""
+    signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
+    text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
+    names = {name: plant(name) for name in plants()} | {name: name_.lower() for name, name_ in style.NAMES.items()}
+    named = "|".join(sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True))
+    return re.sub(rf"\b({named})\b(?!_)", lambda m: names[m[1]], text)
+
+
+def bound(value: float) -> str:
+    """A number of theory, which may be without bound."""
+    return "no bound" if math.isinf(value) else number(value)
+
+
+def escape(text: str) -> str:
+    """Text for a chart, which reads some tags."""
+    return html.escape(text, quote=False)

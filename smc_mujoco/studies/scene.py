@@ -1,0 +1,153 @@
+"""A scene: one question, the runs that answer it, and how they are shown. scenes/ holds one script each.
+
+A scene file has a docstring - the question, the figure of the paper it answers, what to look for - and a `scene`:
+
+    scene = smc.Scene(title="Duffing", conditions={"nominal": smc.paper.comparison("duffing")})
+"""
+
+import ast
+import dataclasses
+import hashlib
+import re
+import runpy
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import find as lookup
+from smc_mujoco.common.files import shipped
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.scenario import Scenario
+
+LONGEST = 60  # bytes of a name in a file's name, which most file systems bound at 255
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What a scene file declares.
+
+    Attributes:
+      title: shown on figures and films.
+      conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
+      film: the condition that is filmed; by default the first.
+      figure: "overview" (x, u, s and phase portrait, a figure a condition) or "signals" (u of all conditions in one).
+      answers: metrics of the driven channels that answer the scene's question, printed on their own after the scores.
+      facts: label -> sentence, printed under the answers: what else was measured.
+    """
+
+    title: str
+    conditions: Mapping[str, Mapping[str, Scenario]]
+    film: str = ""
+    figure: str = "overview"
+    answers: tuple[str, ...] = ()
+    facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self):
+        if not isinstance(self.conditions, Mapping) or not self.conditions:
+            raise ScenarioError(f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs")
+        for condition, runs in self.conditions.items():
+            errors.name(f"a condition of scene {self.title!r}", condition)
+            if not isinstance(runs, Mapping) or not runs or not all(isinstance(s, Scenario) for s in runs.values()):
+                raise ScenarioError(
+                    f"condition {condition!r} of scene {self.title!r} is {shown(runs)}: give labels with Scenarios"
+                )
+            for label in runs:
+                errors.name(f"a label of condition {condition!r} of scene {self.title!r}", label)
+            if len(plants := {s.plant.name for s in runs.values()}) > 1:
+                raise ScenarioError(
+                    f"condition {condition!r} of scene {self.title!r} has the plants {', '.join(sorted(plants))}, "
+                    "which share no axes: give each plant a condition of its own"
+                )
+        files = [(f"{slug(condition)}-{slug(label)}", label) for condition, label, _ in self.runs()]
+        for named in ([(slug(condition), condition) for condition in self.conditions], files):
+            made = [file for file, _ in named]
+            if same := [name for file, name in named if made.count(file) > 1]:
+                raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(same)}")
+        object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
+        if self.film not in self.conditions:
+            raise unknown(f"condition to film in scene {self.title!r}", self.film, self.conditions)
+        if self.figure not in ("overview", "signals"):
+            raise unknown("kind of figure", self.figure, ("overview", "signals"))
+        answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
+        object.__setattr__(self, "answers", answers)
+        for name in answers:
+            lookup(f"metric that answers scene {self.title!r}", name, {m.name: m for m in metrics()})
+        if not isinstance(self.facts, Mapping) or not all(isinstance(text, str) for text in self.facts.values()):
+            raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
+
+    def seeded(self, seed: int) -> "Scene":
+        """The same scene with another seed in every run."""
+        conditions = {
+            condition: {label: dataclasses.replace(scenario, seed=seed) for label, scenario in runs.items()}
+            for condition, runs in self.conditions.items()
+        }
+        return dataclasses.replace(self, conditions=conditions)
+
+    def runs(self) -> Iterator[tuple[str, str, Scenario]]:
+        """(condition, label, scenario) of every run."""
+        for condition, runs in self.conditions.items():
+            for label, scenario in runs.items():
+                yield condition, label, scenario
+
+
+def scenes() -> dict[str, Path]:
+    """Name -> file of every scene that comes with the package."""
+    return {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
+
+
+def find(name: str) -> Path:
+    """The scene file at a path, or the one of that name that comes with the package."""
+    if Path(name).is_file():
+        return Path(name)
+    if Path(name).suffix or Path(name).name != name:
+        raise ScenarioError(f"no scene file {name}: give the path of one, or a name that smc-mujoco list shows")
+    return lookup("scene", name, scenes())
+
+
+def read(path: Path) -> Scene:
+    """The scene that a file declares.
+
+    Raises:
+      ScenarioError: the file fails, or declares none.
+    """
+    main = sys.modules["__main__"]
+    if getattr(main, "__file__", None) and Path(str(main.__file__)).resolve() == path.resolve():
+        scene = vars(main).get("scene")  # it is running already, as a script
+    else:
+        scene = _execute(path).get("scene")
+    if not isinstance(scene, Scene):
+        raise ScenarioError(f"{path} declares no scene: write `scene = smc.Scene(title=..., conditions=...)`")
+    return scene
+
+
+def question(path: Path) -> str:
+    """The first line of a scene file's docstring."""
+    return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0]
+
+
+def _execute(path: Path) -> dict:
+    """What a scene file defines; modules beside it can be imported, as in a script."""
+    sys.path.insert(0, str(path.resolve().parent))
+    try:
+        return runpy.run_path(str(path))
+    except Exception as error:  # whatever a user's script raises
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+        where = f"{path}, line {lines[-1]}" if lines else str(path)
+        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; mend the file"
+        raise ScenarioError(f"{where}: {what}") from error
+
+
+def slug(name: str, longest: int = LONGEST) -> str:
+    """A name as part of a file name: letters and numbers, and what ties them together.
+
+    It holds no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
+    """
+    words = re.sub(r"\s*=\s*", "-", name.lower())
+    made = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
+    if len(made.encode()) > longest:
+        start = made.encode()[: longest - 9].decode(errors="ignore")
+        made = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    return made

@@ -1,0 +1,123 @@
+"""A study's folder: part files of finished runs, and the table made of them.
+
+    store = Store(Path("study"))
+    store.open(resume=True)
+    store.add(rows)                        # a part: there whole or not at all
+    store.collect(["5f0c...", ...])        # results.parquet, in this order, from whatever parts hold it
+
+A part is a parquet file whose name is the hash of the runs in it. What a crash or another program left in its place -
+cut short, of other columns, scored by other code - is passed over, and its runs count as not done. The bytes of
+results.parquet depend on its rows alone.
+"""
+
+import contextlib
+import functools
+import hashlib
+import re
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import reading
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.studies import table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+GROUP = 4096  # rows that are in memory at once while the table is written; chosen
+PARTS_HELD = 64  # parts likewise
+ABANDONED = 3600.0  # s, after which a temporary file is one that a killed study left; chosen
+PART = re.compile(r"[0-9a-f]{32}\.parquet")
+
+
+class Store:
+    """The folder of a study. Parts are written by one thread at a time."""
+
+    def __init__(self, out: Path):
+        self.parts, self.results = out / "parts", out / "results.parquet"
+        self.schema = table.schema({"scores": fingerprint.of(tuple(m.formula for m in metrics()))})
+        self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, its row there
+
+    def open(self, resume: bool) -> None:
+        """Make the folder, and look up the runs that are in it; without `resume` remove them, and the table.
+
+        Raises:
+          ScenarioError: the folder cannot be made.
+        """
+        try:
+            self.parts.mkdir(parents=True, exist_ok=True)
+            self._tidy()
+            parts = [path for path in sorted(self.parts.iterdir()) if PART.fullmatch(path.name)]
+            for path in () if resume else (*parts, self.results):
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            raise ScenarioError(f"cannot use {self.parts}: {error.strerror}; choose another folder") from error
+        for path in parts if resume else ():
+            self._enter(path)
+
+    def _tidy(self) -> None:
+        """Remove the temporary files of studies that were killed long ago."""
+        for path in [*self.parts.glob(".*.parquet"), *self.parts.parent.glob(".results.*.parquet")]:
+            with contextlib.suppress(FileNotFoundError):  # another study's, which has just ended
+                if time.time() - path.stat().st_mtime > ABANDONED:
+                    path.unlink()
+
+    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Write finished runs as a part.
+
+        Raises:
+          ScenarioError: the folder cannot be written.
+        """
+        import pyarrow as pa
+
+        hashes = [row["hash"] for row in rows]
+        path = self.parts / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
+        table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
+        self.where.update((name, (path, i)) for i, name in enumerate(hashes))
+
+    def collect(self, hashes: Sequence[str]) -> None:
+        """Write the table of these finished runs, in this order.
+
+        Raises:
+          ScenarioError: the folder cannot be written, or a part was removed meanwhile.
+        """
+        import pyarrow as pa
+
+        held = functools.lru_cache(maxsize=PARTS_HELD)(self._read)
+
+        def rows(names: Sequence[str]) -> "pa.Table":
+            wanted: dict[Path, list[int]] = {}  # part -> which of the names are in it
+            for i, name in enumerate(names):
+                wanted.setdefault(self.where[name][0], []).append(i)
+            found = []
+            for path, here in wanted.items():
+                if (part := held(path)) is None:
+                    raise ScenarioError(f"part {path} was removed or broken while the study ran: start it once more")
+                found.append(part.take([self.where[names[i]][1] for i in here]))
+            order = np.argsort(np.concatenate(list(wanted.values())))
+            return pa.concat_tables(found).take(order).combine_chunks()
+
+        groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
+        table.write(self.results, self.schema, map(rows, groups))
+
+    def _enter(self, path: Path) -> None:
+        part = self._read(path)
+        if part is not None:
+            for i, name in enumerate(part["hash"].to_pylist()):
+                self.where.setdefault(name, (path, i))
+
+    def _read(self, path: Path) -> "pa.Table | None":
+        """A part, or None where it is none, or not whole."""
+        try:
+            with reading(path, "part", "start the study once more") as file:
+                part = table.read(file, sealed=True)
+        except ScenarioError:
+            return None
+        own = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
+        return part if own else None

@@ -1,0 +1,187 @@
+"""The table of a study: a row a run, as parquet, with the run itself a call away.
+
+    table = smc.Table.read("study/results.parquet")
+    best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
+    table.scenario(0), table.trace(0)          # what ran, and what it did, by running it again
+
+Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s), every metric of
+`metrics.score` (null where the run failed or the metric is not for it, inf for "never"), how it
+failed if it did (`diverged_at` in s, `failure`), and from what to make it again (`versions`, `scenario`, both JSON).
+"""
+
+import dataclasses
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
+BEFORE |= {"seed": "int64", "duration": "float64"}
+AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
+DIGEST = b"digest"  # in a file's metadata
+FEW: Mapping[str, Scenario] = frozen({})
+
+
+def columns() -> dict[str, str]:
+    """Column -> its type, in order."""
+    return BEFORE | {m.name: "float64" for m in metrics()} | AFTER
+
+
+def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
+    """The schema of a study's files."""
+    import pyarrow as pa
+
+    kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
+    return pa.schema([(name, kinds[kind]) for name, kind in columns().items()], metadata=dict(metadata or {}))
+
+
+def content(rows: "pa.Table") -> bytes:
+    """All that rows say, as bytes: names and values, with null apart from NaN."""
+    from pyarrow import types
+
+    parts = [to_json([rows.column_names, len(rows)]).encode()]
+    for column in rows.columns:
+        if types.is_floating(column.type) or types.is_integer(column.type):
+            parts += [column.is_null().to_numpy().tobytes(), column.to_numpy().tobytes()]
+        else:
+            parts.append(json.dumps(column.to_pylist()).encode())
+    return b"".join(parts)
+
+
+def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
+    """A parquet file, a row group a table, with a digest of all rows in its metadata.
+
+    Checksums of parquet cover pages, but neither their headers nor the footer.
+
+    Raises:
+      ScenarioError: the folder cannot be written.
+    """
+    import pyarrow.parquet as pq
+
+    digest = hashlib.sha256()
+    with (
+        replacing(path) as file,
+        file.open("wb") as sink,
+        pq.ParquetWriter(sink, schema, compression="zstd", write_page_checksum=True) as writer,
+    ):
+        for rows in groups:
+            writer.write_table(rows)
+            digest.update(content(rows))
+        writer.add_key_value_metadata({DIGEST: digest.hexdigest()})
+
+
+def read(path: Path, sealed: bool = False) -> "pa.Table":
+    """The rows that `write` wrote.
+
+    Args:
+      sealed: whether to refuse a file without a digest, as version 0.1 wrote them.
+
+    Raises:
+      ScenarioError: the file holds something else. Other errors: it is no parquet file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
+        rows = pa.concat_tables(groups) if groups else file.read()
+        metadata = dict(file.metadata.metadata or {})
+    said, digest = metadata.pop(DIGEST, None), hashlib.sha256()
+    for group in groups:
+        digest.update(content(group))
+    if said != digest.hexdigest().encode() and (sealed or said is not None):
+        raise ScenarioError("it is damaged, or was changed, since it was written")
+    metadata.pop(b"ARROW:schema", None)
+    return rows.replace_schema_metadata(metadata)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Runs and their scores.
+
+    Attributes:
+      data: the pyarrow Table.
+      known: hash -> Scenario, for laws and signals of yours, whose code no file holds.
+    """
+
+    data: "pa.Table"
+    known: Mapping[str, Scenario] = dataclasses.field(default=FEW, repr=False)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike) -> "Table":
+        """The table in a parquet file that a study wrote, or in the study's folder.
+
+        Raises:
+          ScenarioError: no such file, no table of a study, or one that does not hold what was written.
+        """
+        if isinstance(path, str | os.PathLike) and os.path.isdir(path):
+            path = Path(path) / "results.parquet"
+        with reading(path, "table", "give the results.parquet of a study that has ended") as file:
+            data = read(file)
+            if missing := [name for name in (*BEFORE, *AFTER) if name not in data.column_names]:
+                raise ScenarioError(f"it has no column {missing[0]!r}")
+        return cls(data=data)
+
+    def __len__(self) -> int:
+        return self.data.num_rows
+
+    def __repr__(self) -> str:
+        counts = [f"{len(set(self.column(name).tolist()))} {name}s" for name in ("plant", "law", "condition")]
+        return f"Table({len(self)} runs: {', '.join(counts)})"
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Every row as column -> value."""
+        return self.data.to_pylist()
+
+    def column(self, name: str) -> np.ndarray:
+        """A column, (rows,): numbers with NaN for null, or texts with None."""
+        find("column of the table", name, dict.fromkeys(self.data.column_names))
+        return self.data[name].to_numpy()
+
+    def select(
+        self,
+        plant: str | Sequence[str] | None = None,
+        law: str | Sequence[str] | None = None,
+        condition: str | Sequence[str] | None = None,
+    ) -> "Table":
+        """The rows with this plant, law and condition, each a name, several, or None for all."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        data = self.data
+        for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
+            if wanted is not None:
+                there = dict.fromkeys(self.column(name).tolist())
+                names = list(wanted) if isinstance(wanted, Iterable) and not isinstance(wanted, str) else [wanted]
+                for one in names:
+                    find(f"{name} of this table", one, there)
+                data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))
+        return dataclasses.replace(self, data=data)
+
+    def scenario(self, i: int) -> Scenario:
+        """The scenario of row i."""
+        if not isinstance(i, int | np.integer) or not -len(self) <= i < len(self):
+            raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
+        row = self.data.slice(int(i) % len(self), 1)
+        known = self.known.get(row["hash"][0].as_py())
+        return known or serialise.restore(from_json(row["scenario"][0].as_py()))
+
+    def trace(self, i: int) -> Trace:
+        """The trace of row i: the run once more, which with the same versions is the same to the last bit."""
+        return run(self.scenario(i))

@@ -1,0 +1,163 @@
+"""The pytest plugin: tests on the step responses of control laws.
+
+    def test_my_law_settles(step_response):
+        r = step_response("inverted_pendulum", my_law, step=0.2, friction=smc.Coulomb(0.05))
+        assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
+
+pytest loads this file in every session of whoever has the package installed (entry point `pytest11`). It therefore
+imports nothing heavy until a test uses a fixture or the marker. As any import of the package does, it chooses MUJOCO_GL
+where that is unset and EGL works: a test's `import mujoco` comes after it and would find none.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import pytest
+
+if TYPE_CHECKING:
+    from smc_mujoco.testing.response import StepResponse
+
+
+class Ledger(NamedTuple):
+    """What fixtures tell hooks: the responses of the test that runs, and pytest's temporary folder."""
+
+    responses: list[StepResponse]
+    temporary: Path
+
+
+LEDGER = pytest.StashKey[Ledger]()
+GOLDEN = "smc_golden"  # the property of a report that names the file which a test recorded
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of this plugin."""
+    group = parser.getgroup("smc_mujoco", "step responses of control laws (smc_mujoco)")
+    group.addoption("--smc-update", action="store_true", help="record golden metrics instead of comparing with them")
+    group.addoption("--smc-video", action="store_true", help="film the step responses of failing tests too")
+    group.addoption("--smc-out", metavar="DIR", help="folder for figures and films; default: a temporary one")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Explain the marker."""
+    config.addinivalue_line(
+        "markers",
+        "smc(plants=[...], conditions=[...]): run the test with each plant and condition of smc_mujoco's study, "
+        "as its arguments `plant` and `condition`.",
+    )
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """One test for each plant and condition of the marker."""
+    marker = metafunc.definition.get_closest_marker("smc")
+    if marker is None:
+        return
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.testing.cases import cases
+
+    try:
+        found, wrong = cases(marker.args, marker.kwargs, metafunc.fixturenames), None
+    except ScenarioError as error:
+        found, wrong = {}, str(error)
+    if wrong:  # told outside of the handler, so that the sentence comes without the error's frames
+        pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
+    for argument, names in found.items():
+        metafunc.parametrize(argument, names)
+
+
+@pytest.fixture(scope="session")
+def step_response(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., StepResponse]:
+    """Run a law from rest to a step of the reference: step_response(plant, law, step, condition, **scenario fields).
+
+    Example: r = step_response("duffing", my_law(k1=4.0), step=0.2, condition="noise", duration=5.0)
+    Every metric is an attribute of r: assert r.settling_time < 2; r.check(settling_time=2, overshoot=5) tests several.
+    """
+    from smc_mujoco.testing.response import respond
+    from smc_mujoco.testing.sentence import mendable
+
+    ledger = request.config.stash.setdefault(LEDGER, Ledger([], tmp_path_factory.getbasetemp()))
+
+    @mendable
+    def run(plant, law, step, condition="nominal", **fields) -> StepResponse:
+        ledger.responses.append(respond(plant, law, step, condition, fields))
+        return ledger.responses[-1]
+
+    return run
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Compare a response with the metrics that `pytest --smc-update` recorded: golden(r, settling_time=0.01).
+
+    Named metrics are compared within a tolerance in their unit. With none named, or with rel=0.05, all the others are
+    too: within that share of their recorded value, by default within 1 %.
+    """
+    from smc_mujoco.testing import golden as files
+    from smc_mujoco.testing.sentence import mendable
+
+    file, update = files.place(request.path), request.config.getoption("smc_update")
+    test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
+
+    @mendable
+    def compare(response: StepResponse, rel: float | None = None, **tolerances: float) -> None:
+        __tracebackhide__ = True
+        key = test if (n := next(number)) == 1 else f"{test} {n}"
+        if update:
+            files.record(file, key, response, rel, tolerances)
+            request.node.user_properties.append((GOLDEN, str(file)))
+        else:
+            files.compare(file, key, response, rel, tolerances)
+
+    return compare
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Forget the responses of the test before."""
+    if ledger := item.config.stash.get(LEDGER, None):
+        ledger.responses.clear()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Add what the step responses of a failing test were to its report."""
+    report = yield
+    ledger = item.config.stash.get(LEDGER, None)
+    if ledger is None or call.when == "teardown":
+        return report
+    responses = _used(item, ledger)
+    if report.failed and responses:
+        from smc_mujoco.testing.report import report as tell
+
+        config, out = item.config, item.config.getoption("smc_out")
+        folder = config.invocation_params.dir / out if out else ledger.temporary / "smc_mujoco"
+        report.sections.append(
+            ("step responses", tell(item.nodeid, responses, folder, bool(config.getoption("smc_video"))))
+        )
+    for response in responses if call.when == "call" else ():
+        response.limits.clear()  # another test may share it, with limits of its own
+    return report
+
+
+def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
+    """The responses that a test made, and those that it has from fixtures of a wider scope."""
+    from smc_mujoco.testing.response import StepResponse
+
+    fixed = [value for value in getattr(item, "funcargs", {}).values() if isinstance(value, StepResponse)]
+    return list({id(response): response for response in [*fixed, *ledger.responses]}.values())
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say which golden files were written."""
+    if config.getoption("smc_update"):
+        reports = itertools.chain.from_iterable(terminalreporter.stats.values())
+        noted = [pair for report in reports for pair in getattr(report, "user_properties", ())]
+        for file in sorted({value for name, value in noted if name == GOLDEN}):
+            terminalreporter.write_line(f"golden metrics recorded in {file}")

@@ -1,0 +1,251 @@
+"""Theory at rest against MuJoCo, on the study's five plants; its closed forms against eigenvalues."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import linear_theory, linearisation
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.metrics.catalogue import steady_error
+from smc_mujoco.studies.paper import scenarios
+
+H = 1e-3  # s, control period
+SMALL = 1e-4  # of the plant's x0: there tanh is linear to 1e-8
+PLANTS = [smc.plant(name) for name in scenarios.PLANTS]
+each_plant = pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
+
+
+def own(plant: smc.Plant, name: str = "observer_free") -> smc.Law:
+    return gains.law(plant.name, name, "study")
+
+
+def from_near_rest(plant: smc.Plant, law: smc.Law, delay: float = 0.0, duration: float = 24.0) -> np.ndarray:
+    """|x| of the worst channel at the samples, after a push that leaves every mode moving."""
+    x0 = [SMALL * x for x in plant.x0]
+    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=x0, input_delay=delay, duration=duration))
+    return np.abs(trace.x).max(axis=1)
+
+
+def grows(size: np.ndarray) -> bool:
+    """Whether the envelope of the last third is above that of the second."""
+    third = len(size) // 3
+    return bool(size[-third:].max() > size[-2 * third : -third].max())
+
+
+# what a plant is at rest
+
+
+def test_a_single_pendulum_has_its_textbook_coefficients():
+    p = smc.plant("inverted_pendulum").parameters
+    at = linearisation.linear(smc.plant("inverted_pendulum"))
+    assert at.inertia == pytest.approx(p["m"] * p["l"] ** 2)
+    assert at.damping == pytest.approx(p["b"])
+    assert at.modes == pytest.approx([-p["m"] * p["grav"] * p["l"]])
+
+
+def test_a_network_has_the_modes_of_its_path_graph():
+    plant = smc.plant("pendulum_network", n=7)
+    p = plant.parameters
+    graph = 2.0 - 2.0 * np.cos(np.pi * np.arange(7) / 7)  # its Laplacian's eigenvalues
+    assert linearisation.linear(plant).modes == pytest.approx(p["m"] * p["grav"] * p["l"] + p["kc"] * graph)
+
+
+def test_factors_give_the_true_plant():
+    heavy = linearisation.linear(smc.plant("inverted_pendulum"), {"mass": 2.0})
+    assert heavy.modes == pytest.approx(2.0 * linearisation.linear(smc.plant("inverted_pendulum")).modes)
+
+
+@pytest.mark.parametrize("name", ["cart_pole", "overhead_crane"])
+def test_a_joint_without_an_actuator_is_refused(name):
+    with pytest.raises(smc.ScenarioError, match=f"{name} has no theory here: give a plant with an actuator"):
+        linear_theory.smallest_lam(smc.plant(name), 1.0)
+
+
+@pytest.mark.parametrize("name", ["classical", "adaptive", "super_twisting"])
+def test_a_law_that_switches_has_no_theory(name):
+    plant = smc.plant("duffing")
+    law = own(plant, name)
+    assert linearisation.local(law) is None
+    assert linear_theory.rest_error(plant, law, 0.2) is None
+    assert linear_theory.borne(plant, law, 0.1) is None
+
+
+@pytest.mark.parametrize("lam", [-1.0, math.nan, math.inf])
+def test_a_gain_out_of_range_is_refused(lam):
+    with pytest.raises(smc.ScenarioError, match="lam is"):
+        linear_theory.critical_delay(smc.plant("duffing"), lam, 1.0)
+
+
+# smallest lambda
+
+
+@each_plant
+def test_the_measured_smallest_lambda_is_the_one_of_theory_within_one_percent(plant):
+    k1 = own(plant).gains["k1"]
+    least = linear_theory.smallest_lam(plant, k1)
+    if least == 0.0:  # any lambda stabilises it
+        assert plant.name == "pendulum_network"
+        assert not grows(from_near_rest(plant, smc.law("observer_free", lam=1e-3, k1=k1)))
+        return
+    assert grows(from_near_rest(plant, smc.law("observer_free", lam=0.99 * least, k1=k1)))
+    assert not grows(from_near_rest(plant, smc.law("observer_free", lam=1.01 * least, k1=k1)))
+
+
+def test_negative_damping_asks_for_more_than_itself():
+    assert linear_theory.smallest_lam(smc.plant("van_der_pol", mu=3.0), 100.0) == pytest.approx(3.0)
+
+
+def test_without_k1_nothing_holds_a_pendulum_up():
+    assert linear_theory.smallest_lam(smc.plant("inverted_pendulum"), 0.0) == math.inf
+    assert linear_theory.smallest_lam(smc.plant("pendulum_network"), 0.0) == 0.0
+
+
+@each_plant
+def test_sampling_fast_leaves_the_smallest_lambda_and_bounds_the_largest(plant):
+    k1 = own(plant).gains["k1"]
+    low, high = linear_theory.lam_range(plant, k1, 1e-6)
+    inertia = linearisation.linear(plant).inertia
+    assert low == pytest.approx(linear_theory.smallest_lam(plant, k1), rel=1e-5, abs=1e-9)
+    assert high == pytest.approx(2.0 * inertia / 1e-6, rel=1e-3)  # h lam / M = 2: v+ = -v
+
+
+@each_plant
+def test_both_ends_of_the_range_of_lambda_are_where_the_loop_turns_unstable(plant):
+    k1, h = own(plant).gains["k1"], 0.01
+    for end, inside in zip(linear_theory.lam_range(plant, k1, h), (1.001, 0.999), strict=True):
+        if end > 0.0:
+            assert (
+                linear_theory.growth(plant, end * inside, k1, h)
+                < 1.0
+                < linear_theory.growth(plant, end / inside, k1, h)
+            )
+
+
+def test_where_sampling_is_too_slow_there_is_no_lambda():
+    assert linear_theory.lam_range(smc.plant("inverted_pendulum"), 9.7, 1.0) == (math.inf, math.inf)
+
+
+# critical delay
+
+
+@each_plant
+def test_the_measured_critical_delay_is_the_one_of_theory_within_one_control_period(plant):
+    law = own(plant)
+    critical = linear_theory.critical_delay(plant, law.gains["lam"], law.gains["k1"], H)
+    periods = math.ceil(critical / H) - 1  # the last one that is stable
+    assert not grows(from_near_rest(plant, law, delay=periods * H))
+    assert grows(from_near_rest(plant, law, delay=(periods + 1) * H))
+
+
+def test_the_theory_is_that_of_a_saturated_laws_middle_too():
+    plant = smc.plant("inverted_pendulum")
+    law = own(plant, "boundary_layer")
+    critical = linear_theory.critical_delay(plant, *linearisation.local(law) or (0.0, 0.0), H)
+    periods = math.ceil(critical / H) - 1
+    assert not grows(from_near_rest(plant, law, delay=periods * H))
+    assert grows(from_near_rest(plant, law, delay=(periods + 1) * H))
+
+
+@each_plant
+def test_holding_the_command_costs_half_a_period_of_delay(plant):
+    law = own(plant)
+    continuous = linear_theory.critical_delay(plant, law.gains["lam"], law.gains["k1"])
+    for h in (1e-3, 1e-4):
+        held = linear_theory.critical_delay(plant, law.gains["lam"], law.gains["k1"], h)
+        assert held == pytest.approx(continuous - h / 2, abs=h * h * 2.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    plant=st.sampled_from(PLANTS),
+    lam=st.floats(0.05, 40.0),
+    k1=st.floats(0.2, 30.0),
+    h=st.sampled_from([1e-3, 5e-3, 0.02, 0.1]),
+)
+def test_the_closed_form_of_the_critical_delay_agrees_with_eigenvalues(plant, lam, k1, h):
+    critical = linear_theory.critical_delay(plant, lam, k1, h) / h
+    first = math.ceil(min(critical, 60.0) + 1e-9) if critical else 0  # of the unstable ones, in periods
+    for periods in {0, 1, 2, 3, 7, 12, first - 1}:
+        if 0 <= periods < first:
+            assert linear_theory.growth(plant, lam, k1, h, periods) < 1.0 + 1e-9
+    if critical < 60.0:
+        assert linear_theory.growth(plant, lam, k1, h, first) > 1.0 - 1e-9
+
+
+def test_a_loop_that_is_unstable_anyway_bears_no_delay():
+    assert linear_theory.critical_delay(smc.plant("inverted_pendulum"), 0.2, 1.0) == 0.0
+    assert linear_theory.critical_delay(smc.plant("inverted_pendulum"), 0.2, 1.0, H) == 0.0
+
+
+def test_a_law_weaker_than_the_plants_own_damping_bears_every_delay():
+    stiff = smc.plant("duffing", alpha=4.0, delta=6.0)
+    assert linear_theory.critical_delay(stiff, 0.5, 1.0) == math.inf
+    assert linear_theory.growth(stiff, 0.5, 1.0, 0.05, 100) < 1.0
+
+
+# at rest under a constant disturbance
+
+
+@each_plant
+def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant):
+    d, law = 0.2, own(plant)
+    trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0))
+    measured = steady_error(trace)
+    assert measured == pytest.approx(linear_theory.steady_error(plant, law.gains["lam"], law.gains["k1"], d), rel=0.01)
+    assert measured == pytest.approx(linear_theory.rest_error(plant, law, d), rel=1e-4)
+
+
+@each_plant
+def test_a_small_disturbance_needs_no_more_than_linear_theory(plant):
+    law = own(plant)
+    lam, k1 = linearisation.local(law) or (0.0, 0.0)
+    assert linear_theory.rest_error(plant, law, 1e-4) == pytest.approx(
+        linear_theory.steady_error(plant, lam, k1, 1e-4), rel=1e-5
+    )
+
+
+@each_plant
+def test_what_is_borne_puts_the_plant_where_it_may_just_be(plant):
+    law, most = own(plant), 0.02
+    level = linear_theory.borne(plant, law, most)
+    assert level is not None
+    assert linear_theory.rest_error(plant, law, level) == pytest.approx(most, rel=1e-4)
+
+
+@settings(max_examples=15, deadline=None)
+@given(plant=st.sampled_from(PLANTS), k1=st.floats(1.0, 10.0), most=st.floats(1e-3, 0.5))
+def test_what_is_borne_is_the_largest_force_up_to_there(plant, k1, most):
+    """Of the law's pull less the plant's own, on a grid that ends at `most`."""
+    law = smc.law("observer_free", lam=5.0, k1=k1)
+    force = linearisation.holding(plant, law)
+    assert force is not None
+    rises = force(np.linspace(0.0, most, 2_001)[1:])
+    first = int(np.argmax(np.r_[np.diff(rises) < 0.0, True]))
+    assert linear_theory.borne(plant, law, most) == pytest.approx(max(rises[first], 0.0), rel=1e-6, abs=1e-9)
+
+
+def test_the_actuators_bound_counts_where_it_is_below_lambda():
+    plant, law = smc.plant("inverted_pendulum"), smc.law("observer_free", lam=40.0, k1=9.7)
+    bounded = linear_theory.borne(plant, law, 0.1, u_max=6.0)
+    p = plant.parameters
+    assert bounded == pytest.approx(
+        6.0 - p["m"] * p["grav"] * p["l"] * math.sin(math.atanh(6.0 / 40.0) / 9.7), rel=0.01
+    )
+
+
+def test_beyond_what_the_law_can_hold_a_pendulum_rests_nowhere():
+    plant = smc.plant("inverted_pendulum")
+    law = smc.law("observer_free", lam=2.0, k1=9.7)
+    summit = linear_theory.borne(plant, law, 3.0)
+    assert summit is not None
+    assert (linear_theory.rest_error(plant, law, 0.999 * summit) or math.inf) < 0.5
+    assert linear_theory.rest_error(plant, law, 1.001 * summit) == math.inf
+    near = linear_theory.rest_error(plant, law, 0.99 * summit)
+    for factor in (0.99, 1.01):
+        push = smc.Constant(factor * summit)
+        trace = smc.run(smc.Scenario(plant=plant, law=law, x0=near, disturbance=push, duration=20.0))
+        assert (abs(trace.x[-1, 0]) < 0.5) == (factor < 1.0)

@@ -1,0 +1,298 @@
+"""Margins: what is found is a boundary, the first one from below, and theory's where there is one."""
+
+import dataclasses
+import importlib
+import json
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import margin_kinds
+from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
+from smc_mujoco.cli.commands.margins import QUICK, table
+from smc_mujoco.cli.commands.margins import margins as command
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.studies.paper import scenarios
+
+margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
+
+BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
+ROUGH = Margin(
+    plant="p", law="l", kind="delay", value=math.nan, unit="s", resolution=0.1, searched=1.0, theory=math.inf
+)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Every margin of two laws on one plant, coarsely."""
+    bases = [BASE, scenarios.scenario("duffing", "classical", duration=4.0)]
+    return margins.of(bases, resolution=COARSE, threads=2)
+
+
+def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
+    return margin_kinds.Kind(unit="{u}", levels=levels, put=put, none=none)
+
+
+def pushed(level):
+    """A scenario that bears what it is asked to: a push of more than the law has, or none."""
+    return dataclasses.replace(BASE, duration=0.5, x0=0.0, disturbance=smc.Constant(0.0 if level else 50.0))
+
+
+# what a margin is
+
+
+def test_it_is_the_boundary_between_what_is_borne_and_what_is_not(found):
+    bases = {"observer_free": BASE, "classical": scenarios.scenario("duffing", "classical", duration=4.0)}
+    closed = [margin for margin in found if not margin.open]
+    assert len(closed) > 5
+    for margin in closed:
+        kind = margin_kinds.SPECS[margin.kind]
+        levels = margin.value, margin.value + margin.resolution
+        assert margin.resolution > 0.0
+        runs = smc.run([kind.put(bases[margin.law], level) for level in levels])
+        assert [margin_kinds.bears(trace) for trace in runs] == [True, False]
+
+
+def test_a_run_bears_what_leaves_it_within_five_percent_of_its_start():
+    held = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.2)))
+    carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))
+    assert abs(held.x[-1, 0]) < 0.05 * 1.5 < abs(carried.x[-1, 0])
+    assert (margin_kinds.bears(held), margin_kinds.bears(carried)) == (True, False)
+
+
+def test_a_run_bears_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
+    trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 0.0), duration=1.0))
+    fallen = trace.x.copy()
+    assert margin_kinds.bears(trace)
+    fallen[:, 1] = np.linspace(0.0, 3.0, len(fallen))
+    assert not margin_kinds.bears(dataclasses.replace(trace, x=fallen))
+
+
+def test_a_run_that_fails_bears_nothing():
+    @smc.law_function
+    def broken(y, gains, memory):
+        return math.nan, 0.0
+
+    assert not margin_kinds.bears(smc.run(dataclasses.replace(BASE, law=broken())))
+
+
+def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_for(found):
+    assert [(margin.law, margin.kind) for margin in found] == [
+        (law, kind) for law in ("observer_free", "classical") for kind in KINDS
+    ]
+    assert [margin.unit for margin in found[:5]] == ["s", "N", "N", "1", "m"]
+    for margin in found:
+        if not margin.open:
+            step = 5 * BASE.control_period if margin.kind == "delay" else COARSE * margin.value
+            assert margin.resolution <= step * (1.0 + 1e-9)
+
+
+def test_it_does_not_depend_on_company_or_threads(found):
+    assert margins.of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
+
+
+# the search
+
+
+def test_it_stops_at_the_first_level_that_is_not_borne(monkeypatch):
+    island = kind_of(lambda base, level: pushed(not 1.3 < level < 2.5))
+    monkeypatch.setitem(margin_kinds.SPECS, "island", island)
+    (margin,) = margins.of([pushed(True)], ["island"])
+    assert margin.value == pytest.approx(1.3, rel=FINE)
+    assert margin.searched == 4.0
+
+
+def test_an_island_between_two_levels_goes_unseen(monkeypatch):
+    monkeypatch.setitem(margin_kinds.SPECS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
+    (margin,) = margins.of([pushed(True)], ["island"])
+    assert margin.open
+
+
+def test_what_never_fails_is_told_by_value_and_searched_alike(monkeypatch):
+    monkeypatch.setitem(margin_kinds.SPECS, "nothing", kind_of(lambda base, level: pushed(True)))
+    (margin,) = margins.of([pushed(True)], ["nothing"])
+    assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
+
+
+def test_a_law_that_fails_anyway_has_no_margin():
+    (margin,) = margins.of([dataclasses.replace(BASE, law=smc.law("none"))], ["mass"])
+    assert math.isnan(margin.value)
+    assert not margin.open
+
+
+def test_a_margin_below_the_smallest_level_is_found_too(monkeypatch):
+    monkeypatch.setitem(margin_kinds.SPECS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
+    (margin,) = margins.of([pushed(True)], ["tiny"])
+    assert margin.value == pytest.approx(0.3, abs=FINE)
+
+
+def test_delays_are_whole_control_periods():
+    slow = dataclasses.replace(BASE, control_period=0.03, physics_step=None)
+    (margin,) = margins.of([slow], ["delay"])
+    periods = margin.value / 0.03
+    assert periods == pytest.approx(round(periods))
+    assert margin.resolution == pytest.approx(0.03)
+
+
+def test_it_tells_how_far_it_is():
+    told = []
+    margins.of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))
+    assert all(0.0 < done <= whole for done, whole in told)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert told[-1][0] == told[-1][1]
+
+
+# theory beside it
+
+
+@pytest.mark.parametrize("plant", scenarios.PLANTS)
+def test_the_disturbance_borne_is_the_one_of_theory(plant):
+    (margin,) = margins.margins([plant], ["observer_free"], ["disturbance"], "study", quick=True)
+    assert margin.theory is not None
+    assert margin.value <= margin.theory * 1.001
+    assert margin.value + margin.resolution >= margin.theory * 0.999
+
+
+def test_a_delay_may_be_borne_beyond_where_rest_turns_unstable_in_a_small_oscillation():
+    (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
+    assert margin.theory is not None
+    assert margin.theory - BASE.control_period < margin.value < 1.25 * margin.theory
+    ringing = scenarios.scenario("inverted_pendulum", "observer_free", changes={"input_delay": margin.value})
+    x = abs(smc.run(ringing).x[:, 0])
+    assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)  # neither grows nor decays
+    assert 0.01 < x[-1000:].max() / 0.5 <= margin_kinds.BEARS
+
+
+def test_dry_friction_up_to_theory_is_borne(found):
+    friction = next(margin for margin in found if margin.kind == "friction")
+    assert friction.theory is not None
+    assert friction.value >= friction.theory - friction.resolution
+
+
+def test_only_laws_with_a_linear_part_have_theory(found):
+    assert [margin.kind for margin in found if margin.theory is not None] == ["delay", "disturbance", "friction"]
+
+
+POLES = """
+<mujoco><option integrator="RK4"/><worldbody>
+  <body><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
+  <body pos="0 2 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
+</worldbody><actuator>{motors}</actuator>{rest}</mujoco>"""
+MOTORS = '<motor joint="a" gear="40" ctrlrange="-1 1"/><motor joint="b" gear="15" ctrlrange="-1 1"/>'
+
+
+@pytest.fixture
+def poles(tmp_path):
+    """A function that makes a plant of two poles whose motors are of unlike strength."""
+
+    def make(rest="", channels=("a", "b")) -> smc.Plant:
+        path = tmp_path / f"{'tied' if rest else 'free'}.xml"
+        path.write_text(POLES.format(motors=MOTORS, rest=rest))
+        return smc.plant_from(path, channels)
+
+    return make
+
+
+def test_theory_knows_the_weakest_motor(poles):
+    strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
+    base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
+    at = 15.0 / (30.0 * 5.0 / 0.01)  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
+    expected = margin_kinds.SPECS["disturbance"].expected(base)
+    assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
+
+
+def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
+    """Of a model that is not known, of two units, and of a pole without an actuator."""
+    law, runs = smc.law("boundary_layer", k=30.0, phi=0.1, c=5.0), {"duration": 1.5}
+    tied = poles('<equality><joint joint1="a" joint2="b"/></equality>', ["a"])
+    bases = [
+        smc.Scenario(plant=tied, law=law, x0=0.2, **runs),
+        smc.Scenario(plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs),
+        smc.Scenario(plant="cart_pole", law=law, x0=0.0, **runs),
+    ]
+    found = margins.of(bases, ["disturbance"], COARSE)
+    assert [margin.theory for margin in found] == [None] * 3
+    assert found[0].value > 0.1
+    assert found[1].value > 0.1
+
+
+def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
+    heavier = margin_kinds.SPECS["mass"].put
+    for name in ("mass", "M"):
+        known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
+        assert heavier(known, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
+    assert heavier(BASE, 2.0).mismatch == {"mass": 2.0}
+    (margin,) = margins.of([dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE)
+    assert margin.kind == "mass"
+
+
+# files and the command
+
+
+def test_margins_survive_their_file(found, tmp_path):
+    path = margins.save([*found, ROUGH], tmp_path / "margins.json")
+    *again, rough = margins.load(path)
+    assert again == found
+    assert math.isnan(rough.value)
+    assert rough.theory == math.inf
+    json.loads(path.read_text(), parse_constant=pytest.fail)
+
+
+@pytest.mark.parametrize("text", ["", "3", '[{"plant": 1}]'])
+def test_what_holds_no_margins_is_refused(text, tmp_path):
+    path = tmp_path / "margins.json"
+    path.write_text(text)
+    with pytest.raises(smc.ScenarioError, match="is no file of margins"):
+        margins.load(path)
+    with pytest.raises(smc.ScenarioError, match=r"end the name in .json"):
+        margins.save([], tmp_path / "margins.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((["duffin"], ["classical"], ["delay"], "study"), "did you mean 'duffing'"),
+        ((["duffing"], ["classic"], ["delay"], "study"), "did you mean 'classical'"),
+        ((["duffing"], ["classical"], ["delays"], "study"), "did you mean 'delay'"),
+        ((["duffing"], ["classical"], ["delay"], "best"), "unknown set of gains"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_the_cure(arguments, sentence):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        margins.margins(*arguments)
+
+
+def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
+    path = tmp_path / "margins.json"
+    command(["duffing"], "observer_free,classical", "disturbance", "study", quick=True, json=path)
+    shown = capsys.readouterr().out
+    assert "largest disturbance borne" in shown
+    assert "1.29" in shown
+    assert [entry["law"] for entry in json.loads(path.read_text())] == ["observer_free", "classical"]
+
+
+def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(capsys, monkeypatch):
+    monkeypatch.setattr(margins, "margins", lambda *a, **k: pytest.fail("it ran"))
+    with pytest.raises(SystemExit):
+        command(["duffing"], json="margins.txt")
+    assert "end the name in .json" in capsys.readouterr().err
+
+
+def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_borne():
+    from rich.console import Console
+
+    console = Console(width=100)
+    with console.capture() as captured:
+        console.print(table("delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]))
+    first, second = captured.get().splitlines()[-3:-1]
+    assert "none" in first
+    assert "any" in first
+    assert ">= 1.00" in second
+
+
+def test_what_is_quick_is_part_of_the_study():
+    assert set(QUICK["plants"]) <= set(scenarios.PLANTS)
+    assert set(QUICK["kinds"]) <= set(KINDS)
+    assert set(scenarios.LAWS) <= set(gains.LAWS)

@@ -1,0 +1,622 @@
+"""Statistics: intervals cover what they say, ranks are paired, and no winner is declared inside the noise."""
+
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from rich.console import Console
+from scipy import stats
+
+import smc_mujoco as smc
+from smc_mujoco import grid
+from smc_mujoco.analysis import paired_runs as cells
+from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
+from smc_mujoco.analysis.differences import OF_VALUE, exceeds, least_difference, worse
+from smc_mujoco.analysis.friedman import friedman
+from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, holm
+from smc_mujoco.analysis.ranking import ranks as places
+from smc_mujoco.cli.leaderboard_table import leaderboard_table
+from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.metrics.catalogue import metrics as every_metric
+from smc_mujoco.simulation import serialise
+from smc_mujoco.studies import run_key
+from smc_mujoco.studies import study as run_study
+from smc_mujoco.studies.leaderboard import METRICS, Board, leaderboard
+from smc_mujoco.studies.paper import scenarios as paper
+
+INF = math.inf
+FEW = 199  # resamples
+
+
+class Stand:
+    """A stand-in for a study's table: columns by name."""
+
+    def __init__(self, **columns):
+        rows = len(columns["law"])
+        given = {"plant": ["duffing"] * rows, "condition": ["nominal"] * rows, "failure": [None] * rows}
+        given |= {"diverged_at": [math.nan] * rows, "seed": list(range(rows))}
+        self.columns = {name: np.asarray(values) for name, values in (given | columns).items()}
+
+    def column(self, name: str) -> np.ndarray:
+        return find("column", name, self.columns)
+
+    def scenario(self, i: int):
+        return serialise.restore(json.loads(self.column("scenario")[i]))
+
+    def taken(self, rows) -> "Stand":
+        return Stand(**{name: values[rows] for name, values in self.columns.items()})
+
+
+def stand(scores: dict[str, np.ndarray], metric: str = "itae", **columns) -> Stand:
+    """law -> (conditions, seeds) as a table of one plant."""
+    conditions, seeds = next(iter(scores.values())).shape
+    return Stand(
+        law=np.repeat(list(scores), conditions * seeds),
+        condition=np.tile(np.repeat([f"c{i}" for i in range(conditions)], seeds), len(scores)),
+        seed=np.tile(np.arange(seeds), len(scores) * conditions),
+        **{metric: np.concatenate([s.ravel() for s in scores.values()])},
+        **columns,
+    )
+
+
+def by_law(found):
+    return {one.law: one for one in found}
+
+
+def ranks(scores, resamples: int = 1999, **options) -> list[Rank]:
+    return places(compare(scores, **options), resamples)
+
+
+def within(count: int, runs: int, probability: float) -> bool:
+    """Whether a count is one that a binomial distribution has but for 1 in 10,000."""
+    return bool(stats.binomtest(count, runs, probability).pvalue > 1e-4)
+
+
+# medians
+
+
+def test_few_values_by_hand():
+    assert median_interval([3.0, 1.0, 2.0]) == Interval(2.0, 1.0, 3.0, 3)
+    assert median_interval([4.0, 1.0, 2.0, 3.0]) == Interval(2.5, 1.0, 4.0, 4)
+
+
+@pytest.mark.parametrize(("n", "low", "high"), [(5, 1, 5), (7, 1, 7), (10, 2, 9), (20, 6, 15)])
+def test_the_ends_are_the_order_statistics_that_the_binomial_distribution_gives(n, low, high):
+    """P*(median* <= x_(j)) = P(Bin(n, j / n) >= n / 2), Efron 1979; against the expanded percentile."""
+    tail = stats.norm.cdf(-math.sqrt(n / (n - 1)) * stats.t.ppf(0.975, n - 1))
+    below = [stats.binom.sf(math.ceil(n / 2) - 1, n, j / n) for j in range(1, n + 1)]
+    assert 1 + np.argmax(np.array(below) >= tail) == low
+    assert median_interval(np.arange(1.0, n + 1))[1:3] == (low, high)
+
+
+@pytest.mark.parametrize(("n", "low", "high"), [(5, 1, 5), (10, 2, 9), (20, 6, 15)])
+def test_the_interval_of_a_skewed_sample_covers_as_often_as_its_order_statistics_do(n, low, high):
+    rng, runs = np.random.default_rng(n), 1000
+    samples = rng.lognormal(sigma=2.0, size=(runs, n))  # median 1
+    samples[rng.random((runs, n)) < 0.1 * (samples > 1)] = INF  # as failures among the worse half: the median stays
+    found = [median_interval(sample) for sample in samples]
+    covered = sum(one.low <= 1.0 <= one.high for one in found)
+    probability = stats.binom.cdf(high - 1, n, 0.5) - stats.binom.cdf(low - 1, n, 0.5)
+    assert probability >= min(0.93, 1 - 2 ** (1 - n))
+    assert within(covered, runs, probability)
+
+
+def test_from_six_to_forty_seeds_it_covers_93_percent_or_more():
+    for n in range(6, 41):
+        low, high = median_interval(np.arange(1, n + 1))[1:3]
+        assert stats.binom.cdf(high - 1, n, 0.5) - stats.binom.cdf(low - 1, n, 0.5) > 0.93
+
+
+def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_pooled_runs_does_not():
+    rng, runs, covered, pooled = np.random.default_rng(0), 300, 0, 0
+    for _ in range(runs):
+        values = rng.normal(size=(1, 12)) + 0.1 * rng.normal(size=(8, 12))  # the seed decides; median 0
+        one, other = median_interval(values), median_interval(values.ravel())
+        covered += one.low <= 0 <= one.high
+        pooled += other.low <= 0 <= other.high
+    assert covered / runs > 0.92
+    assert pooled / runs < 0.7
+
+
+def test_never_is_worst_and_ends_an_interval():
+    assert median_interval([1, 2, 3, 4, INF, INF, INF]) == Interval(4.0, 1.0, INF, 7)
+    assert median_interval([1, INF]).median == INF
+    assert median_interval([INF] * 9) == Interval(INF, INF, INF, 9)
+
+
+def test_a_constant_has_no_width_and_a_single_seed_no_interval():
+    assert median_interval([2.5] * 6) == Interval(2.5, 2.5, 2.5, 6)
+    for one in (median_interval([2.5]), median_interval([[1.0], [4.0]])):
+        assert one.median == 2.5
+        assert math.isnan(one.low)
+        assert math.isnan(one.high)
+        assert one.n == 1
+
+
+def test_intervals_are_the_same_each_time_and_in_any_order():
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=30)  # whose upper end is near the next value
+    assert {median_interval(rng.permutation(values)) for _ in range(20)} == {median_interval(values)}
+    assert np.exp(median_interval(values)[1:3]) == pytest.approx(median_interval(np.exp(values))[1:3])
+
+
+@pytest.mark.parametrize("values", [[], [1.0, math.nan], np.zeros((2, 2, 2))])
+def test_values_that_are_none_are_refused(values):
+    with pytest.raises(ScenarioError, match="give"):
+        median_interval(values)
+
+
+@pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9)])
+def test_a_level_or_a_number_of_resamples_out_of_range_is_refused(name, value):
+    with pytest.raises(ScenarioError, match=name):
+        median_interval([1.0, 2.0], **{name: value})
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 1), (3, 20), (20, 20)])
+def test_the_interval_of_a_share_is_wilson_s(k, n):
+    wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
+    assert share_interval(k / n, n)[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
+
+
+# ranks
+
+
+def test_ranks_are_those_of_the_medians_of_each_block():
+    scores = {"a": [[1.0, 1.0, 9.0], [INF, INF, 1.0]], "b": [[1.02, 5.0, 1.0], [INF, INF, 2.0]]}
+    scores["c"] = [[3.0, 1.0, 4.0], [2.0, 3.0, INF]]
+    found = by_law(ranks(scores))  # medians 1, 1.02, 3: the first two tied; never, never, 3
+    assert {law: rank.mean for law, rank in found.items()} == {"a": 2.0, "b": 2.0, "c": 2.0}
+    scores["b"][0][0] = 1.04  # by more than 3 %
+    assert {law: rank.mean for law, rank in by_law(ranks(scores)).items()} == {"a": 1.75, "b": 2.25, "c": 2.0}
+
+
+def test_the_interval_of_a_place_is_that_of_seeds_drawn_again_and_laws_ranked_again():
+    rng = np.random.default_rng(5)
+    scores = {f"law{i}": rng.lognormal(size=(3, 12)) * (1 + 0.3 * i) for i in range(5)}
+    cells = np.stack(list(scores.values()))
+    drawn = np.median(cells[:, :, rng.integers(0, 12, (2000, 12))], axis=3)  # law, block, draw
+    places = stats.rankdata(stats.rankdata(drawn, axis=0).mean(axis=1).round(9), axis=0)
+    tail = stats.norm.cdf(-math.sqrt(12 / 11) * stats.t.ppf(0.975, 11))
+    low, high = np.quantile(places, [tail, 1 - tail], axis=1)
+    found = by_law(ranks(scores))
+    assert [found[law].low for law in scores] == pytest.approx(low, abs=0.5)
+    assert [found[law].high for law in scores] == pytest.approx(high, abs=0.5)
+    assert [found[law].median for law in scores] == pytest.approx(np.median(places, axis=1), abs=0.5)
+    assert len(set(low)) > 2  # not all alike
+
+
+def test_differences_that_are_rounding_are_ties():
+    a, b = np.array([1.0, 1e-12, 1.0, INF]), np.array([1.0 + 1e-9, 3e-11, 1.001, 2.0])
+    assert worse(a, b).tolist() == [0.0, 0.0, -1.0, 1.0]
+    assert worse(b, a).tolist() == [0.0, 0.0, 1.0, -1.0]
+
+
+def test_the_least_relevant_difference_is_of_the_larger_value_of_the_scale_or_what_the_sensor_tells():
+    assert least_difference(2.0) == pytest.approx(0.06)
+    assert least_difference(2.0, scale=20.0) == pytest.approx(0.1)
+    assert least_difference(2.0, scale=20.0, resolution=0.2) == pytest.approx(0.2)
+    assert exceeds([1.04, 1.02, INF, INF, 1.0], [1.0, 1.0, 1.0, INF, INF]).tolist() == [True, False, True, False, False]
+    assert not exceeds(1.04, 1.0, scale=10.0)
+    assert not exceeds(1e-10, 0.0)  # rounding
+
+
+def test_corrected_p_values_are_holms():
+    p = np.array([[0.01, 0.04], [0.03, 0.005]])
+    assert holm(p) == pytest.approx(np.array([[0.03, 0.06], [0.06, 0.02]]))  # 0.005 * 4, 0.01 * 3, 0.03 * 2, 0.04
+    rng = np.random.default_rng(0)
+    a, b, c = rng.lognormal(size=(3, 2, 20))
+    scores = {"a": a, "b": b * 1.5, "c": c * 3}
+    pairs = [(x[k], y[k]) for k in range(2) for x, y in ((a, b * 1.5), (a, c * 3), (b * 1.5, c * 3))]
+    single = [stats.binomtest(int((x < y).sum()), 20).pvalue for x, y in pairs]
+    wanted = iter(sorted(np.maximum.accumulate(np.sort(single) * np.arange(6, 0, -1)).clip(max=1)))
+    found = compare(scores).p
+    assert sorted(np.minimum(found, found.transpose(0, 2, 1))[:, *np.triu_indices(3, 1)].ravel()) == pytest.approx(
+        list(wanted)
+    )
+
+
+def blocks(*factors: float, seeds: int = 20, seed: int = 0) -> np.ndarray:
+    """Starts that vary far more from seed to seed than laws do, times a factor a block: (blocks, seeds)."""
+    return np.random.default_rng(seed).lognormal(size=(1, seeds)) * np.array(factors)[:, None]
+
+
+def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals_overlap():
+    scores = {"a": blocks(1.0), "b": blocks(1.05)}
+    a, b = median_interval(scores["a"]), median_interval(scores["b"])
+    assert a.high > b.low
+    found = by_law(ranks(scores))
+    assert (found["a"].best, found["b"].best) == (True, False)
+    assert (found["a"].low, found["a"].high, found["b"].low, found["b"].high) == (1, 1, 2, 2)
+    shuffled = {"a": blocks(1.0), "b": np.random.default_rng(1).permutation(blocks(1.05)[0])}  # the same, unpaired
+    assert all(rank.best for rank in ranks(shuffled))
+
+
+@pytest.mark.parametrize(("factor", "wins"), [(1.02, False), (1.04, True)])
+def test_less_than_the_least_relevant_difference_is_a_tie_however_sure_it_is(factor, wins):
+    found = compare({"a": blocks(1.0), "b": blocks(factor)})
+    assert found.p[0, 0, 1] < 1e-4
+    assert found.best == [("a",) if wins else ("a", "b")]
+    assert (1 - 1 / factor > OF_VALUE) == wins
+    floored = compare({"a": blocks(1.0), "b": blocks(factor)}, floors=1.0)
+    assert floored.best == [("a", "b")]
+
+
+def test_a_law_ahead_in_nearly_every_seed_does_not_win_with_the_worse_median():
+    a = np.geomspace(1.0, 1e4, 25)
+    b = np.roll(a, -1)  # a is ahead in 24 of 25
+    b[11] *= 0.9  # the median
+    found = compare({"a": a, "b": b})
+    assert found.p[0, 0, 1] < 1e-5
+    assert np.median(b) < 0.95 * np.median(a)
+    assert found.best == [("a", "b")]
+
+
+def test_a_law_that_is_always_last_does_not_hide_that_another_is_beaten():
+    scores = {"a": blocks(1.0), "b": blocks(1.1), "z": blocks(9.0), "never": blocks(INF)}
+    assert compare({law: scores[law] for law in "ab"}).best == [("a",)]
+    assert compare(scores).best == [("a",)]
+
+
+@pytest.mark.parametrize(("seeds", "wins"), [(1, False), (SEEDS - 1, False), (SEEDS, True)])
+def test_fewer_than_sixteen_seeds_tell_no_laws_apart(seeds, wins):
+    board = leaderboard(stand({"a": blocks(1, 2, seeds=seeds), "b": blocks(2, 4, seeds=seeds)}), ["itae"])[0]
+    assert board.winner == ("a" if wins else None)
+    assert ("too few" in board.verdict) != wins
+
+
+def test_sixteen_seeds_are_too_few_for_very_many_comparisons_and_the_board_says_so():
+    laws = {f"law{i:02}": blocks(*range(i + 1, i + 6), seeds=SEEDS) for i in range(30)}
+    board = leaderboard(stand(laws), ["itae"], resamples=FEW)[0]
+    assert board.pairs == 5 * 30 * 29 / 2
+    assert board.verdict == "no winner: 16 seeds, too few for 2175 comparisons"
+    enough = {law: blocks(*range(i + 1, i + 6), seeds=20) for i, law in enumerate(laws)}
+    assert leaderboard(stand(enough), ["itae"], resamples=FEW)[0].winner == "law00"
+
+
+def simulated(laws: int, seeds: int, bad: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Equal laws that share the effect of their seed, a fifth of the runs failing, and `bad` ones that are worse."""
+    own = rng.lognormal(sigma=0.5, size=(laws + bad, 1, seeds)) * rng.lognormal(size=(laws + bad, 3, seeds))
+    cells = rng.lognormal(size=(1, 1, seeds)) * own
+    cells[laws:] *= 30.0
+    cells[rng.random(cells.shape) < 0.2] = INF
+    return {f"law{i}": c for i, c in enumerate(cells)}
+
+
+@pytest.mark.parametrize(("laws", "seeds", "bad"), [(2, 16, 0), (2, 20, 0), (2, 17, 2), (3, 16, 1), (6, 20, 0)])
+def test_equal_laws_are_seldom_separated_in_any_block(laws, seeds, bad):
+    rng, runs, wrong = np.random.default_rng(laws + seeds), 400, 0
+    for _ in range(runs):
+        wrong += bool(compare(simulated(laws, seeds, bad, rng)).better[:, :laws, :laws].any())
+    assert stats.binomtest(wrong, runs, 0.05, alternative="greater").pvalue > 1e-3
+
+
+def test_of_two_equal_laws_in_one_block_one_wins_as_often_as_the_sign_test_is_wrong():
+    rng, runs, seeds = np.random.default_rng(0), 2000, 20
+    found = [compare({"a": a, "b": b}) for a, b in rng.lognormal(size=(runs, 2, seeds))]
+    assert within(sum(bool((one.p <= 0.05).any()) for one in found), runs, 2 * stats.binom.cdf(5, seeds, 0.5))  # 4.1 %
+    assert sum(bool(one.better.any()) for one in found) <= sum(bool((one.p <= 0.05).any()) for one in found)
+
+
+def test_laws_that_do_the_same_are_never_separated():
+    scores = np.random.default_rng(0).lognormal(size=(4, 30))
+    for rank in ranks({"a": scores, "b": scores.copy(), "c": scores.copy()}):
+        assert (rank.mean, rank.place, rank.median, rank.low, rank.high, rank.p) == (2, 2, 2, 2, 2, 1)
+
+
+def test_a_law_that_is_clearly_better_wins():
+    rng = np.random.default_rng(3)
+    wins = 0
+    for _ in range(50):
+        scores = simulated(4, 20, 0, rng)
+        scores["better"] = 0.02 * scores.pop("law0")
+        scores["better"][np.isinf(scores["better"])] = 0.01
+        wins += compare(scores).best == [("better",)] * 3
+    assert wins >= 45
+
+
+def test_over_several_conditions_only_what_holds_in_each_is_told():
+    """a beats b, b beats c and c beats a, each in two of three conditions."""
+    scores = {"a": blocks(1, 2, 3), "b": blocks(2, 3, 1), "c": blocks(3, 1, 2)}
+    board = leaderboard(stand(scores), ["itae"])[0]
+    assert (board.best, board.winner) == ((), None)
+    assert board.verdict == (
+        "no winner in all 3 conditions: a wins under c0, loses under c1, c2; b wins under c2, loses under c0, c1; "
+        "c wins under c1, loses under c0, c2"
+    )
+    assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].verdict == (
+        "winner: a, in all 2 conditions"
+    )
+    text = " ".join(printed([board]).split())
+    assert "too few" not in text
+    assert text.count("1 won 2 lost") == 3
+    level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
+    assert level.verdict == "no winner in all 2 conditions: a wins under c1"
+
+
+def test_friedman_s_test_is_scipy_s_and_the_critical_difference_demsar_s():
+    rng = np.random.default_rng(0)
+    medians = rng.integers(0, 6, size=(5, 12)).astype(float)  # with ties
+    scores = {f"law{i}": np.stack([row - 0.01, row, row + 0.01], axis=1) for i, row in enumerate(medians)}
+    found = friedman(compare(scores))
+    assert found is not None
+    assert found.p == pytest.approx(stats.friedmanchisquare(*medians).pvalue)
+    assert found.critical_difference == pytest.approx(2.728 * math.sqrt(5 * 6 / (6 * 12)), rel=1e-3)  # his table 5a
+    assert found.blocks == 12
+    assert friedman(compare({"a": medians[:1], "b": medians[1:2]})) is None
+    same = friedman(compare({"a": medians, "b": medians}))
+    assert same is not None
+    assert same.p == 1.0
+
+
+@pytest.mark.parametrize("other", [np.zeros((2, 3)), np.array([[1.0, math.nan]])])
+def test_laws_of_different_cells_are_refused(other):
+    with pytest.raises(ScenarioError, match="cells"):
+        compare({"a": np.array([[1.0, 2.0]]), "b": other})
+
+
+# leaderboards
+
+
+def study(seeds: int = 20, seed: int = 0) -> Stand:
+    """Two plants, three laws, two conditions; law c never settles on duffing, and fails in one run on van_der_pol."""
+    rng, rows = np.random.default_rng(seed), []
+    for plant in ("van_der_pol", "duffing"):
+        for condition in ("nominal", "noise"):
+            for s in range(seeds):
+                start = rng.lognormal()
+                rows += [(plant, condition, s, law, start * (1 + i)) for i, law in enumerate("abc")]
+    plants, conditions, number, laws, values = (np.array(column) for column in zip(*rows, strict=True))
+    settling = np.where((plants == "duffing") & (laws == "c"), INF, values)
+    failed = (plants == "van_der_pol") & (laws == "c") & (number == 1) & (conditions == "noise")
+    metrics = {name: np.where(failed, math.nan, values) for name in METRICS[2:]}
+    return Stand(
+        plant=plants,
+        condition=conditions,
+        seed=number,
+        law=laws,
+        settling_time=np.where(failed, math.nan, settling),
+        failure=np.where(failed, "left the world", None),
+        diverged_at=np.where(failed, 1.0, math.nan),
+        spread_settling_time=np.full(len(rows), math.nan),
+        **metrics,
+    )
+
+
+def picked(boards: list[Board], metric: str, **group: str) -> Board:
+    (found,) = (b for b in boards if b.metric == metric and b.group == group)
+    return found
+
+
+def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
+    table = study()
+    boards = leaderboard(table)
+    assert [(b.group["plant"], b.metric) for b in boards[:5]] == [("van_der_pol", name) for name in METRICS]
+    assert len(boards) == 10
+    itae = picked(boards, "itae", plant="duffing")
+    assert [entry.law for entry in itae.entries] == ["a", "b", "c"]
+    rows = (table.column("plant") == "duffing") & (table.column("law") == "b")
+    each = [np.median(table.column("itae")[rows & (table.column("condition") == c)]) for c in ("nominal", "noise")]
+    assert itae.entries[1].interval.median == np.median(each)
+    assert [block.medians["b"] for block in itae.blocks] == each
+    assert (itae.winner, itae.verdict, itae.cells, itae.seeds) == ("a", "winner: a, in all 2 conditions", 40, 20)
+    assert itae.unit == "{x} s^2"
+    settles = picked(boards, "settles", plant="duffing")
+    assert [entry.interval.median for entry in settles.entries] == [1.0, 1.0, 0.0]
+    assert settles.verdict == "no winner: a, b"
+    assert by_law(picked(boards, "settling_time", plant="duffing").entries)["c"].interval[:3] == (INF, INF, INF)
+    failing = by_law(picked(boards, "settles", plant="van_der_pol").entries)["c"]
+    assert failing.interval.median == 39 / 40
+
+
+def test_a_failed_run_is_worst_in_every_metric():
+    board = leaderboard(study(), ["tv_rate"])[0]
+    table = study()
+    rows = (table.column("plant") == "van_der_pol") & (table.column("law") == "c")
+    c = table.column("tv_rate")[rows & (table.column("condition") == "noise")]
+    assert board.blocks[1].medians["c"] == np.median(np.where(np.isnan(c), INF, c))
+    assert board.blocks[1].medians["c"] > np.nanmedian(c)
+
+
+def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
+    table = study()
+    boards = leaderboard(table, resamples=FEW)
+    shuffled = leaderboard(table.taken(np.random.default_rng(1).permutation(240)), resamples=FEW)
+    for board in boards:
+        assert picked(shuffled, board.metric, **board.group) == board
+    names = {"a": "z", "b": "y", "c": "x"}
+    renamed = table.taken(slice(None))
+    renamed.columns["law"] = np.array([names[law] for law in table.column("law")])
+    for before, after in zip(boards, leaderboard(renamed, resamples=FEW), strict=True):
+        old, new = by_law(before.entries), by_law(after.entries)
+        for law, name in names.items():
+            assert new[name].interval == old[law].interval
+            assert new[name].rank.mean == pytest.approx(old[law].rank.mean)
+            assert new[name].rank.best == old[law].rank.best
+            assert (new[name].rank.low, new[name].rank.high) == (old[law].rank.low, old[law].rank.high)
+
+
+def test_groups_may_be_conditions_or_all_runs_where_units_allow():
+    table = study()
+    (all_runs,) = leaderboard(table, ["itae"], by=())
+    assert all_runs.cells == 80
+    assert math.isnan(all_runs.entries[0].interval.median)  # rad and m, N and N m
+    assert all_runs.winner == "a"
+    (times,) = leaderboard(table, ["settling_time"], by=())
+    assert math.isfinite(times.entries[0].interval.median)
+    both = leaderboard(table, ["itae"], by=("plant", "condition"))
+    assert [tuple(b.group.values()) for b in both[:2]] == [("van_der_pol", "nominal"), ("van_der_pol", "noise")]
+    assert both[0].friedman is None
+
+
+def test_only_runs_that_all_laws_have_are_compared():
+    table = study()
+    lacking = (table.column("law") == "b") & (table.column("seed") == 3) & (table.column("condition") == "noise")
+    boards = leaderboard(table.taken(~lacking), ["itae"])
+    assert [b.cells for b in boards] == [39, 39]
+    assert {entry.interval.n for entry in boards[0].entries} == {20}
+    without = leaderboard(table.taken((table.column("law") != "b") | (table.column("seed") != 3)), ["itae"])
+    assert [(b.cells, b.seeds) for b in without] == [(38, 19), (38, 19)]
+
+
+def test_a_metric_that_does_not_apply_has_no_board():
+    assert leaderboard(study(), ["spread_settling_time"]) == []
+    assert [b.metric for b in leaderboard(study(), ["spread_settling_time", "itae"])] == ["itae", "itae"]
+
+
+def test_what_cannot_be_compared_is_refused():
+    table = study()
+    first = (table.column("law") == "a") == (table.column("condition") == "nominal")
+    for bad, options, words in (
+        (table.taken(slice(0, 0)), {}, "no runs"),
+        (table, {"metrics": ["speed"]}, "unknown metric"),
+        (table, {"metrics": ()}, "metrics is"),
+        (table, {"by": ("law",)}, "unknown group"),
+        (table, {"level": 1.5}, "level"),
+        (table.taken(np.r_[0:240, 0]), {}, "several runs of a on van_der_pol, nominal, seed 0"),
+        (table.taken(first), {}, "a, b, c have no run of van_der_pol in common"),
+    ):
+        with pytest.raises(ScenarioError, match=words):
+            leaderboard(bad, **options)
+
+
+def printed(boards: list[Board], width: int = 100) -> str:
+    console = Console(width=width, file=io.StringIO())
+    console.print(leaderboard_table(boards))
+    return console.file.getvalue()
+
+
+def test_the_table_says_who_wins_and_where_none_does():
+    text = printed(leaderboard(study()))
+    for words in ("van_der_pol", "40 runs,", "20 seeds", "winner", "no winner", "2 of 3*", "never", "95 % interval"):
+        assert words in text
+    assert "too few" in " ".join(printed(leaderboard(study(seeds=3))).split())
+    assert max(map(len, printed(leaderboard(study()), width=80).splitlines())) <= 80
+
+
+def test_a_real_table_has_what_a_leaderboard_needs():
+    pa = pytest.importorskip("pyarrow")
+    table_type = pytest.importorskip("smc_mujoco.studies.table").Table
+    ran = [run_key.row(paper.scenario(plant, "none"))["scenario"] for plant in study().column("plant")]
+    stand_in = study().taken(slice(None))
+    stand_in.columns |= {"scenario": np.array(ran), "hash": np.array([""] * len(ran))}
+    columns = {name: values.tolist() for name, values in stand_in.columns.items()}
+    numbers = {name: pa.array(v, from_pandas=True) for name, v in columns.items() if isinstance(v[0], float)}
+    table = table_type(data=pa.table(columns | numbers))
+    assert leaderboard(table, resamples=FEW) == leaderboard(stand_in, resamples=FEW)
+
+
+# what a verdict may say
+
+
+def checked(boards: list[Board]) -> int:
+    """How many winners boards name, each of them borne out by the numbers that the board shows."""
+    named = 0
+    for board in boards:
+        for block in board.blocks:
+            if block.winner:
+                others = [m for law, m in block.medians.items() if law != block.winner]
+                assert exceeds(min(others), block.medians[block.winner])
+                assert block.runs >= SEEDS
+                named += 1
+            lowest = min(block.medians, key=block.medians.__getitem__)
+            assert lowest in block.best
+        if board.winner:
+            first, *rest = board.entries
+            assert (first.law, first.rank.place) == (board.winner, 1)
+            assert all(entry.rank.place > 1 for entry in rest)
+            if board.metric != "settles" and not math.isnan(first.interval.median):
+                assert not any(exceeds(first.interval.median, entry.interval.median) for entry in rest)
+            assert set(board.wins(board.winner)) == {board.name(block) for block in board.blocks}
+        for entry in board.entries:
+            assert not set(board.wins(entry.law)) & set(board.losses(entry.law))
+            assert entry.rank.best == (not board.losses(entry.law))
+    return named
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
+    rng, named = np.random.default_rng(seed), 0
+    for _ in range(12):
+        laws, conditions, seeds = rng.integers(2, 7), rng.integers(1, 5), rng.integers(14, 26)
+        common = rng.lognormal(size=(1, 1, seeds))
+        values = common * rng.lognormal(sigma=rng.choice([0.01, 0.2, 1.0]), size=(laws, conditions, seeds))
+        values *= rng.choice([0.2, 1.0, 1.02, 1.05, 2.0], size=(laws, conditions, 1))
+        values = np.where(rng.random(values.shape) < rng.choice([0.0, 0.0, 0.2]), INF, values)
+        if rng.random() < 0.3:
+            values = np.ceil(4 * values) / 4  # ties
+        table = stand({f"law{i}": v for i, v in enumerate(values)}, settling_time=values.ravel())
+        named += checked(leaderboard(table, ["itae", "settles", "settling_time"], resamples=FEW))
+        named += checked(leaderboard(table, ["itae"], by=("plant", "condition"), resamples=FEW))
+    assert named > 5
+
+
+def test_seeds_that_change_nothing_are_one_sample():
+    once = {"a": [[1.0]], "b": [[2.0]]}
+    same = stand({law: np.repeat(values, 20, axis=1) for law, values in once.items()})
+    (board,) = leaderboard(same, ["itae"])
+    assert (board.cells, board.seeds, board.winner) == (1, 20, None)
+    assert board.verdict == "no winner: 20 seeds, 1 distinct run"
+    assert all(math.isnan(entry.interval.low) for entry in board.entries)
+    assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
+
+
+def test_a_seed_is_a_sample_if_it_changes_one_law_or_another_metric():
+    still, moved = np.ones((1, 20)), blocks(2.0)
+    (board,) = leaderboard(stand({"a": still, "b": moved}), ["itae"])
+    assert (board.cells, board.winner) == (20, "a")
+    other = stand({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
+    assert leaderboard(other, ["itae"])[0].cells == 20
+
+
+def test_one_condition_without_randomness_is_one_sample_beside_others():
+    (a, b), (one,) = blocks(1.0, 2.0, seeds=20), np.full((1, 20), 1.0)
+    table = stand({"a": np.stack([a, one]), "b": np.stack([b, 2 * one])})
+    (board,) = leaderboard(table, ["itae"])
+    assert [(block.seeds, block.runs, block.winner) for block in board.blocks] == [(20, 20, "a"), (20, 1, None)]
+    assert board.cells == 21
+    text = " ".join(printed([board]).split())
+    assert "20 seeds, 1 distinct run" in text
+    assert board.verdict == "no winner in all 2 conditions: a wins under c0"
+
+
+def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count_are_tied():
+    fine = paper.scenario("duffing", "none")  # x0 1.5, u_max 6
+    coarse = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
+    assert cells.floor(fine, "{x}") == pytest.approx(0.005 * 1.5)
+    assert cells.floor(coarse, "{x}") == pytest.approx(0.5 / 50)  # m
+    assert cells.floor(paper.scenario("inverted_pendulum", "none", "encoder"), "{x}") == pytest.approx(0.0025)
+    assert cells.floor(fine, "{u}/s") == pytest.approx(0.005 * 6)
+    assert cells.floor(fine, "%") == pytest.approx(0.5)
+    assert cells.floor(coarse, "s") == 0.0
+    table = stand({"a": blocks(1e-3), "b": blocks(2e-3)}, metric="ultimate_bound")
+    assert leaderboard(table, ["ultimate_bound"])[0].winner == "a"
+    table.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * 40)
+    assert leaderboard(table, ["ultimate_bound"])[0].verdict == "no winner: a, b"
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """Three plants, five laws, five conditions: real runs."""
+    laws = ["observer_free", "classical", "super_twisting", "adaptive", "boundary_layer"]
+    conditions = ["nominal", "noise", "constant", "coulomb", "encoder"]
+    scenarios = grid(["inverted_pendulum", "van_der_pol", "duffing"], laws, conditions, SEEDS, duration=0.15)
+    return run_study(scenarios, tmp_path_factory.mktemp("study"))
+
+
+def test_no_board_of_real_runs_has_a_verdict_that_contradicts_it(real):
+    names = [metric.name for metric in every_metric()]
+    assert checked(leaderboard(real, [*METRICS, *names], resamples=FEW)) > 0
+    assert checked(leaderboard(real, by=("plant", "condition"), resamples=FEW)) > 0
+    assert checked(leaderboard(real, by=(), resamples=FEW)) > 0
+
+
+def test_a_real_scenario_without_randomness_is_one_run_from_any_seed(tmp_path):
+    scenarios = [
+        paper.scenario("duffing", law, duration=0.2, seed=seed)
+        for law in ("classical", "adaptive")
+        for seed in range(20)
+    ]
+    board = leaderboard(run_study(scenarios, tmp_path), ["itae"])[0]
+    assert board.verdict == "no winner: 20 seeds, 1 distinct run"

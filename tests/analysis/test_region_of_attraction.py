@@ -1,0 +1,251 @@
+"""Regions of attraction: early leaving changes no verdict, and the analytic limits hold."""
+
+import dataclasses
+import importlib
+import json
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import linear_theory
+from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
+from smc_mujoco.cli.commands.basin import basin as command
+from smc_mujoco.draw import region
+
+maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")  # smc.basin is the function
+
+PENDULUM = smc.plant("inverted_pendulum")
+WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
+
+
+def base(plant: str, law: smc.Law, duration: float = 6.0) -> smc.Scenario:
+    return smc.Scenario(plant=plant, law=law, duration=duration, integrator="implicitfast")
+
+
+@pytest.fixture(scope="module")
+def weak():
+    """The inverted pendulum under a law that cannot lift it from everywhere."""
+    return maps.of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 16), np.linspace(-4.5, 4.5, 16))
+
+
+@smc.law_function(gains={"far": 1.0})
+def fails_far_out(y, gains, memory):
+    return math.nan if abs(y.x) > gains.far else -6.0 * math.tanh(y.de + 3.0 * y.e), y.de
+
+
+# verdicts
+
+
+@pytest.mark.parametrize(
+    ("plant", "law"),
+    [
+        ("inverted_pendulum", WEAK),
+        ("inverted_pendulum", smc.law("classical", k=1.945, c=12.0)),
+        ("duffing", smc.law("observer_free", lam=0.9, k1=1.0)),
+        ("van_der_pol", smc.law("observer_free", lam=6.0, k1=1.976)),
+        ("van_der_pol", smc.law("super_twisting", k1=4.567, k2=45.47, c=2.16)),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.name,
+)
+def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law):
+    x, v = np.linspace(-2.2, 2.2, 5), np.linspace(-5.0, 5.0, 4)
+    early = maps.of(base(plant, law), x, v)
+    late = maps.of(base(plant, law), x, v, early=False)
+    assert (early.outcome == late.outcome).all()
+    assert (late.decided_at == 6.0).all()
+
+
+def test_most_of_what_converges_leaves_early(weak):
+    assert (weak.decided_at[weak.outcome == CONVERGES] < 6.0).mean() > 0.5
+
+
+def test_a_law_below_the_smallest_lambda_converges_from_nowhere_else():
+    law = smc.law("observer_free", lam=0.2, k1=3.0)
+    assert law.gains["lam"] < linear_theory.smallest_lam(smc.plant("duffing"), 3.0)
+    found = maps.of(base("duffing", law, 20.0), [-1.5, -0.5, 0.5, 1.5], [-1.0, 1.0])
+    assert (found.outcome == DOES_NOT).all()
+
+
+def test_what_creeps_away_from_an_unstable_rest_has_not_converged():
+    law = smc.law("observer_free", lam=0.23, k1=9.7)  # 0.253 would do
+    found = maps.of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
+    assert found.outcome[1, 1] != CONVERGES
+
+
+@pytest.mark.parametrize(("lam", "k1"), [(0.3, 3.076), (0.95, 1.0)])  # growing by 0.12 and 0.04 per s
+def test_what_leaves_slowly_is_not_taken_for_home_early(lam, k1):
+    plant = smc.plant("duffing")
+    assert lam < linear_theory.smallest_lam(plant, k1)
+    slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
+    found = maps.of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
+    assert (found.outcome[1] != CONVERGES).all()
+
+
+def test_a_run_that_fails_does_not_converge():
+    found = maps.of(base("duffing", fails_far_out(far=1.0), 4.0), [0.5, 1.5], [0.0, 0.1])
+    assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2
+
+
+def test_a_turn_away_is_not_home():
+    found = maps.of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
+    assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
+
+
+def test_what_swings_in_and_out_of_home_at_the_end_is_undecided():
+    swinging = base("van_der_pol", smc.law("none"), 10.0)
+    found = maps.of(swinging, [2.0], [0.0])
+    assert found.outcome.tolist() == [[DOES_NOT]]  # the limit cycle's speed is never home
+    trace = smc.run(dataclasses.replace(swinging, x0=2.0))
+    assert maps.judge(trace, np.array([50.0]), np.array([100.0]), final=True) == UNDECIDED
+
+
+def test_a_state_has_the_same_verdict_in_any_company(weak):
+    alone = maps.of(base("inverted_pendulum", WEAK), weak.x[[0, 7, -1]], weak.v[[0, 9, -1]], threads=1)
+    assert (alone.outcome == weak.outcome[np.ix_([0, 9, -1], [0, 7, -1])]).all()
+
+
+def test_the_channels_of_a_network_start_alike():
+    found = maps.of(
+        base("inverted_pendulum_network", smc.law("observer_free", lam=3.96, k1=9.36), 3.0), [-0.5, 0.5], [0]
+    )
+    assert (found.outcome == CONVERGES).all()
+
+
+@pytest.mark.parametrize("law", [smc.law("classical", k=6.0, c=2.849), smc.law("adaptive", gamma=66.11, c=2.853)])
+def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple(law):
+    """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the end."""
+    x, v = np.linspace(-4.0, 4.0, 5), np.linspace(-12.0, 12.0, 5)
+    assert (maps.of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
+    assert (maps.of(base("van_der_pol", law, 8.0), x, v, early=False).outcome == CONVERGES).all()
+
+    state, h = np.array(np.meshgrid(x, v)), 1e-3
+    gain = np.full((5, 5), law.gains.get("k", 0.0))
+    for sample in range(8000):
+        s = state[1] + law.gains["c"] * state[0]
+        u = np.clip(-gain * np.sign(s), -6.0, 6.0)
+        gain = gain + h * law.gains.get("gamma", 0.0) * np.abs(s)
+
+        def rate(z, u=u):
+            return np.array([z[1], (1.0 - z[0] ** 2) * z[1] - z[0] + u])
+
+        a = rate(state)
+        b = rate(state + h / 2 * a)
+        c = rate(state + h / 2 * b)
+        state = state + h / 6 * (a + 2 * b + 2 * c + rate(state + h * c))
+        if sample >= 6400:
+            assert np.abs(state[0]).max() < 0.02 * 4.0
+            assert np.abs(state[1]).max() < 0.02 * 12.0
+
+
+# analytic limits
+
+
+def test_metres_and_radians_do_not_start_alike():
+    with pytest.raises(smc.ScenarioError, match="cart_pole has channels in m and rad"):
+        maps.of(smc.Scenario(plant="cart_pole", law="none"), [0.1], [0.0])
+
+
+def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
+    limit = maps.holdable(PENDULUM, WEAK.gains["lam"])
+    p = PENDULUM.parameters
+    assert limit == pytest.approx(math.asin(1.5 / (p["m"] * p["grav"] * p["l"])), rel=0.01)
+    found = maps.of(base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0])
+    assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
+
+
+def test_a_torque_above_gravitys_holds_it_anywhere():
+    assert maps.holdable(PENDULUM, 2.46) == math.inf
+    assert maps.holdable(smc.plant("duffing"), 0.1) == pytest.approx(0.101, abs=0.001)  # 0.1 = x - x^3
+
+
+def test_what_has_fallen_over_the_saddle_of_full_torque_does_not_come_back_unless_it_swings_back(weak):
+    """With u = -U, E = J v^2 / 2 + m grav l cos x + U x is constant but for friction; other u take from it on the way.
+
+    So from beyond the saddle, with less than its E, there is no way back. With more a pendulum swings down and back.
+    """
+    p, torque = PENDULUM.parameters, WEAK.gains["lam"]
+    inertia, weight = p["m"] * p["l"] ** 2, p["m"] * p["grav"] * p["l"]
+    saddle = math.asin(torque / weight)
+    x, v = np.meshgrid(weak.x, weak.v)
+    energy = inertia * v**2 / 2 + weight * np.cos(x) + torque * np.abs(x)
+    beyond, low = np.abs(x) > saddle, energy < weight * math.cos(saddle) + torque * saddle
+    assert (beyond & low).sum() > 10
+    assert (weak.outcome[beyond & low] == DOES_NOT).all()
+    assert (weak.outcome[beyond & ~low] == CONVERGES).any()
+
+
+def test_the_map_of_an_odd_plant_and_law_is_odd(weak):
+    assert (weak.outcome == weak.outcome[::-1, ::-1]).all()
+
+
+# files and pictures
+
+
+def test_a_map_survives_its_file(weak, tmp_path):
+    again = maps.load(weak.save(tmp_path / "map.json"))
+    for field in dataclasses.fields(Basin):
+        assert np.array_equal(getattr(again, field.name), getattr(weak, field.name))
+    assert again.outcome.dtype == np.int8
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"plant": 1}'])
+def test_what_is_no_map_is_refused(text, tmp_path):
+    path = tmp_path / "map.json"
+    path.write_text(text)
+    with pytest.raises(smc.ScenarioError, match="is no map"):
+        maps.load(path)
+
+
+def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
+    assert region.draw([weak, weak], tmp_path / "map.png").stat().st_size > 10_000
+    classes, entries = region.classed(weak)
+    assert np.array_equal(classes == 4, weak.outcome == DOES_NOT)
+    assert sum(float(words.split(": ")[1].rstrip(" %")) for _, words in entries) == pytest.approx(100, abs=1)
+    with pytest.raises(smc.ScenarioError, match=r"end the name in .png or .svg"):
+        region.draw([weak], tmp_path / "map.pdf")
+
+
+@pytest.mark.parametrize("points", [(1, 5), (5, 0), (5, 2.5)])
+def test_a_grid_of_nothing_is_refused(points):
+    with pytest.raises(smc.ScenarioError, match="points in"):
+        maps.basin("duffing", "observer_free", points, gains="study")
+
+
+@pytest.mark.parametrize("early", [True, False])
+def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(early):
+    least = 0.067 if early else 0.01
+    short = base("duffing", smc.law("classical"), duration=0.8 * least)
+    with pytest.raises(smc.ScenarioError, match=r"duration \S* s is too short to tell .*: give at least \S* s$"):
+        maps.of(short, [0.1], [0.1], early=early)
+    assert maps.of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
+
+
+@pytest.mark.parametrize("x", [[], [math.nan], [[1.0]]])
+def test_positions_that_are_none_are_refused(x):
+    with pytest.raises(smc.ScenarioError, match="give one or more finite numbers"):
+        maps.of(base("duffing", WEAK), x, [0.0])
+
+
+def test_the_study_maps_by_name_and_tells_how_far_it_is():
+    told = []
+    found = maps.basin("duffing", "observer_free", (3, 2), None, None, "study", 2.0, report=lambda *a: told.append(a))
+    assert (found.x.tolist(), found.v.tolist(), found.unit) == ([-3.0, 0.0, 3.0], [-9.0, 9.0], "m")
+    assert all(0 < done <= most for done, most in told)
+    assert told == sorted(told)
+
+
+def test_the_command_prints_the_share_and_writes_what_it_is_asked_for(tmp_path, capsys):
+    command("duffing", points=2, gains="study", duration=1.0, out=tmp_path / "a.png", json=tmp_path / "a.json")
+    assert "% of the states converge" in capsys.readouterr().out
+    assert json.loads((tmp_path / "a.json").read_text())["plant"] == "duffing"
+    assert (tmp_path / "a.png").exists()
+
+
+def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(capsys, monkeypatch):
+    monkeypatch.setattr(maps, "basin", lambda *a, **k: pytest.fail("it ran"))
+    for option in ({"out": "map.gif"}, {"json": "map.txt"}):
+        with pytest.raises(SystemExit):
+            command("duffing", **option)
+        assert "end the name in" in capsys.readouterr().err

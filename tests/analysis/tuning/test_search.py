@@ -1,0 +1,314 @@
+"""What tuning promises: one rule for every law, the same gains for the same seed, never worse for a larger budget."""
+
+import dataclasses
+import json
+import math
+import warnings
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search, search_space
+from smc_mujoco.analysis.tuning.objective import FAILED, Objective
+from smc_mujoco.analysis.tuning.search import FINALISTS, STAGE, compare, load, tune
+from smc_mujoco.cli import main
+from smc_mujoco.metrics.catalogue import itae, tv
+from smc_mujoco.studies.paper import scenarios
+
+SHORT = Objective(duration=1.0)
+LEAN = Objective(conditions=("nominal",), duration=0.5)
+
+
+@smc.law_function(gains={"when": 0.1, "k": 3.0})
+def failing(y, gains, memory):
+    return math.nan if y.t > gains.when else -gains.k * (y.de + 2.0 * y.e), y.e
+
+
+@pytest.fixture(scope="module")
+def found():
+    """One tuning, for those tests that only look at it."""
+    return tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT)
+
+
+# the same seed, a larger budget
+
+
+def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
+    assert tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT, threads=1) == found
+    assert tune("duffing", "observer_free", budget=64, seed=4, objective=SHORT).law != found.law
+
+
+@pytest.mark.parametrize("law", ["observer_free", "adaptive_leak"])
+def test_a_larger_budget_goes_on_where_a_smaller_one_stopped(law):
+    runs = [tune("duffing", law, budget=budget, objective=LEAN) for budget in (STAGE, 2 * STAGE, 3 * STAGE)]
+    longest = runs[-1]
+    for one in runs:
+        assert one.history == longest.history[: one.budget]
+        assert one.finals == longest.finals[: len(one.finals)]
+        assert one.objective == min(e.objective for e in one.finals)
+    assert [len(one.finals) for one in runs] == [FINALISTS, 2 * FINALISTS, 3 * FINALISTS]
+    assert [one.objective for one in runs] == sorted((one.objective for one in runs), reverse=True)
+
+
+def test_the_best_of_each_stage_are_run_accurately(found):
+    """Euler's method ranks candidates, RK4 decides: its objective is not the one that the search saw."""
+    known = {e.gains: e.objective for e in found.history}
+    first = sorted(found.history[:STAGE], key=lambda e: e.objective)[:FINALISTS]
+    assert [e.gains for e in found.finals[:FINALISTS]] == [e.gains for e in first]
+    ratios = [e.objective / known[e.gains] for e in found.finals]
+    assert all(0.9 < ratio < 1.1 for ratio in ratios)
+    assert not any(ratio == 1.0 for ratio in ratios)
+
+
+def test_what_is_not_integrated_by_rk4_is_run_as_it_is_in_both_rounds():
+    cases = Objective(conditions=("coulomb",)).scenarios("duffing", smc.law("classical"), 0)
+    assert search._cheap(cases[0]) == cases[0]
+    assert cases[0].integrator == "implicitfast"
+
+
+def test_it_stops_exactly_at_the_budget_and_no_set_of_gains_is_paid_for_twice(found):
+    sets = [e.gains for e in found.history]
+    assert len(sets) == 64
+    assert len(set(sets)) == 64
+
+
+def test_what_the_best_gains_cost_can_be_had_again(found):
+    traces = smc.run(found.definition.scenarios(found.plant, found.law, found.seed))
+    again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 1.0) for t in traces)
+    assert again == pytest.approx(found.objective, rel=1e-12)
+    assert [t.scenario.input_delay for t in traces] == [0.0, 0.0, 0.01, *[0.0] * 4]
+    assert [t.scenario.noise.position > 0.0 for t in traces] == [False, True, *[False] * 5]
+    assert [bool(t.scenario.disturbance) for t in traces] == [False] * 3 + [True] * 2 + [False] * 2
+    assert [t.scenario.mismatch.get("mass", 1.0) for t in traces] == [1.0] * 5 + [0.7, 1.3]
+
+
+@pytest.mark.parametrize("law", ["classical", "observer_free"])
+def test_tuning_beats_the_default_gains(law):
+    tuned = tune("duffing", law, budget=96, objective=Objective(duration=2.0))
+    assert tuned.objective < tuned.before
+
+
+def test_the_front_is_what_no_other_evaluation_beats(found):
+    front = found.front
+    assert found.objective == min(e.objective for e in front)
+    for e in front:
+        assert not any(o.tracking <= e.tracking and o.variation < e.variation for o in found.finals)
+    assert [e.variation for e in front] == sorted((e.variation for e in front), reverse=True)
+
+
+# the search space
+
+
+def test_scales_are_those_of_the_plant():
+    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, modelled=False)
+    assert scales == {"X": 1.5, "F": 4.0, "M": pytest.approx(6.0), "T": pytest.approx(1.5)}
+    assert search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, modelled=True)["F"] == pytest.approx(4.0 / 6.0)
+    assert search_space.scales(smc.plant("inverted_pendulum"), 6.0, False)["M"] == pytest.approx(0.5 * 0.5**2)
+
+
+def test_a_gain_is_searched_three_decades_wide_about_its_scale():
+    scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
+    box = search_space.box(smc.law("super_twisting"), scales)
+    middle = {name: math.sqrt(low * high) for name, (low, high) in box.items()}
+    assert middle == {"k1": pytest.approx(6.0 / 4.0**0.5), "k2": pytest.approx(12.0), "c": pytest.approx(2.0)}
+    assert [high / low for low, high in box.values()] == pytest.approx([1000.0] * 3)
+
+
+def test_a_force_is_searched_up_to_what_the_actuator_gives_and_no_further():
+    scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
+    assert search_space.box(smc.law("twisting"), scales)["r1"] == (pytest.approx(6.0 / 10**1.5), 6.0)
+    sides = {"lam": "upper", "k1": "upper"}
+    assert search_space.movable(smc.law("observer_free"), sides) == {"k1": "upper"}
+    assert search_space.movable(smc.law("observer_free"), {"lam": "lower"}) == {"lam": "lower"}
+
+
+def test_what_is_held_keeps_the_value_it_came_with():
+    tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=5, objective=LEAN)
+    assert tuned.law.gains["k0"] == 1.25
+    assert set(tuned.bounds) == {"gamma", "c"}
+
+
+def test_the_search_knows_nothing_of_the_gains_it_is_given():
+    one, other = (tune("duffing", smc.law("classical", k=k), budget=20, objective=LEAN) for k in (0.5, 5.0))
+    assert one.history == other.history
+    assert one.before != other.before
+
+
+def test_a_law_of_ones_own_is_tuned_once_its_units_are_known(monkeypatch):
+    with pytest.raises(smc.ScenarioError, match=r"no unit of failing's gain 'when'.*SCALES"):
+        tune("duffing", failing(), budget=5, objective=LEAN)
+    monkeypatch.setitem(search_space.SCALES, "failing", {"when": None, "k": search_space.FORCE_PER_SPEED})
+    tuned = tune("duffing", failing(when=1.0), budget=5, objective=LEAN)
+    assert tuned.objective < FAILED
+
+
+def test_an_optimum_at_a_bound_is_told_and_the_bound_moved(monkeypatch):
+    monkeypatch.setitem(
+        search_space.SCALES, "observer_free", {"lam": search_space.Unit(force=-2), "k1": search_space.RATE}
+    )
+    goal, budgets = Objective(conditions=("nominal",), duration=1.5), (2 * STAGE, 3 * STAGE)
+    first, then = (tune("duffing", "observer_free", budget=budget, objective=goal) for budget in budgets)
+    assert first.at_bound == {"lam": "upper"}
+    assert first.searched == first.bounds == then.bounds
+    assert then.widened == ["lam"]
+    assert then.searched["lam"] == (then.bounds["lam"][0], pytest.approx(then.bounds["lam"][1] * 10))
+    assert then.objective < first.objective
+    assert then.gains["lam"] > first.bounds["lam"][1]
+    assert len(then.history) == 3 * STAGE
+
+
+@pytest.mark.parametrize(("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")])
+def test_near_a_bound_is_within_two_percent_of_its_decades(gain, side):
+    assert search_space.at_bound({"k": gain}, {"k": (1.0, 1000.0)}).get("k") == side
+
+
+# runs that fail
+
+
+def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails():
+    goal = Objective(conditions=("nominal",), duration=0.2)
+    laws = [failing(when=when) for when in (0.0, 0.05, 0.1, 0.15, 1.0)]
+    traces = smc.run([goal.scenarios("duffing", law, 0)[0] for law in laws])
+    costs = [goal.terms([trace])[0] for trace in traces]
+    assert all(map(math.isfinite, costs))
+    assert costs == sorted(costs, reverse=True)
+    assert len(set(costs)) == 5
+    assert costs[-1] < 1.0 < FAILED <= costs[-2]
+
+
+# equal terms
+
+
+def test_a_law_that_got_more_than_its_rivals_is_not_compared(found):
+    rival = tune("duffing", "classical", budget=64, seed=3, objective=SHORT)
+    assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
+    assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
+    unequal = {
+        "budget": tune("duffing", "classical", budget=65, seed=3, objective=SHORT),
+        "rule": dataclasses.replace(rival, rule="by hand"),
+        "objective": dataclasses.replace(rival, definition=Objective(duration=1.0, u_max=12.0)),
+        "seed": dataclasses.replace(rival, seed=4),
+        "plant": dataclasses.replace(rival, plant=smc.plant("duffing", M=2.0)),
+        "bounds": dataclasses.replace(rival, bounds=dict(rival.bounds) | {"k": (1e-3, 1e3)}),
+        "budget ": dataclasses.replace(rival, history=rival.history * 2),
+    }
+    for what, one in unequal.items():
+        with pytest.raises(smc.ScenarioError, match=what.strip()):
+            compare([found, one])
+    for nothing in ([], [1]):
+        with pytest.raises(smc.ScenarioError, match="list of tunings"):
+            compare(nothing)
+
+
+def test_every_law_of_the_paper_is_bounded_by_the_same_u():
+    for law in scenarios.LAWS:
+        assert {s.u_max for s in Objective().scenarios("van_der_pol", smc.law(law), 0)} == {6.0}
+
+
+# files
+
+
+def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
+    path = found.save(tmp_path / "new" / "it.json")
+    assert load(path) == found
+    held = json.loads(path.read_text())
+    assert held["budget"] == 64
+    assert held["definition"]["conditions"] == ["nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"]
+    assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy"}
+
+
+def test_what_is_no_tuning_is_refused(found, tmp_path):
+    broken = tmp_path / "broken.json"
+    for text in ("", "[]", "{}", '{"scenario": {}}'):
+        broken.write_text(text)
+        with pytest.raises(smc.ScenarioError, match="is no tuning"):
+            load(broken)
+    with pytest.raises(smc.ScenarioError, match="no tuning at"):
+        load(tmp_path / "none.json")
+    with pytest.raises(smc.ScenarioError, match=r"\.json"):
+        found.save(tmp_path / "it.txt")
+
+
+# bad input
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"plant": "dufing"}, "unknown plant 'dufing': did you mean 'duffing'"),
+        ({"plant": 3}, "plant is 3"),
+        ({"law": "clasical"}, "unknown law 'clasical'"),
+        ({"law": "none"}, "no gain to tune"),
+        ({"law": "hierarchical"}, "hierarchical"),
+        ({"plant": "cart_pole", "law": "classical"}, "cart_pole"),
+        ({"budget": 0}, "budget is 0"),
+        ({"budget": 2.5}, "budget is 2.5"),
+        ({"seed": -1}, "seed is -1"),
+        ({"objective": "best"}, "unknown objective 'best'"),
+        ({"threads": 0}, "threads is 0"),
+    ],
+)
+def test_bad_input_is_one_sentence(changed, message):
+    with pytest.raises(smc.ScenarioError, match=message):
+        tune(**({"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN} | changed))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"conditions": ("calm",)}, {"conditions": 3}, {"starts": 1.0}, {"conditions": ()}, {"weight": -1.0}]
+    + [{name: value} for name in ("duration", "u_max", "control_period") for value in (0.0, math.inf, "1")],
+)
+def test_a_bad_objective_is_refused(changed):
+    with pytest.raises(smc.ScenarioError):
+        Objective(**changed)
+
+
+# the command
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main.main(["tune", *arguments])
+        return end.value.code, *capsys.readouterr()
+
+    return run
+
+
+def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
+    code, out, err = call("duffing", "classical", "--budget", "3", "--objective", "tracking", "--out", "k.json")
+    tuned = load(tmp_path / "k.json")
+    assert (code, err) == (0, "")
+    assert f"{tuned.gains['k']:g}" in out
+    assert f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; 3 sets" in out
+    assert tuned.definition == Objective(weight=0.0)
+    assert ("no set of gains" in out) == (tuned.objective > tuned.before)
+
+
+def test_the_command_says_when_the_default_gains_are_better(call):
+    _, out, _ = call("duffing", "super_twisting", "--budget", "1")
+    assert "1 set of gains" in out
+    assert "no set of gains tried is better than the default ones: give a larger --budget" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("dufing", "classical"), "duffing"),
+        (("duffing", "clasical"), "classical"),
+        (("duffing", "classical", "--objective", "best"), "balanced"),
+        (("duffing", "classical", "--out", "k.txt"), ".json"),
+        (("duffing", "none"), "no gain"),
+    ],
+)
+def test_the_command_refuses_in_one_sentence(call, arguments, word):
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("smc-mujoco: ")
+    assert err.count("\n") == 1
+    assert word in err

@@ -1,0 +1,259 @@
+"""What `smc-mujoco laws` promises: every law in a table that fits, one in full, and a new file found everywhere."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import lawbook, main
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.estimator import estimators
+from smc_mujoco.control.law import catalogue, law_function, laws
+from smc_mujoco.control.surface import surfaces
+
+ROOT = Path(smc.__file__).parents[1]
+EVERY = [(name, t) for name, templates in lawbook.catalogue().items() for t in templates]
+ONE_BY_ONE = pytest.mark.parametrize(("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind)
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Run the command line in a terminal of 80 columns: (exit code, stdout, stderr)."""
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def called(*words):
+        with pytest.raises(SystemExit) as end:
+            main.main(list(words))
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return called
+
+
+def flat(text):
+    """Text without its line breaks and columns' spaces."""
+    return " ".join(text.split())
+
+
+# all of them
+
+
+def test_the_table_has_every_law_surface_and_estimator_and_fits(call):
+    code, out, err = call("laws")
+    assert (code, err) == (0, "")
+    firsts = [line.split()[0] for line in out.splitlines() if line[:1].strip()]
+    for names in (laws(), surfaces(), estimators()):
+        assert [name for name in names if name not in firsts] == []
+    assert "…" not in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert f"Laws ({len(laws())})" in out
+    assert "smc-mujoco laws NAME" in out
+
+
+def test_the_table_has_formula_degree_and_source(call):
+    out = call("laws")[1]
+    (line,) = (line for line in out.splitlines() if line.startswith("super_twisting "))
+    assert line.split()[1] == "1"
+    assert "Levant 1993" in line
+    assert "u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s)" in flat(re.sub(r"Levant 1993|\s+", " ", out[out.index(line) :]))
+
+
+def test_there_are_at_least_thirty_laws():
+    assert len(laws()) >= 30
+
+
+# one of them
+
+
+@ONE_BY_ONE
+def test_a_page_has_all_that_is_known(name, template: Template, call):
+    code, out, err = call("laws", name)
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    text = flat(out)
+    said = lawbook.entry(template)
+    for part in (said.formula, said.title, said.source, said.known, said.discretisation, *template.conditions):
+        assert flat(part) in text
+    for gain, value in template.defaults.items():
+        assert re.search(rf"\b{gain} += {re.escape(f'{value:g}')}(?=\s|$)", out)
+    assert template.kind in text
+
+
+@ONE_BY_ONE
+def test_a_page_loses_no_word_of_the_docstring(name, template: Template):
+    said = lawbook.entry(template)
+    words = re.findall(r"\w+", " ".join(said))
+    for word in re.findall(r"\w+", template.doc):
+        assert word in words or word in ("Source", "Sources"), word
+
+
+@ONE_BY_ONE
+def test_a_formula_is_an_equation(name, template: Template):
+    """The first sentence of the docstring is `Name: formula`; of the velocity sensor there is no formula."""
+    said = lawbook.entry(template)
+    if name != "measured":
+        assert "=" in said.formula or said.formula.startswith("derivatives"), said.formula
+        assert said.title
+        assert "=" not in said.title or name in ("kalman", "levant"), said.title
+
+
+def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
+    out = flat(call("laws", "pid")[1])
+    assert "kp kd > ki" in out
+    assert "tt = 0.5 > 0" in out
+    assert "kp = 10 >= 0" in out
+    assert "degree 2: acts on e, with u in e''" in out
+    assert 'smc.law("pid", kp=10, ki=5)' in out
+    assert "plants inverted_pendulum" in flat(call("laws", "swing_up")[1])
+    assert "none on the gains alone" in flat(call("laws", "classical")[1])
+    assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(call("laws", "filtered_difference")[1])
+
+
+def test_a_name_of_a_law_and_a_surface_shows_both(call):
+    shared = sorted(set(laws()) & set(surfaces()))
+    assert shared
+    out = call("laws", shared[0])[1]
+    for kind in ("law", "surface"):
+        assert re.search(rf"^{shared[0]} .*{kind}$", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")]
+)
+def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
+    code, out, err = call("laws", typed)
+    assert (code, out) == (2, "")
+    assert err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
+
+
+def test_help_teaches(call):
+    code, out, _ = call("laws", "--help")
+    text = flat(out)
+    assert code == 0
+    for words in ("laws [OPTIONS] [NAME]", "relative degree", "Example: smc-mujoco laws super_twisting"):
+        assert words in text
+    assert "laws" in call("--help")[1]
+
+
+# sources in short
+
+
+@pytest.mark.parametrize(
+    ("source", "short"),
+    [
+        ("V. Utkin, Sliding Modes, Springer 1992, chapter 1.", "Utkin 1992"),
+        ("J.-J. Slotine & W. Li, Applied Control, Prentice Hall 1991.", "Slotine & Li 1991"),
+        ('A. Levant, "Quasi", TAC 50(11):1812, 2005; B. More, 2010.', "Levant 2005"),
+        ('W. Gao, Y. Wang & A. Homaifa, "Discrete", TIE 42(2):117, 1995.', "Gao et al. 1995"),
+        ('L. Yang & J. Yang, "Fast", IJRNC 21(16):1865, 2011.', "Yang & Yang 2011"),
+        ('J. Gaber, "Observer-Free Control", eq. 4.', "Gaber"),
+        ("the law of J. Gaber, with the leak of P. Ioannou & P. Kokotovic, 1984.", "Gaber"),
+        ("", ""),
+    ],
+)
+def test_a_source_in_short_is_its_first_authors_and_their_year(source, short):
+    assert lawbook.brief(source) == short
+
+
+def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
+    @law_function(gains={"k": 2.0}, conditions={"k > 1": lambda g: g.k > 1})
+    def own(y, gains, memory):
+        """Own law: u = -k e.
+
+        It is odd. Sampled, it is late.
+        Source: A. Author, "Title", J. Things 1(2):3, 1999.
+        """
+        return -gains.k * y.e, y.e
+
+    said = lawbook.entry(own)
+    assert said == (
+        "Own law",
+        "u = -k e",
+        "Sampled, it is late.",
+        "It is odd.",
+        'A. Author, "Title", J. Things 1(2):3, 1999.',
+    )
+    assert lawbook.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
+
+
+# adding a law touches one file
+
+LAW = '''"""Brand new: u = -k sgn(s), s = de + c e.
+
+Explicit. Source: N. Body, "Of no use", J. Nothing 1(1):1, 2001.
+"""
+
+from smc_mujoco.control.law import command, law_function, sgn, sliding
+
+
+@law_function(gains={"k": 4.0, "c": 2.5}, nonnegative=("k", "c"), conditions={"k > c": lambda g: g.k > g.c})
+def brand_new(y, gains, memory):
+    s, eq = sliding(y, gains.c)
+    return command(y, eq - gains.k * sgn(s)), s
+'''
+PLUGIN = """import importlib
+importlib.import_module("smc_mujoco.control.laws").__path__.append({folder!r})
+"""
+
+
+@pytest.fixture
+def added(tmp_path):
+    """A folder with one new law in it, and a plugin that stands for the file being in smc_mujoco/control/laws."""
+    folder = tmp_path / "more"
+    folder.mkdir()
+    (folder / "brand_new.py").write_text(LAW)
+    (tmp_path / "added_law.py").write_text(PLUGIN.format(folder=str(folder)))
+    return tmp_path
+
+
+def python(added, *words):
+    """What a fresh interpreter with that law prints."""
+    environment = os.environ | {
+        "PYTHONPATH": f"{ROOT}{os.pathsep}{added}",
+        "COLUMNS": "80",
+        "PYTHONIOENCODING": "utf-8",
+    }
+    done = subprocess.run([sys.executable, "-B", *words], cwd=ROOT, env=environment, capture_output=True, text=True,
+                          timeout=300, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_a_new_law_is_one_file_in_the_lists_and_on_its_page(added):
+    code = """
+import added_law, contextlib
+import smc_mujoco as smc
+from smc_mujoco.cli import main as cli
+assert "brand_new" in smc.laws()
+for words in (["list"], ["laws"], ["laws", "brand_new"]):
+    with contextlib.suppress(SystemExit):
+        cli.main(words)
+"""
+    out = python(added, "-c", code)
+    assert out.count("brand_new") >= 3
+    assert out.count("Body 2001") == 1
+    for words in ("k > c", "J. Nothing 1(1):1, 2001", "c = 2.5"):
+        assert words in flat(out)
+
+
+def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
+    names = [path.name for path in sorted((ROOT / "tests").glob("test_laws*.py"))] + [
+        "test_lawbook.py",
+        "test_references.py",
+    ]
+    files = [str(ROOT / "tests" / name) for name in names]
+    out = python(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
+                 "-k", "brand_new", *files)  # fmt: skip
+    cases = [line for line in out.splitlines() if "::" in line]
+    assert len(cases) >= 10
+    found = {case.partition("::")[0].removeprefix("tests/") for case in cases}
+    assert {"test_lawbook.py", "test_references.py"} < found
+    assert any(name.startswith("test_laws") for name in found)
+
+
+def test_the_catalogue_of_this_process_is_left_alone():
+    assert "brand_new" not in catalogue()

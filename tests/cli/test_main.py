@@ -1,0 +1,706 @@
+"""What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main, show, tables
+from smc_mujoco.common import gl
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.metrics.catalogue import metrics, score
+
+LABEL = "a label that is forty characters in all."
+SCENE = f'''"""Does a scene of one's own run?"""
+
+import smc_mujoco as smc
+
+
+@smc.law_function(gains={{"k": 3.0}})
+def mine(y, gains, memory):
+    s = y.de + gains.k * y.e
+    return -gains.k * s, s
+
+
+scene = smc.Scene(
+    title="Mine",
+    conditions={{
+        "calm": {{"{LABEL}": smc.Scenario(plant="duffing", law=mine(), duration=0.2)}},
+        "noisy": {{"rough": smc.Scenario(plant="duffing", law=mine(), duration=0.2, noise=smc.Noise(0.01, 0.05))}},
+    }},
+)
+'''
+FILES = {
+    f"calm-{LABEL.rstrip('.').replace(' ', '_')}..npz",
+    "noisy-rough.npz",
+    "calm.svg",
+    "calm.png",
+    "noisy.svg",
+    "noisy.png",
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty working folder, a terminal of 80 columns, and nothing of the process changed for good."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    return tmp_path
+
+
+@pytest.fixture
+def call(folder, capsys):
+    """Run the command line in this process: (exit code, stdout, stderr)."""
+
+    def called(*words: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main.main([str(word) for word in words])
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return called
+
+
+@pytest.fixture
+def scene(folder) -> Path:
+    (folder / "mine.py").write_text(SCENE)
+    return folder / "mine.py"
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures take most of the time, and most claims are not about them."""
+    monkeypatch.setattr(show, "figures", lambda *_: [])
+
+
+@pytest.fixture
+def trace(folder) -> Path:
+    return smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2)).save(folder / "one.npz")
+
+
+def python(*words: object, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """A fresh interpreter, with this package, that answers in text."""
+    return subprocess.run(
+        [sys.executable, *map(str, words)],
+        cwd=cwd,
+        env=environment(**variables),
+        capture_output=True,
+        encoding="utf-8",
+        timeout=120,
+        check=False,
+    )
+
+
+def environment(**variables: str) -> dict[str, str]:
+    root = Path(smc.__file__).parents[1]
+    return os.environ | {"PYTHONPATH": str(root), "COLUMNS": "80", "PYTHONIOENCODING": "utf-8"} | variables
+
+
+def refused(answer: tuple[int, str, str], *words: object) -> None:
+    """Exit code 2, one sentence on stderr with these words in it, no traceback."""
+    code, out, err = answer
+    assert code == 2
+    assert err.startswith("smc-mujoco: ")
+    assert len(err.splitlines()) == 1
+    assert "Traceback" not in out + err
+    for word in words:
+        assert str(word) in err
+
+
+# list
+
+
+def test_list_names_everything_there_is(call):
+    code, out, err = call("list")
+    assert (code, err) == (0, "")
+    scenes = [path.stem for path in (Path(smc.__file__).parents[1] / "scenes").glob("*.py")]
+    assert len(scenes) >= 10
+    names = [*smc.plants(), *smc.laws(), *smc.estimators(), *scenes, *smc.paper.CONDITIONS]
+    assert [name for name in names if not re.search(rf"(?<![\w]){name}(?![\w])", out)] == []
+    assert "…" not in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_no_line_about_a_thing_ends_where_its_formula_would_begin(call, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "400")
+    _, out, _ = call("list")
+    assert "differentiator of order n = 1, 2, 3 (with n = 1 the super-twisting one)" in out
+    assert [line for line in out.splitlines() if line.rstrip().endswith((":", ","))] == []
+
+
+def test_a_terminal_without_a_width_has_80_columns(call, monkeypatch):
+    shown = call("list")
+    monkeypatch.setenv("COLUMNS", "0")
+    assert call("list") == shown
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
+def test_with_its_output_closed_a_command_does_its_work(trace, folder):
+    code = "from smc_mujoco.cli.main import main; main()"
+    command = f'"{sys.executable}" -c "{code}" show one.npz --export csv <&- >&-'
+    done = subprocess.run(
+        ["sh", "-c", command], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (folder / "one.csv").read_text().startswith("t [s],")
+
+
+# run
+
+
+def test_run_of_a_scene_file_prints_its_scores_and_writes_its_files_where_it_says(call, scene, folder):
+    code, out, err = call("run", scene, "--no-video", "--out", "results")
+    assert (code, err) == (0, "")
+    assert {path.name for path in (folder / "results").iterdir()} == FILES
+    said = out.partition("wrote\n")[2].split()
+    assert {Path(name) for name in said} == {Path("results") / name for name in FILES}
+    for heading in ("Mine, calm", "Mine, noisy"):
+        assert heading in out
+
+
+def test_results_go_to_videos_and_the_scene_s_name_when_nothing_else_is_asked_for(call, scene, folder):
+    assert call("run", scene, "--no-video")[0] == 0
+    assert {path.name for path in (folder / "videos" / "mine").iterdir()} == FILES
+
+
+@pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])
+@pytest.mark.parametrize("fails", [False, True], ids=["all well", "one fails"])
+def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, fails, call, undrawn, folder):
+    lines = [
+        "import smc_mujoco as smc",
+        "@smc.law_function",
+        "def sour(y, gains, memory):",
+        "    if y.t > 0.05:",
+        "        raise ValueError('sour')",
+        "    return 0.0, 0.0",
+        f"common = dict(plant={plant!r}, duration=0.2, reference=smc.Constant(1e-3))",
+        f"runs = {{{LABEL!r}: smc.Scenario(law='adaptive', noise=smc.Noise(0.1, 0.5), **common)}}",
+        "runs |= {'sour': smc.Scenario(law=sour(), **common)}" if fails else "",
+        "scene = smc.Scene(title='Wide', conditions={'nominal': runs})",
+    ]
+    (folder / "wide.py").write_text("\n".join(lines))
+    code, out, _ = call("run", "wide.py", "--no-video", "--out", "out")
+    assert code == 0
+    table = out.partition("Wide")[2].partition("wrote\n")[0].partition("sour:")[0].splitlines()
+    assert max(map(len, table)) <= 80
+    (row,) = [line for line in table if line.startswith(LABEL[:8])]
+    (saved,) = [path for path in (folder / "out").glob("*.npz") if "label" in path.name]
+    values = score(smc.load(saved))
+    expected = [tables.number(values[name]) for name in tables.SHOWN.values() if name in values]
+    assert row.split()[-len(expected) :] == expected
+    headings = " ".join(line for line in table if not line.startswith((LABEL[:8], "sour")))
+    assert "…" not in headings
+    assert all(word in headings for head, name in tables.SHOWN.items() if name in values for word in head.split())
+
+
+def test_a_failing_law_is_named_below_the_table_and_the_others_keep_their_scores(call, undrawn, folder):
+    (folder / "sour.py").write_text(
+        "import smc_mujoco as smc\n"
+        "@smc.law_function\n"
+        "def sour(y, gains, memory):\n"
+        "    if y.t > 0.05:\n"
+        "        raise ValueError('sour grapes')\n"
+        "    return 0.0, 0.0\n"
+        "common = dict(plant='duffing', duration=0.2)\n"
+        "runs = {'bad': smc.Scenario(law=sour(), **common), 'good': smc.Scenario(law='classical', **common)}\n"
+        "scene = smc.Scene(title='Sour', conditions={'nominal': runs})\n"
+    )
+    code, out, err = call("run", "sour.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    told = " ".join(out.split())
+    assert "bad: law 'sour' raised ValueError (sour grapes) in channel 0, at t = 0.051 s" in told
+    assert told.index("good") < told.index("bad: law 'sour'")
+    assert tables.number(score(smc.load("out/nominal-good.npz"))["ultimate_bound"]) in told
+
+
+def test_a_seed_of_its_own_changes_what_is_random_and_the_same_seed_nothing(call, undrawn, scene):
+    for out, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert call("run", scene, "--no-video", "--out", out, "--seed", seed)[0] == 0
+    a, b, c = (smc.load(f"{out}/noisy-rough.npz") for out in "abc")
+    assert (a.scenario.seed, c.scenario.seed) == (1, 2)
+    np.testing.assert_array_equal(a.x, b.x)
+    np.testing.assert_array_equal(a.s, b.s)
+    assert (a.s != c.s).any()
+
+
+def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene, monkeypatch):
+    asked = []
+
+    def noted(scenarios, threads, **options):
+        asked.append(threads)
+        return smc.run(scenarios, threads, **options)
+
+    monkeypatch.setattr(show, "run", noted)
+    for threads in (1, 2):
+        assert call("run", scene, "--no-video", "--out", str(threads), "--threads", threads)[0] == 0
+    assert asked == [1, 2]
+    np.testing.assert_array_equal(smc.load("1/noisy-rough.npz").x, smc.load("2/noisy-rough.npz").x)
+
+
+def test_timing_names_the_stretches_and_they_add_up(call, scene):
+    _, out, _ = call("run", scene, "--no-video", "--out", "out", "--timing")
+    spent = {name: float(seconds) for name, seconds in re.findall(r"([a-z ]+?) (\d+\.\d\d) s", out.splitlines()[-1])}
+    total = spent.pop(" in all")
+    assert [name.strip() for name in spent] == ["loading", "compiling", "simulating", "traces", "figures"]
+    assert total == pytest.approx(sum(spent.values()), abs=0.006 * len(spent))
+    assert spent[" figures"] > 0.0
+
+
+def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_to_install(
+    call, scene, folder, monkeypatch
+):
+    monkeypatch.setattr(gl, "choose", lambda: gl.Choice(wish="", backend="disabled"))
+    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
+    gl.missing.cache_clear()
+    code, out, err = call("run", scene, "--out", "out")
+    gl.missing.cache_clear()
+    assert (code, err) == (0, "")
+    assert {path.name for path in (folder / "out").iterdir()} == FILES
+    (line,) = [line for line in out.splitlines() if line.startswith("no film: ")]
+    assert "install" in line
+
+
+def test_where_rendering_is_turned_off_all_but_the_film_is_written_and_one_line_says_so(scene, folder):
+    code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
+    done = python("-c", code, "run", scene, "--out", "out", cwd=folder, MUJOCO_GL="disabled")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {path.name for path in (folder / "out").iterdir()} == FILES
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
+    assert "MUJOCO_GL" in line
+
+
+# show
+
+
+def test_show_prints_every_metric_with_its_value(call, trace):
+    code, out, err = call("show", trace)
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split()[1] for line in out.splitlines() if line and not line.startswith(" ")}
+    everything, realistic = score(smc.load(trace)), {m.name for m in metrics() if m.realistic}
+    assert set(everything) == {m.name for m in metrics() if not m.network}
+    values = {name: value for name, value in everything.items() if name not in realistic}
+    assert set(rows) & realistic == set()
+    assert {name: rows[name] for name in values} == {name: tables.number(value) for name, value in values.items()}
+
+
+def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
+    stuck = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.3, friction=Coulomb(5.0)))
+    stuck.save(folder / "stuck.npz")
+    code, out, err = call("show", "stuck.npz")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line and not line.startswith(" ")}
+    assert rows["stick_time"][:2] == ["0.300", "s"]
+    assert rows["peak_reaction"][:2] == [tables.number(score(stuck)["peak_reaction"]), "N"]
+    assert rows["reaction"][-1] == f"{stuck.reaction[-1, 0]:.3g}"
+
+
+def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
+    scenario = smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.3)
+    trace = smc.run(scenario)
+    trace.save(folder / "pole.npz")
+    code, out, err = call("show", "pole.npz")
+    assert (code, err) == (0, "")
+    parts = re.split(r"^(driven: slide \(m\)|free: hinge \(rad\)):? *$", out, flags=re.M)
+    assert parts[1::4] == ["driven: slide (m)"] * 2  # above the curves, and above the metrics
+    assert parts[3::4] == ["free: hinge (rad)"] * 2
+    driven, free = parts[6::2]
+    for part, group, x, u in ((driven, "driven", "m", "N"), (free, "free", "rad", None)):
+        rows = {line.split()[0]: line.split()[1:3] for line in part.splitlines() if line and not line.startswith(" ")}
+        assert rows["peak"] == [tables.number(smc.scores(trace)[group]["peak"]), x]
+        assert rows.get("max_u", ["", None])[1] == u
+        assert "spread_bound" not in rows
+
+
+def test_a_scene_of_carts_with_poles_has_a_table_of_each(call, undrawn, folder):
+    (folder / "poles.py").write_text(
+        "import smc_mujoco as smc\n"
+        "run = smc.Scenario(plant='cart_pole', law='hierarchical', model='nominal', duration=0.3)\n"
+        "scene = smc.Scene(title='Poles', conditions={'nominal': {'k = 2': run, 'k = -2': run}})\n"
+    )
+    code, out, err = call("run", "poles.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    cart, pole = out.split("Poles, driven: slide (m)")[1].split("Poles, free: hinge (rad)")
+    assert "TV rate" in cart
+    assert "TV rate" not in pole
+    peaks = smc.scores(smc.load("out/nominal-k-2.npz"))
+    for part, group, unit in ((cart, "driven", "m s^2"), (pole, "free", "rad s^2")):
+        assert tables.number(peaks[group]["itae"]) in part
+        assert unit in part
+    assert {path.name for path in (folder / "out").glob("*.npz")} == {"nominal-k-2.npz", "nominal-k--2.npz"}
+
+
+ANSWERS = """
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+
+def block(level):
+    return smc.Scenario(plant="duffing", law="none", x0=0.1, duration=0.3, friction=Coulomb(level))
+
+scene = smc.Scene(
+    title="Blocks",
+    conditions={"dry": {"light": block(0.05), "heavy": block(5.0)}, "wet": {"light": block(0.0)}},
+    answers=("stick_time", "peak_reaction"),
+    facts={"springs": "they deviate by 3 % [at most]."},
+)
+"""
+
+
+def test_answers_are_a_table_a_metric_with_a_line_a_label_and_a_column_a_condition(call, undrawn, folder):
+    (folder / "blocks.py").write_text(ANSWERS)
+    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    after = out[out.index("stick_time (s)") :]
+    assert re.search(r"law +dry +wet *\n", after)
+    stick, reaction = (re.findall(r"^(light|heavy) +(.*?) *$", part, re.M) for part in after.split("peak_reaction (N)"))
+    assert [label for label, _ in stick] == ["light", "heavy"]
+    assert stick[0][1].split()[1] == "0"  # nothing holds it in the wet
+    assert stick[1][1] == "0.300"
+    assert reaction[0][1].split() == ["0.0500", "0"]
+    assert len(reaction[1][1].split()) == 1  # no heavy one in the wet
+    assert "springs: they deviate by 3 % [at most]." in after
+    assert max(map(len, after.partition("wrote")[0].splitlines())) <= 80
+
+
+def test_answers_of_one_condition_are_one_table(call, undrawn, folder):
+    (folder / "blocks.py").write_text(ANSWERS.replace(', "wet": {"light": block(0.0)}', ""))
+    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    assert re.search(r"law +stick_time \(s\) +peak_reaction \(N\)", out)
+    assert re.search(r"heavy +0\.300 +\d", out)
+
+
+def test_a_run_that_failed_has_no_answer():
+    wild = smc.plant("duffing", alpha=-1e6, beta=0.0)
+    runs = {"wild": smc.run(smc.Scenario(plant=wild, law="none", duration=0.1))}
+    (table,) = tables.answers(("peak", "spread_bound"), {"nominal": runs})
+    shown = [["wild"], ["failed"]]  # and nothing of the spread, which a single mass has not
+    assert [[str(cell) for cell in column.cells] for column in table.columns] == shown
+
+
+def test_runs_with_other_kinds_of_channels_share_no_table():
+    cart = smc.run(smc.Scenario(plant="cart_pole", law="none", duration=0.1))
+    block = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.1))
+    with pytest.raises(ScenarioError, match="draw one plant at a time"):
+        tables.scores("both", {"cart": cart, "block": block})
+
+
+def test_show_exports_the_columns_and_draws_the_figure_that_it_names(call, trace, folder):
+    code, out, err = call("show", trace, "--export", "one.csv", "--figure", "drawn/one")
+    assert (code, err) == (0, "")
+    assert re.findall(r"wrote (\S+)", out) == ["one.csv", "drawn/one.svg", "drawn/one.png"]
+    table = np.genfromtxt("one.csv", delimiter=",", names=True)
+    (position,) = [name for name in table.dtype.names or () if name.startswith("x_")]  # as numpy writes "x [m]"
+    np.testing.assert_array_equal(table[position], smc.load(trace).x[:, 0])
+    assert (folder / "drawn" / "one.svg").read_text().rstrip().endswith("</svg>")
+    assert (folder / "drawn" / "one.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_show_exports_several_formats_beside_the_trace(call, trace, folder):
+    code, out, err = call("show", trace, "--export", "csv, mat")
+    assert (code, err) == (0, "")
+    assert re.findall(r"wrote (\S+)", out) == [str(folder / "one.csv"), str(folder / "one.mat")]
+    assert (folder / "one.csv").exists()
+    assert (folder / "one.mat").exists()
+    refused(call("show", trace, "--export", "csv,mta"), "did you mean 'mat'?")
+
+
+def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
+    path = folder / "a\n\x1b[31m[b].npz"
+    refused(call("show", path), r"a\n\x1b[31m[b].npz")
+    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05)).save(path)
+    _, out, _ = call("show", path, "--export", "csv")
+    assert [line for line in out.splitlines() if line.startswith("wrote")] == [rf"wrote {folder}/a\n\x1b[31m[b].csv"]
+
+
+def test_show_of_a_failed_run_says_why(call, folder):
+    unstable = smc.plant("duffing", alpha=-1e6, beta=0.0)
+    smc.run(smc.Scenario(plant=unstable, law="none", duration=0.1)).save("wild.npz")
+    code, out, _ = call("show", "wild.npz")
+    assert code == 0
+    assert "left the finite world" in " ".join(out.split())
+
+
+# mistakes
+
+
+def test_a_misspelt_scene_is_answered_with_the_nearest_name(call):
+    refused(call("run", "duffin"), "'duffin'", "did you mean 'duffing'?")
+
+
+def test_a_scene_like_no_other_is_answered_with_all_names(call):
+    refused(call("run", "xyz"), "'xyz'", "inverted_pendulum", "vdp_noise")
+
+
+@pytest.mark.parametrize("path", ["there.py", "not/there.py", "not/there", "."])
+def test_a_path_that_is_no_file_is_named(path, call):
+    refused(call("run", path), path)
+
+
+def test_a_file_without_a_scene_is_named(call, folder):
+    (folder / "empty.py").write_text("x = 1\n")
+    refused(call("run", "empty.py"), "empty.py", "declares no scene")
+
+
+SCENES = {
+    "a typing mistake": ("smc.Scen(title='T', conditions={})", "Scen"),
+    "a name that is not there": ("smc.Scene(title='T', conditions={'a': {'b': ok(plant='dufing')}})", "'duffing'"),
+    "a gain that is not there": ("smc.law('classical', kk=1.0)", "kk"),
+    "a value out of range": ("smc.Scene(title='T', conditions={'a': {'b': ok(duration=-1.0)}})", "duration"),
+    "no conditions": ("smc.Scene(title='T', conditions={})", "conditions"),
+    "a list of conditions": ("smc.Scene(title='T', conditions=[ok()])", "conditions"),
+    "a condition that is one run": ("smc.Scene(title='T', conditions={'a': ok()})", "'a'"),
+    "a condition without runs": ("smc.Scene(title='T', conditions={'a': {}})", "'a'"),
+    "a condition of names": ("smc.Scene(title='T', conditions={'a': {'b': 'classical'}})", "'a'"),
+    "two plants": ("smc.Scene(title='T', conditions={'a': {'b': ok(), 'c': ok(plant='van_der_pol')}})", "van_der_pol"),
+    "labels alike": ("smc.Scene(title='T', conditions={'a': {'B c': ok(), 'b_c': ok()}})", "B c, b_c"),
+    "conditions alike": ("smc.Scene(title='T', conditions={'A': {'b': ok()}, 'a': {'b': ok()}})", "A, a"),
+    "no such film": ("smc.Scene(title='T', film='c', conditions={'a': {'b': ok()}})", "'c'"),
+    "no such metric": ("smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})", "'ripple'"),
+    "facts without labels": ("smc.Scene(title='T', facts=['so'], conditions={'a': {'b': ok()}})", "facts"),
+    "no such figure": ("smc.Scene(title='T', figure='pie', conditions={'a': {'b': ok()}})", "'pie'"),
+    "a scene of runs": ("{'a': {'b': ok()}}[0]", "KeyError"),
+}
+
+
+@pytest.mark.parametrize("mistake", SCENES)
+def test_a_mistake_in_a_scene_file_names_the_file_and_the_line(mistake, call, folder):
+    expression, word = SCENES[mistake]
+    (folder / "wrong.py").write_text(
+        "import smc_mujoco as smc\n"
+        "def ok(plant='duffing', duration=0.1): return smc.Scenario(plant=plant, law='none', duration=duration)\n"
+        "\n"
+        f"scene = {expression}\n"
+    )
+    answer = call("run", "wrong.py", "--no-video")
+    refused(answer, "wrong.py", "line 2" if "ok(plant='dufing')" in expression or "-1.0" in expression else "line 4")
+    assert word in answer[2]
+    assert not (folder / "videos").exists()
+
+
+def test_a_file_that_is_no_python_is_named(call, folder):
+    (folder / "torn.py").write_text('"""Torn?"""\nx = (\n')
+    refused(call("run", "torn.py"), "torn.py", "line 2")
+
+
+def test_a_file_that_imports_what_is_not_there_is_named(call, folder):
+    (folder / "lonely.py").write_text("import nowhere_to_be_found\n")
+    refused(call("run", "lonely.py"), "lonely.py, line 1", "nowhere_to_be_found")
+
+
+def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene, folder, monkeypatch):
+    monkeypatch.setattr(show, "run", lambda *_, **__: pytest.fail("it ran"))
+    (folder / "taken").write_text("")
+    refused(call("run", scene, "--no-video", "--out", "taken"), "taken", "--out")
+    refused(call("run", scene, "--no-video", "--out", "taken/below"), "taken", "--out")
+
+
+def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
+    (folder / "out" / "noisy-rough.npz").mkdir(parents=True)
+    refused(call("run", scene, "--no-video", "--out", "out"), "noisy-rough.npz")
+
+
+@pytest.mark.parametrize("content", [b"", b"x = 1\n", b"PK\x03\x04"])
+def test_what_is_no_trace_is_named(content, call, folder):
+    (folder / "odd.npz").write_bytes(content)
+    refused(call("show", "odd.npz"), "odd.npz")
+
+
+@pytest.mark.parametrize("path", ["there.npz", "not/there.npz", "."])
+def test_a_trace_that_is_not_there_is_named(path, call):
+    refused(call("show", path), path)
+
+
+@pytest.mark.parametrize("name", ["one.txt", "one", "one.npz", "one.xlsx"])
+def test_an_export_with_another_ending_is_refused_and_writes_nothing(name, call, trace, folder):
+    before = trace.read_bytes()
+    refused(call("show", trace, "--export", f"out/{name}"), name, ".csv", ".mat")
+    assert not (folder / "out").exists()
+    assert trace.read_bytes() == before
+
+
+def test_a_seed_too_large_is_refused(call, scene):
+    refused(call("run", scene, "--no-video", "--seed", 10**20), "seed")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["run"],
+        ["show"],
+        ["walk"],
+        ["run", "duffing", "--fast"],
+        ["run", "duffing", "--seed", "-1"],
+        ["run", "duffing", "--seed", "one"],
+        ["run", "duffing", "--threads", "0"],
+    ],
+    ids=" ".join,
+)
+def test_a_command_put_wrongly_ends_with_code_2_and_shows_how_it_is_put(words, call):
+    code, out, err = call(*words)
+    assert (code, out) == (2, "")
+    assert "Usage: smc-mujoco" in err
+    assert "Traceback" not in err
+
+
+# the process around it
+
+
+HELP = """
+import contextlib, io, sys
+from smc_mujoco.cli import main
+for words in (["--help"], ["run", "--help"], ["show", "--help"], ["list", "--help"], ["--version"]):
+    said = io.TextIOWrapper(io.BytesIO(), "utf-8")
+    with contextlib.redirect_stdout(said):
+        try:
+            main(words)
+        except SystemExit as end:
+            assert not end.code, end.code
+    said.seek(0)
+    print(repr(said.read()))
+print(*({"mujoco", "numba", "llvmlite", "matplotlib", "scipy", "PIL"} & set(sys.modules)))
+"""
+
+
+def test_help_and_version_answer_without_the_simulator_the_compiler_and_the_plots(tmp_path):
+    done = python("-c", HELP, cwd=tmp_path)
+    assert done.stderr == ""
+    *said, heavy = done.stdout.split("\n")[:-1]
+    for words, text in zip((("run", "show", "list"), ("--seed", "--threads"), ("--export",), ()), said, strict=False):
+        assert "Usage: smc-mujoco" in text
+        assert all(word in text for word in words)
+    assert said[-1] == repr(f"smc-mujoco {smc.__version__}\n")
+    assert heavy == ""
+
+
+SCRIPT = '''"""Is this run once?"""
+
+import json
+
+import smc_mujoco as smc
+from beside_it import LEVEL
+
+print("the file runs")
+
+
+@smc.law_function
+def plain(y, gains, memory):
+    return -float(json.dumps(LEVEL)) * y.de, y.e
+
+
+scene = smc.Scene(
+    title="Once",
+    conditions={"nominal": {"plain": smc.Scenario(plant="duffing", law=plain, duration=0.05)}},
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
+'''
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory):
+    """A scene run as a script from another folder: (its folder, what came of it)."""
+    folder = tmp_path_factory.mktemp("script")
+    (folder / "scenes").mkdir()
+    (folder / "scenes" / "once.py").write_text(SCRIPT)
+    (folder / "scenes" / "beside_it.py").write_text("LEVEL = 2.0\n")
+    return folder, python("scenes/once.py", "--no-video", cwd=folder)
+
+
+def test_a_scene_run_as_a_script_is_executed_once(script):
+    _, done = script
+    assert done.returncode == 0
+    assert done.stdout.count("the file runs") == 1
+
+
+def test_a_scene_imports_a_module_beside_it_and_writes_below_the_working_folder(script):
+    folder, _ = script
+    assert {path.name for path in (folder / "videos" / "once").iterdir()} == {
+        "nominal-plain.npz",
+        "nominal.svg",
+        "nominal.png",
+    }
+
+
+def test_a_module_beside_a_scene_is_found_by_the_command_too(script, call):
+    folder, _ = script
+    path = folder / "scenes" / "nested.py"
+    path.write_text(SCRIPT.replace("json.dumps(LEVEL)", "LEVEL").replace("import json\n", ""))
+    code, out, err = call("run", path, "--no-video", "--out", "out")
+    assert (code, err) == (0, "")
+    assert out.count("the file runs") == 1
+
+
+def test_a_law_in_the_plain_loop_is_one_line_on_stderr(script):
+    _, done = script
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("smc-mujoco: law 'plain' does not compile: ")
+    assert done.stderr.endswith("the run takes the plain loop\n")
+
+
+def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace):
+    code = "\n".join(
+        [
+            "from smc_mujoco.cli.main import main",
+            "for words in (['list'], ['run', 'mine.py', '--no-video', '--out', 'out'], ['show', 'one.npz']):",
+            "    try: main(words)",
+            "    except SystemExit as end: assert not end.code, words",
+        ]
+    )
+    done = python("-c", code, cwd=folder, PYTHONIOENCODING="ascii")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.isascii()
+    for word in ("Plants", "noisy-rough.npz", "settling_time"):
+        assert word in done.stdout
+
+
+LONG = """
+import smc_mujoco as smc
+
+run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, control_period=0.1, physics_step=1e-3)
+scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
+if __name__ == "__main__":
+    import threading, time
+    from smc_mujoco.cli import show
+    simulate = show.simulate
+    def announced(*arguments):
+        threading.Timer(0.3, lambda: print("simulating", flush=True)).start()
+        return simulate(*arguments)
+    show.simulate = announced
+    smc.play(__file__)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a process")
+def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
+    (tmp_path / "long.py").write_text(LONG)
+    process = subprocess.Popen(
+        [sys.executable, "long.py", "--no-video"],
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "simulating\n"
+        process.send_signal(signal.SIGINT)
+        try:
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert err == "smc-mujoco: stopped; files already written are complete\n"
+    assert "Traceback" not in out
+    assert list((tmp_path / "videos" / "long").iterdir()) == []

@@ -1,0 +1,191 @@
+"""JSON has one way to write NaN and infinity, and older ways are read; damaged files are one sentence."""
+
+import dataclasses
+import json
+import math
+import os
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.margins import Margin
+from smc_mujoco.analysis.margins import load as load_margins
+from smc_mujoco.analysis.margins import save as save_margins
+from smc_mujoco.analysis.region_of_attraction import Basin
+from smc_mujoco.analysis.region_of_attraction import load as load_map
+from smc_mujoco.analysis.tuning import result
+from smc_mujoco.common.files import from_json, plain, reading, to_json
+from smc_mujoco.simulation import serialise
+from smc_mujoco.studies.paper.claims.show import document
+from smc_mujoco.studies.paper.claims.verdict import Claim
+from smc_mujoco.studies.report.kept import kept
+from smc_mujoco.testing import golden
+
+NUMBERS = (math.nan, math.inf, -math.inf, 0.1, -0.0)
+WORDS = st.sampled_from(["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"])
+LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | WORDS
+DATA = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text() | WORDS, inner), max_leaves=20)
+
+
+def strict(text: str) -> Any:
+    """JSON as other languages read it."""
+
+    def constant(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    return json.loads(text, parse_constant=constant)
+
+
+def same(a: object, b: object) -> bool:
+    """Whether they are equal to the last bit and sign, NaN too."""
+    return repr(a) == repr(b)
+
+
+@given(DATA)
+def test_whatever_is_written_is_json_and_comes_back(data):
+    assert same(strict(to_json(data)), plain(data))
+    assert same(from_json(to_json(data)), data)
+
+
+def test_numbers_that_json_lacks_are_words():
+    assert to_json({"a": [math.nan, (math.inf, -math.inf)], "b": "NaN"}) == (
+        '{"a": ["NaN", ["Infinity", "-Infinity"]], "b": "\'NaN"}'
+    )
+
+
+def test_bare_numbers_of_older_files_are_read():
+    assert same(from_json("[NaN, Infinity, -Infinity]"), [math.nan, math.inf, -math.inf])
+
+
+# every file of ours
+
+
+def test_scenarios():
+    scenario = smc.Scenario(plant="duffing", law=smc.law("super_twisting"))
+    text = to_json(serialise.describe(scenario))
+    strict(text)
+    assert serialise.restore(from_json(text)).law.gains["w_max"] == math.inf
+
+
+def margin(value: float, searched: float) -> Margin:
+    return Margin(
+        plant="duffing",
+        law="classical",
+        kind="delay",
+        value=value,
+        unit="s",
+        resolution=0.1,
+        searched=searched,
+        theory=None,
+    )
+
+
+def test_margins_of_both_versions(tmp_path):
+    odd = margin(math.nan, math.inf)
+    path = save_margins([odd], tmp_path / "a.json")
+    (told,) = strict(path.read_text())
+    assert told["value"] == "NaN"
+    (tmp_path / "old.json").write_text(
+        '[{"plant": "duffing", "law": "classical", "kind": "delay", "value": null, "unit": "s", '
+        '"resolution": 0.1, "searched": "inf", "theory": null}]'
+    )
+    for name in ("a.json", "old.json"):
+        assert same(load_margins(tmp_path / name), [odd])
+
+
+def test_maps_of_both_versions(tmp_path):
+    axis, one = np.array([0.0]), np.ones((1, 1))
+    odd = Basin(
+        plant="duffing",
+        law="classical",
+        x=axis,
+        v=axis,
+        outcome=one.astype(np.int8),
+        decided_at=math.inf * one,
+        unit="rad",
+        duration=math.inf,
+    )
+    text = odd.save(tmp_path / "a.json").read_text()
+    strict(text)
+    (tmp_path / "old.json").write_text(text.replace('"Infinity"', "Infinity"))
+    for name in ("a.json", "old.json"):
+        assert same(load_map(tmp_path / name), odd)
+
+
+def test_tunings_of_both_versions(tmp_path):
+    shipped = result.shipped("duffing", "classical")
+    worst = dataclasses.replace(shipped.history[0], objective=math.inf, tracking=math.inf)
+    odd = dataclasses.replace(shipped, before=math.nan, history=(worst, *shipped.history[1:]))
+    text = odd.save(tmp_path / "a.json").read_text()
+    strict(text)
+    (tmp_path / "old.json").write_text(text.replace('"Infinity"', "Infinity").replace('"NaN"', "NaN"))
+    for name in ("a.json", "old.json"):
+        assert same(result.load(tmp_path / name), odd)
+        assert result.load(tmp_path / name).history == odd.history
+
+
+def test_claims():
+    words = dict.fromkeys(("id", "text", "where", "measured", "holds_if", "note"), "NaN")
+    beside = {"tuned": {"x": math.inf}}
+    claim = Claim(**words, verdict="refuted", numbers={}, beside=beside, verdicts={}, flips=False)
+    (told,) = strict(document([claim]))["claims"]
+    assert told["beside"] == claim.plain()["beside"] == {"tuned": {"x": "Infinity"}}
+
+
+def test_golden_values_of_both_versions(tmp_path):
+    for word in ("inf", "Infinity"):
+        file = tmp_path / "test_it.golden.json"
+        file.write_text(f'{{"test": {{"rise_time": {{"value": "{word}", "tolerance": 0.0, "unit": "s"}}}}}}')
+        assert golden._number(file, "test", "rise_time", golden.read(file)["test"], "value") == math.inf
+
+
+def test_rows_of_a_study(tmp_path):
+    scenario = smc.Scenario(plant="duffing", law=smc.law("super_twisting"), duration=0.01)
+    table = smc.study([scenario], tmp_path)
+    for column in ("gains", "scenario", "versions"):
+        strict(table.column(column)[0])
+    assert serialise.restore(from_json(table.column("scenario")[0])).law.gains == scenario.law.gains
+
+
+# damaged files
+
+
+@pytest.mark.parametrize(
+    "error", [OSError("disk"), MemoryError(), RecursionError("deep"), KeyError("a"), OverflowError()]
+)
+def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
+    (tmp_path / "a").write_text("")
+    said = rf"a is no map \({type(error).__name__}.*\): give another$"
+    with pytest.raises(smc.ScenarioError, match=said), reading(tmp_path / "a", "map", "give another"):
+        raise error
+
+
+def test_what_is_no_regular_file_is_not_opened(tmp_path):
+    os.mkfifo(tmp_path / "a.json")
+    for load in (load_margins, load_map, result.load):
+        for path in (tmp_path / "a.json", tmp_path, "/dev/zero"):
+            with pytest.raises(smc.ScenarioError, match="it is no regular file"):
+                load(path)
+
+
+@pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
+def test_what_a_report_kept_is_computed_again_where_it_is_damaged(damage, tmp_path):
+    odd, made = margin(0.1, 0.2), []
+
+    def make() -> list[Margin]:
+        made.append(1)
+        return [odd]
+
+    def get() -> list[Margin]:
+        return kept(tmp_path / "margins.json", [], make, save_margins, load_margins)
+
+    assert get() == get() == [odd]
+    assert len(made) == 1
+    (path,) = tmp_path.iterdir()
+    path.write_text(damage)
+    assert get() == get() == [odd]
+    assert len(made) == 2

@@ -1,0 +1,300 @@
+"""Models are compiled whatever control callback is installed, by whichever thread, and nobody waits for ever."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import threading
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import mjcb
+from smc_mujoco.envs.gymnasium_env import PlantEnv
+from smc_mujoco.envs.tasks import tasks, toppling
+from smc_mujoco.envs.vector_env import BatchEnv
+from smc_mujoco.mechanisms import fidelity
+from smc_mujoco.mechanisms.custom.nominal_model import prepared
+from smc_mujoco.simulation import batch, callback, coerce
+
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+
+MODEL = """
+<mujoco>
+  <worldbody>
+    <body><joint name="j" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03"/></body>
+  </worldbody>
+  <actuator><motor joint="j"/></actuator>
+</mujoco>
+"""
+SPRINGS = {"plant": "duffing", "law": "none", "mechanism": "springs", "mismatch": {"mass": 1.1}, "duration": 0.003}
+
+PLAY = {"actuator": smc.Backlash(gap=0.01)}
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A plant of a user's file."""
+    (tmp_path / "own.xml").write_text(MODEL)
+    return smc.plant_from(tmp_path / "own.xml", ["j"])
+
+
+def run_of(law, plant="duffing", **fields):
+    return smc.run(smc.Scenario(plant=plant, law=law, duration=0.003, **fields))
+
+
+def still_of(trace, folder):
+    return smc.still([trace], 0.0, folder / "still.png")
+
+
+# (own plant, a trace of it, folder) -> whether what is to come out did
+COMPILES = {
+    "a run of an own model": lambda own, trace, folder: run_of("super_twisting", own).failure is None,
+    "an environment of an own model": lambda own, trace, folder: len(PlantEnv(own).reset(seed=0)[0]) == 2,
+    "a batch of an own model": lambda own, trace, folder: BatchEnv(own, num_envs=2).reset(seed=0)[0].shape == (2, 2),
+    "a mechanism with mismatch": lambda own, trace, folder: smc.Scenario(**SPRINGS).mechanism == "springs",
+    "a mechanism's deviation": lambda own, trace, folder: fidelity.deviation("duffing", "springs") < 1.0,
+    "a picture": lambda own, trace, folder: still_of(trace, folder),
+    "an own model again": lambda own, trace, folder: smc.plant_from(own.build.source.path, ["j"], name="again").n == 1,
+    "a trace of an own model": lambda own, trace, folder: smc.load(folder / "own.npz").scenario == trace.scenario,
+    "a plant's model": lambda own, trace, folder: own.load().nv == 1,
+    "backlash": lambda own, trace, folder: len(PlantEnv("duffing", changes=PLAY).reset(seed=0)[0]) == 2,
+    "a start among obstacles": lambda own, trace, folder: run_of("none", contact="stops").failure is None,
+    "tasks of an own model": lambda own, trace, folder: "regulate" in tasks(own),
+}
+
+
+@pytest.mark.parametrize("what", COMPILES)
+def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
+    trace = run_of("none", own)
+    trace.save(tmp_path / "own.npz")
+    for kept in (coerce.built, prepared, toppling):  # as the first time in a process
+        kept.cache_clear()
+    asked, found = [], []
+
+    def act(observation):
+        asked.append(observation)
+        if len(asked) == 2:
+            found.append(COMPILES[what](own, trace, tmp_path))
+        return [-0.5 * observation[0]]
+
+    def alone(observation):
+        return [-0.5 * observation[0]]
+
+    beside = run_of(smc.policy(act))
+    assert beside.failure is None
+    assert all(found)
+    assert len(found) == 1
+    np.testing.assert_array_equal(beside.x, run_of(smc.policy(alone)).x)
+
+
+def in_thread(work):
+    """Begin work in a thread; the event of its end."""
+    done = threading.Event()
+
+    def worked():
+        work()
+        done.set()
+
+    threading.Thread(target=worked, daemon=True).start()
+    return done
+
+
+def test_another_thread_compiles_once_the_run_of_a_policy_is_over():
+    asked, let, found = threading.Event(), threading.Event(), []
+
+    def act(observation):
+        asked.set()
+        assert let.wait(60)
+        return [0.0]
+
+    over = in_thread(lambda: found.append(run_of(smc.policy(act)).failure))
+    assert asked.wait(60)
+    compiled = in_thread(lambda: found.append(smc.plant("duffing").load().nv))
+    assert not compiled.wait(0.2)
+    let.set()
+    assert over.wait(60)
+    assert compiled.wait(60)
+    assert sorted(map(str, found)) == ["1", "None"]
+
+
+def test_a_native_run_is_not_waited_for():
+    with callback.installed():
+        before = mujoco.get_mjcb_control()
+        assert in_thread(lambda: smc.plant("duffing").load()).wait(60)
+        assert mujoco.get_mjcb_control() is before
+
+
+class Slow:
+    """A spec that compiles until it is told to stop."""
+
+    def __init__(self):
+        self.begun, self.let = threading.Event(), threading.Event()
+
+    def compile(self):
+        self.begun.set()
+        assert self.let.wait(60)
+        return mujoco.MjSpec().compile()
+
+
+@pytest.mark.parametrize("python", [True, False], ids=["python", "native"])
+def test_no_python_callback_comes_while_a_model_compiles(python):
+    slow, entered = Slow(), threading.Event()
+    native = callback.harness().ctypes
+
+    def enter():
+        with mjcb.held((lambda model, data: None) if python else native):
+            entered.set()
+
+    compiled = in_thread(lambda: mjcb.compiled(slow))  # pyright: ignore[reportArgumentType]
+    assert slow.begun.wait(60)
+    left = in_thread(enter)
+    assert entered.wait(0.2 if python else 60) is not python
+    slow.let.set()
+    assert compiled.wait(60)
+    assert left.wait(60)
+
+
+def test_a_model_that_does_not_compile_leaves_the_callback():
+    def control(model, data):
+        return None
+
+    broken = mujoco.MjSpec()
+    broken.worldbody.add_geom(size=(-1.0, 0.0, 0.0))
+    with mjcb.held(control):
+        with pytest.raises(ValueError, match="size"):
+            mjcb.compiled(broken)
+        assert mujoco.get_mjcb_control() is control
+    assert in_thread(lambda: mjcb.compiled(mujoco.MjSpec())).wait(60)
+
+
+def test_what_is_wrong_with_a_file_is_still_told_within_a_policy(tmp_path):
+    (tmp_path / "bad.xml").write_text(MODEL.replace('size=".03"', 'size="-1"'))
+    found = []
+
+    def act(observation):
+        with pytest.raises(smc.ScenarioError, match="size") as told:
+            smc.plant_from(tmp_path / "bad.xml", ["j"])
+        found.append(str(told.value))
+        return [0.0]
+
+    assert run_of(smc.policy(act)).failure is None
+    assert "Python exception" not in found[0]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forked_child_waits_for_no_thread_of_its_parent():
+    slow, entered, leave = Slow(), threading.Event(), threading.Event()
+
+    def hold():
+        with callback.installed():
+            entered.set()
+            assert leave.wait(60)
+
+    ends = in_thread(hold), in_thread(lambda: mjcb.compiled(slow))  # pyright: ignore[reportArgumentType]
+    assert entered.wait(60)
+    assert slow.begun.wait(60)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
+        child = os.fork()
+    if child == 0:
+        signal.alarm(30)  # ends it where it hangs
+        mjcb.compiled(mujoco.MjSpec())
+        with mjcb.held(lambda model, data: None):
+            mjcb.compiled(mujoco.MjSpec())
+        os._exit(7 if mujoco.get_mjcb_control() is None else 8)
+    leave.set()
+    slow.let.set()
+    assert all(end.wait(60) for end in ends)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+IMPORTS = """
+import threading, time, warnings
+import smc_mujoco as smc
+warnings.simplefilter("ignore")
+asked = threading.Event()
+def other():
+    asked.wait()
+    import smc_mujoco.envs.vector_env
+thread = threading.Thread(target=other)
+thread.start()
+def act(observation):
+    if not asked.is_set():
+        asked.set()
+        time.sleep(0.5)
+        import smc_mujoco.envs.vector_env
+    return [0.0]
+print(smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.003)).failure)
+thread.join()
+"""
+
+
+def test_a_policy_and_another_thread_may_import_the_batches_at_once():
+    root = str(Path(smc.__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": root}
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTS], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.stdout, done.stderr) == ("None\n", "")
+
+
+def foreign(*arguments):
+    """A user's callback."""
+    return 0.0
+
+
+@pytest.mark.parametrize("name", [name for name in mjcb.CALLBACKS if name != "control"])
+def test_another_callback_of_a_user_s_is_not_called_in_a_run_and_put_back(name):
+    alone = run_of("classical")
+    getattr(mujoco, f"set_mjcb_{name}")(foreign)
+    try:
+        beside = run_of("classical")
+        assert getattr(mujoco, f"get_mjcb_{name}")() is foreign
+    finally:
+        getattr(mujoco, f"set_mjcb_{name}")(None)
+    np.testing.assert_array_equal(beside.x, alone.x)
+
+
+@pytest.mark.parametrize("control", [None, foreign], ids=["none", "a Python function"])
+@pytest.mark.parametrize("at", [10, 15, 20])
+def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):
+    monkeypatch.setattr(batch, "SLICE_STEPS", 10)  # 5 of each of two runs
+    two = [smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed) for seed in range(2)]
+    whole, done = smc.run(two), []
+
+    def report(steps):
+        done.append(steps)
+        if sum(done) == 2 * at:
+            mujoco.set_mjcb_control(control)
+
+    for i, trace in smc.stream(two, report=report):
+        assert "MuJoCo's control callback was set" in (trace.failure or "")
+        assert trace.diverged_at == pytest.approx(at * 1e-3)
+        np.testing.assert_array_equal(trace.u[:at], whole[i].u[:at])
+        for array in (trace.x, trace.u, trace.d, trace.reaction):
+            assert np.isnan(array[at:]).all()
+    assert mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler"])
+def test_a_law_that_clears_the_callback_fails_its_run(integrator):
+    asked = itertools.count()
+
+    def act(observation):
+        if next(asked) == 3:
+            mujoco.set_mjcb_control(foreign)
+            mujoco.set_mjcb_control(None)
+        return [-0.5 * observation[0]]
+
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator))
+    assert "MuJoCo's control callback was set" in (trace.failure or "")
+    assert trace.diverged_at == pytest.approx({"RK4": 0.003, "Euler": 0.004}[integrator])
+    k = round((trace.diverged_at or 0.0) / 1e-3)
+    assert np.isfinite(trace.x[:k]).all()
+    assert np.isnan(trace.x[k:]).all()

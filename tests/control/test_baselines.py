@@ -1,0 +1,255 @@
+"""The baselines are what their textbooks say: PID, LQR, computed torque, and a pendulum swung up by its energy.
+
+Most runs are on a free unit mass, x'' = u + d: the Duffing oscillator without its springs.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve_continuous_are
+
+import smc_mujoco as smc
+from smc_mujoco.control import design
+from smc_mujoco.control.component import GainWarning
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import reference as plain
+
+PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
+FREE = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
+
+
+def measured(e=0.0, de=0.0, dt=1e-3, **more):
+    """What a law sees with the reference at 0."""
+    return Measurement(**({"t": 0.0, "r": 0.0, "dr": 0.0, "ddr": 0.0, "f": 0.0, "g": 1.0} | more
+                          | {"dt": dt, "x": e, "v": de, "e": e, "de": de}))  # fmt: skip
+
+
+def called(law, times=1, memory=None, **y):
+    """The law's last u after some calls."""
+    memory, u = np.zeros(law.memory) if memory is None else memory, math.nan
+    assert law.function is not None
+    for _ in range(times):
+        u, _ = law.function(measured(**y), plain.named(law), memory)
+    return u
+
+
+def free(law, **fields):
+    """A run on the free mass."""
+    return smc.run(smc.Scenario(**({"plant": FREE, "law": law, "x0": 1.0, "u_max": math.inf} | fields)))
+
+
+# PID
+
+
+def test_pid_on_a_free_mass_moves_as_its_three_poles_say():
+    """z = (integral of e, e, de), z' = A z, to the order of the control period."""
+    kp, ki, kd = 10.0, 5.0, 6.0
+    trace = free(smc.law("pid", kp=kp, ki=ki, kd=kd, tau=0.0), duration=4.0, control_period=5e-4)
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-ki, -kp, -kd]])
+    exact = np.array([expm(A * t) @ (0.0, 1.0, 0.0) for t in trace.t[::200]])
+    np.testing.assert_allclose(trace.x[::200, 0], exact[:, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize(("ki", "stable"), [(0.9, True), (1.1, False)])
+def test_pid_is_stable_just_where_routh_says(ki, stable):
+    """s^3 + kd s^2 + kp s + ki with kp = kd = 1: just for ki < 1."""
+    if stable:
+        law = smc.law("pid", kp=1.0, kd=1.0, ki=ki, tau=0.0)
+    else:
+        with pytest.warns(GainWarning, match="kp kd > ki"):
+            law = smc.law("pid", kp=1.0, kd=1.0, ki=ki, tau=0.0)
+    size = np.abs(free(law, duration=120.0, control_period=1e-2).x[:, 0])
+    early, late = size[:3000].max(), size[-3000:].max()
+    assert late < 0.5 * early if stable else late > 2.0 * early
+
+
+def test_only_the_integral_leaves_no_error_under_a_constant_force():
+    """Without it the mass rests where kp e = d."""
+    with_it, without = smc.law("pid"), smc.law("pid", ki=0.0)
+    for law, rest in ((with_it, 0.0), (without, 0.2), (smc.law("computed_torque", kp=10.0), 0.2)):
+        trace = free(law, disturbance=smc.Constant(2.0), duration=15.0, u_max=10.0)
+        assert trace.x[-1, 0] == pytest.approx(rest, abs=2e-3)
+        assert trace.u[-1, 0] == pytest.approx(-2.0, abs=2e-2)
+
+
+def test_the_filter_takes_the_noise_from_the_derivative():
+    """White noise through tau D' = n - D, backward Euler: sigma sqrt(h / (2 tau + h)), and delta u = kd D."""
+    law, rng = smc.law("pid", kp=0.0, ki=0.0, kd=2.0, tau=9.5e-3), np.random.default_rng(0)
+    memory = np.zeros(law.memory)
+    u = [called(law, memory=memory, de=n) for n in 0.1 * rng.normal(size=20_000)]
+    assert np.std(u[100:]) == pytest.approx(2.0 * 0.1 * math.sqrt(1e-3 / (2 * 9.5e-3 + 1e-3)), rel=0.05)
+
+
+def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceeded():
+    """Held at e = 1 the integrator rests where (sat(u) - u) / tt = ki e: u exceeds the bound by ki tt."""
+    with pytest.warns(smc.GainWarning, match="kp kd > ki"):
+        law = smc.law("pid", kp=10.0, ki=5.0, kd=0.0, tt=0.5)
+    assert called(law, 20_000, e=1.0, limit=6.0) == pytest.approx(-(6.0 + 5.0 * 0.5), rel=1e-6)
+    assert called(law, 1001, e=1.0) == pytest.approx(-(10.0 + 5.0), rel=1e-9)  # no bound: it winds up as ki t
+
+
+def test_a_pid_that_saturates_does_not_wind_up():
+    """A far start under |u| <= 1: without back-calculation the overshoot is several times larger."""
+    far = {"x0": 5.0, "u_max": 1.0, "duration": 30.0}
+    held, wound = (-free(smc.law("pid", tt=tt), **far).x.min() for tt in (0.5, 1e9))
+    assert held < 1.0
+    assert wound > 2.0
+
+
+@pytest.mark.parametrize("dt", [1e-4, 1e-3, 1e-2])
+def test_the_pid_s_memory_runs_by_the_control_period(dt):
+    law, memory = smc.law("pid", kp=5.0, ki=3.0, kd=1.0, tau=0.1), np.zeros(3)
+    called(law, memory=memory, dt=dt)
+    called(law, round(0.2 / dt), memory, e=1.0, de=1.0, dt=dt)
+    assert memory[1] == pytest.approx(-3.0 * 0.2, rel=1e-9)
+    assert memory[2] == pytest.approx(1.0 - (1.0 + dt / 0.1) ** -round(0.2 / dt), rel=1e-9)
+
+
+def test_design_refuses_a_joint_without_an_actuator():
+    with pytest.raises(
+        smc.ScenarioError, match=r"cart_pole's channel 1 has no actuator, .* take a law that does, 'hier"
+    ):
+        design.lqr("cart_pole")
+
+
+# LQR
+
+
+def closed_form(law, **y):
+    """k1 and k2, seen from outside."""
+    return -called(law, e=1.0, **y), -called(law, de=1.0, **y)
+
+
+def riccati(a1, a2, b, q, r):
+    """The optimal gains and cost matrix, by scipy."""
+    A, B = np.array([[0.0, 1.0], [a1, a2]]), np.array([[0.0], [b]])
+    P = solve_continuous_are(A, B, np.diag(q), np.array([[r]]))
+    return (B.T @ P / r)[0], P
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lqr_s_closed_form_solves_the_riccati_equation(seed):
+    rng = np.random.default_rng(seed)
+    a1, a2 = rng.normal(scale=10.0, size=2)
+    b, r, *q = np.exp(rng.normal(scale=1.5, size=4))
+    law = smc.law("lqr", q1=q[0], q2=q[1], r=r, a1=a1, a2=a2, b=b)
+    np.testing.assert_allclose(closed_form(law), riccati(a1, a2, b, q, r)[0], rtol=1e-7)
+
+
+def test_lqr_costs_what_the_riccati_equation_says_and_its_neighbours_cost_more():
+    """From x(0) = 1 the integral of q1 e^2 + q2 de^2 + r u^2 is P11."""
+
+    def cost(law):
+        trace = free(law, duration=6.0, control_period=5e-4)
+        return np.sum(100.0 * trace.x**2 + 16.0 * trace.v**2 + trace.u**2) * 5e-4
+
+    (k1, k2), P = riccati(0.0, 0.0, 1.0, (100.0, 16.0), 1.0)
+    assert cost(smc.law("lqr")) == pytest.approx(P[0, 0], rel=5e-3)
+    for kp, kd in ((0.8 * k1, k2), (1.2 * k1, k2), (k1, 0.8 * k2), (k1, 1.2 * k2)):
+        assert cost(smc.law("computed_torque", kp=kp, kd=kd)) > cost(smc.law("lqr"))
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_lqr_s_return_difference_is_at_least_1_at_every_frequency(plant):
+    """Kalman's inequality: half to infinite gain margin, 60 degrees of phase margin."""
+    law = design.lqr(plant)
+    a1, a2, b = (law.gains[name] for name in ("a1", "a2", "b"))
+    k1, k2 = closed_form(law)
+    p = 1j * np.logspace(-3, 4, 1000)
+    assert np.abs(1.0 + b * (k1 + k2 * p) / (p**2 - a2 * p - a1)).min() >= 1.0 - 1e-9
+
+
+def test_design_linearises_a_plant_at_the_origin():
+    inertia = 0.5 * 0.5**2
+    expected = {
+        "inverted_pendulum": (9.81 / 0.5, -0.02 / inertia, 1 / inertia),
+        "duffing": (1.0, -0.2, 1.0),
+        "van_der_pol": (-1.0, 1.0, 1.0),
+        # at an end of the row one spring only holds the pendulum back
+        "inverted_pendulum_network": (9.81 / 0.5 - 0.5 / inertia, -0.02 / inertia, 1 / inertia),
+        "pendulum_network": (-9.81 / 0.5 - 0.5 / inertia, -0.02 / inertia, 1 / inertia),
+    }
+    for name, numbers in expected.items():
+        np.testing.assert_allclose(design.linearised(smc.plant(name)), numbers, rtol=1e-6)
+    np.testing.assert_allclose(design.linearised(smc.plant("duffing", M=2.0, alpha=4.0)), (-2.0, -0.1, 0.5), rtol=1e-6)
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "van_der_pol"])
+def test_designed_lqr_moves_a_small_error_as_its_closed_loop_says(plant):
+    law = design.lqr(plant, q=(10.0, 1.0), r=0.5)
+    a1, a2, b = (law.gains[name] for name in ("a1", "a2", "b"))
+    k1, k2 = riccati(a1, a2, b, (10.0, 1.0), 0.5)[0]
+    A = np.array([[0.0, 1.0], [a1 - b * k1, a2 - b * k2]])
+    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=1e-3, duration=2.0, control_period=1e-4, physics_step=1e-4))
+    exact = np.array([expm(A * t) @ (1e-3, 0.0) for t in trace.t[::1000]])
+    np.testing.assert_allclose(trace.x[::1000, 0], exact[:, 0], atol=1e-5)
+
+
+# computed torque
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "van_der_pol"])
+def test_with_the_model_the_error_of_computed_torque_obeys_its_linear_equation(plant):
+    """On the way along a sine, from a wrong start."""
+    reference = smc.Sine(0.5, 2.0)
+    common = {"plant": plant, "x0": 0.3, "reference": reference, "duration": 3.0, "u_max": math.inf}
+    law = smc.law("computed_torque", kp=9.0, kd=4.0)
+    trace = smc.run(smc.Scenario(law=law, model="nominal", control_period=1e-4, physics_step=1e-4, **common))
+    A = np.array([[0.0, 1.0], [-9.0, -4.0]])
+    exact = np.array([expm(A * t) @ (0.3, -1.0) for t in trace.t[::1000]])
+    np.testing.assert_allclose((trace.x - trace.r)[::1000, 0], exact[:, 0], atol=2e-3)
+
+
+def test_without_the_model_computed_torque_is_a_pd_law():
+    law = smc.law("computed_torque", kp=9.0, kd=4.0)
+    assert called(law, e=0.5, de=-0.2, f=3.0, g=7.0, ddr=11.0) == -(9.0 * 0.5 + 4.0 * -0.2)
+    assert called(law, e=0.5, de=-0.2, f=3.0, g=7.0, ddr=11.0, model=1.0) == (-3.7 - 3.0 + 11.0) / 7.0
+
+
+# swing-up
+
+J, W = 0.125, math.sqrt(9.81 / 0.5)  # of the library's pendulum
+
+
+def energy(trace):
+    """E at every sample, J; 0 upright at rest."""
+    return J * (0.5 * trace.v**2 + W**2 * (np.cos(trace.x) - 1.0))[:, 0]
+
+
+@pytest.mark.parametrize("u_max", [0.3, 0.5, 1.0, 2.0, 6.0])
+def test_swing_up_lifts_the_hanging_pendulum_by_a_torque_that_cannot_hold_it(u_max):
+    """m g l = 2.45 N m. Without friction the energy never falls before the catch, and then the pendulum stays up."""
+    plant = smc.plant("inverted_pendulum", b=0.0)
+    trace = smc.run(smc.Scenario(plant=plant, law="swing_up", x0=math.pi, u_max=u_max, duration=15.0))
+    E, up = energy(trace), np.cos(trace.x[:, 0])
+    caught = np.argmax(up > math.cos(1.0))
+    assert E[0] == pytest.approx(-2 * J * W**2)
+    rising = E[:caught]
+    assert rising.max() > -J * W**2  # it got there by swinging
+    assert np.diff(rising).min() > -1e-5 * J * W**2
+    assert trace.failure is None
+    assert up[-5000:].min() > 1.0 - 1e-9
+    assert np.abs(trace.u[-5000:]).max() < 1e-6
+
+
+def test_swing_up_also_works_with_friction_and_with_the_model():
+    for model in ("none", "nominal"):
+        common = {"plant": "inverted_pendulum", "law": "swing_up", "model": model, "u_max": 1.0, "x0": math.pi}
+        trace = smc.run(smc.Scenario(duration=10.0, **common))
+        assert np.cos(trace.x[-1000:, 0]).min() > 1.0 - 1e-9
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_the_catch_holds_all_that_its_torque_can_hold_and_nothing_more(side):
+    """Upright with the speed v0, s = v0: it returns for |v0| < u_max / (J w), else it falls whatever the law."""
+    for part, holds in ((0.95, True), (1.05, False)):
+        v0 = side * part * 0.3 / (J * W)
+        law = smc.law("swing_up", part=0.99)
+        trace = smc.run(smc.Scenario(plant="inverted_pendulum", law=law, x0=0.0, v0=v0, u_max=0.3, duration=3.0))
+        assert (np.abs(trace.x).max() < 1.0) == holds
+
+
+def test_swing_up_warns_of_a_catch_that_gravity_outweighs():
+    with pytest.warns(GainWarning, match="q > J w"):
+        smc.law("swing_up", q=0.5)

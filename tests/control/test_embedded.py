@@ -1,0 +1,260 @@
+"""The paper's law as embedded controllers compute it: how far from tanh, and how far that takes a plant."""
+
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control.component import GainWarning
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.laws import observer_free_q15 as q15
+from smc_mujoco.control.surface import surface
+from smc_mujoco.simulation import reference
+
+PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
+FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
+LAM, K1 = 6.0, 2.5
+HALF = np.linspace(0.0, 12.0, 15_001)
+GRID = np.concatenate([-HALF[:0:-1], HALF])
+
+
+def measured(e=0.0, de=0.0, **more):
+    """What a law sees with the reference at 0."""
+    return Measurement(t=0.0, dt=1e-3, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, **more)
+
+
+def forces(law, e, de):
+    """u and s at many states, (N, 2)."""
+    gains, memory = reference.named(law), np.zeros(law.memory)
+    return np.array([law.function(measured(float(a), float(b)), gains, memory) for a, b in zip(e, de, strict=True)])
+
+
+def squash(name, s=GRID, **gains):
+    """What stands in for tanh in a law, at s."""
+    return -forces(smc.law(name, lam=1.0, **gains), np.zeros_like(s), s)[:, 0]
+
+
+# error against tanh: what the docstrings say, and no less
+
+
+@pytest.mark.parametrize("size", [8, 16, 32, 64, 128, 256])
+def test_the_table_is_as_close_as_linear_interpolation_allows(size):
+    error = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
+    bound = max(0.0963 * (5.0 / size) ** 2, 9.1e-5)
+    assert 0.85 * bound < error <= bound
+
+
+def test_the_table_s_documented_errors():
+    for size, error in ((16, 9.5e-3), (64, 5.9e-4), (256, 9.1e-5)):
+        found = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
+        assert found == pytest.approx(error, rel=0.05)
+
+
+@pytest.mark.parametrize("size", [1, 3, 5, 7, 50, 100, 200, 255])
+def test_a_size_that_divides_nothing_gets_at_least_its_steps(size):
+    error = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
+    assert error <= max(0.0963 * (5.0 / size) ** 2, 9.1e-5, 1.0 if size == 1 else 0.0)
+
+
+def test_the_table_is_exact_at_its_nodes_and_one_beyond_its_end():
+    nodes = np.arange(64) * 5.0 / 64
+    np.testing.assert_allclose(squash("observer_free_table", nodes), np.tanh(nodes), rtol=1e-15)
+    assert squash("observer_free_table", np.array([5.0, 6.0, 1e9, -5.0, -1e9])).tolist() == [1, 1, 1, -1, -1]
+
+
+@pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (2, 9.1e-5), (3, 5.5e-6), (4, 6e-7), (5, 2.3e-7)])
+def test_the_series_is_as_close_as_its_terms_allow(terms, error):
+    assert 0.75 * error < np.abs(squash("observer_free_taylor", terms=terms) - np.tanh(GRID)).max() <= error
+
+
+def test_single_precision_is_within_a_few_roundings():
+    assert 3e-8 < np.abs(squash("observer_free_single") - np.tanh(GRID)).max() <= 1.5e-7
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_is_odd_bounded_and_rises(name):
+    T = squash(name)
+    np.testing.assert_array_equal(T, -T[::-1])
+    assert np.abs(T).max() <= 1.0
+    slack = {"observer_free_single": 2e-7, "observer_free_taylor": 1e-6}.get(name, 0.0)  # their last bits ripple
+    assert np.diff(T).min() >= -slack
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_every_form_is_bounded_by_lam_however_wild_the_state(name):
+    law, wild = smc.law(name, lam=LAM), [-1e30, -1e9, -100.0, 0.0, 100.0, 1e9, 1e30]
+    u = forces(law, *(a.ravel() for a in np.meshgrid(wild, wild)))[:, 0]
+    assert np.isfinite(u).all()
+    assert np.abs(u).max() <= LAM
+
+
+@pytest.mark.parametrize(
+    ("name", "gains"),
+    [
+        ("observer_free_table", {"size": 300}),
+        ("observer_free_taylor", {"terms": 6}),
+        ("observer_free_taylor", {"terms": 2.5}),
+        ("observer_free_q15", {"lam": 8.0}),
+        ("observer_free_q15", {"k1": 50.0}),
+    ],
+)
+def test_what_a_form_cannot_hold_is_said(name, gains):
+    with pytest.warns(GainWarning):
+        law = smc.law(name, **gains)
+    assert np.abs(forces(law, [0.3], [0.2])[0, 0]) <= law.gains["lam"]
+
+
+# single precision
+
+
+def test_single_precision_rounds_every_operation_to_24_bits():
+    """The same operations on numpy's float32 arrays, bit by bit."""
+    rng, f = np.random.default_rng(0), np.float32
+    e, de = rng.normal(scale=2.0, size=(2, 5000))
+    s = de.astype(f) + f(K1) * e.astype(f)
+    a = f(0.25) * np.clip(s, f(-9.0), f(9.0))
+    z = a * a
+    T = a * (f(105.0) + f(10.0) * z) / (f(105.0) + z * (f(45.0) + z))
+    for _ in range(2):
+        T = (T + T) / (f(1.0) + T * T)
+    assert T.dtype == f
+    found = forces(smc.law("observer_free_single", lam=LAM, k1=K1), e, de)
+    np.testing.assert_array_equal(found[:, 0], -(f(LAM) * T).astype(float))
+    np.testing.assert_array_equal(found[:, 1], s.astype(float))
+
+
+# fixed point
+
+
+def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
+    """The fixed-point law as its C would run: int16 words and int32 sums of numpy, where an overflow would wrap."""
+    word, wide = np.int16, np.int32
+
+    def held(n):
+        return np.clip(n, -32767, 32767).astype(word)
+
+    def convert(a, unit):
+        scaled = np.clip(np.asarray(a) / unit * 32768.0, -32767.0, 32767.0)
+        return held(np.copysign(np.floor(np.abs(scaled) + 0.5), scaled))
+
+    def multiply(a, b, bits):
+        full = a.astype(wide) * b.astype(wide)
+        assert np.array_equal(full, a.astype(np.int64) * b.astype(np.int64))
+        return np.sign(full) * ((np.abs(full) + wide(1 << (bits - 1))) >> bits)
+
+    gain = [convert([g], unit) for g, unit in ((k1 * e_range / 8, 16.0), (de_range / 8, 16.0), (lam, u_range))]
+    total = multiply(gain[0], convert(e, e_range), 11) + multiply(gain[1], convert(de, de_range), 11)
+    s = held(total)
+    table = q15.TABLE.astype(word)
+    assert np.array_equal(table, q15.TABLE)
+    size = np.abs(s.astype(wide))
+    i, part = size >> 7, size & 127
+    T = table[i] + multiply(table[i + 1] - table[i], part.astype(word), 7)
+    u = held(multiply(gain[2], held(np.sign(s) * T), 15))
+    return -u * (u_range / 32768.0), s * (8.0 / 32768.0)
+
+
+def test_fixed_point_is_what_16_bit_words_and_32_bit_sums_compute():
+    rng = np.random.default_rng(0)
+    e, de = rng.normal(scale=(0.5, 3.0), size=(20_000, 2)).T
+    e[:100], de[:100] = 1e4 * e[:100], 1e4 * de[:100]  # far out of range
+    u, s = firmware(e, de)
+    found = forces(smc.law("observer_free_q15", lam=LAM, k1=K1), e, de)
+    np.testing.assert_array_equal(found[:, 0], u)
+    np.testing.assert_array_equal(found[:, 1], s)
+
+
+def test_fixed_point_is_as_close_as_its_words_allow():
+    rng = np.random.default_rng(1)
+    e, de = rng.uniform(-1.2, 1.2, 40_000), rng.uniform(-4.0, 4.0, 40_000)
+    u = forces(smc.law("observer_free_q15", lam=LAM, k1=K1), e, de)[:, 0]
+    error = np.abs(u + LAM * np.tanh(de + K1 * e)).max()
+    bound = LAM * (1.6e-4 + (K1 * 4.0 + 8.0 + 16.0) / 2**16) + 8.0 / 2**16
+    assert 0.3 * bound < error <= bound
+
+
+def test_fixed_point_saturates_each_word_at_its_range():
+    law = smc.law("observer_free_q15", lam=LAM, k1=0.25, e_range=1.0)  # e is held at 1: s at 1/4
+    (u, s), (at_range, _) = forces(law, [50.0, 1.0], [0.0, 0.0])
+    assert u == at_range
+    assert s == pytest.approx(0.25, abs=1e-3)
+    assert u == pytest.approx(-LAM * math.tanh(0.25), abs=2e-3)
+
+
+def test_words_round_to_the_nearest_away_from_zero():
+    for a, n in ((0.0, 0), (0.5, 1), (-0.5, -1), (0.49, 0), (1.5, 2), (40_000, 32767), (-40_000, -32767)):
+        assert q15.word.py_func(a / 32768, 1.0) == n
+    for a, b, bits, n in ((3, 1, 1, 2), (-3, 1, 1, -2), (5, 1, 2, 1), (6, 1, 2, 2), (0, -5, 3, 0)):
+        assert q15.product.py_func(a, b, bits) == n
+
+
+# in closed loop
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Plant -> law -> trace, 10 s from the plant's x0."""
+    laws = ("observer_free", *FORMS)
+    scenarios = [smc.Scenario(plant=p, law=smc.law(n, lam=LAM, k1=K1)) for p in PLANTS for n in laws]
+    traces = iter(smc.run(scenarios))
+    return {p: {n: next(traces) for n in laws} for p in PLANTS}
+
+
+# Law -> largest |x - x of observer_free| on the way, rad or m: measured, the worst plant's, and a tenth more. It is
+# the error of the force over the stiffness that holds it, lam k1, times 1.4 at most where tanh saturates.
+APART = {
+    "observer_free_table": 3.5e-4,
+    "observer_free_taylor": 3.1e-6,
+    "observer_free_single": 3.2e-8,
+    "observer_free_q15": 1.0e-4,
+}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_moves_a_plant_as_the_paper_s_law_does(name, plant, runs):
+    exact, form = runs[plant]["observer_free"], runs[plant][name]
+    assert form.failure is None
+    apart = np.abs(form.x - exact.x).max()
+    assert 0.0 < apart <= APART[name]
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_comes_to_rest_where_the_paper_s_law_does(name, plant, runs):
+    """Exactly, but for fixed point: within two steps of e, 4 / 2^15."""
+    step = 4.0 / 2**15 if name == "observer_free_q15" else 5e-7
+    exact, form = (runs[plant][n].x[-2000:] for n in ("observer_free", name))
+    assert np.abs(form - exact).max() <= 2.0 * step
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_is_the_same_compiled_and_as_written(name):
+    scenario = smc.Scenario(plant="pendulum_network", law=name, noise=smc.Noise(0.01, 0.05), duration=0.3)
+    fast, slow = smc.run(scenario), reference.run(scenario)
+    for field in ("x", "u", "s"):
+        np.testing.assert_array_equal(getattr(fast, field), getattr(slow, field))
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_takes_the_scenario_s_surface(name):
+    """Given its own, de + k1 e, it does the same, up to where s is rounded."""
+    common = {"plant": "duffing", "law": smc.law(name, lam=LAM, k1=K1), "model": "nominal", "duration": 3.0}
+    own, given, other = (
+        smc.run(smc.Scenario(**common, surface=s)) for s in (None, surface("linear", c=K1), surface("linear", c=1.0))
+    )
+    assert np.abs(given.x - own.x).max() <= (1e-3 if name == "observer_free_q15" else 1e-6)
+    assert np.abs(other.x - own.x).max() > 0.1
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_with_the_model_every_form_obeys_its_own_error_equation(plant):
+    """e'' = -k1 de - lam tanh(s), f and g cancelled: on every plant as on a free mass."""
+    common = {"model": "nominal", "x0": 0.4, "duration": 2.0, "u_max": math.inf}
+    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
+    laws = [smc.law(name, lam=LAM, k1=K1) for name in FORMS]
+    there = smc.run([smc.Scenario(plant=plant, law=law, **common) for law in laws])
+    here = smc.run([smc.Scenario(plant=free, law=law, **common) for law in laws])
+    for one, other in zip(there, here, strict=True):
+        assert np.abs(one.x - other.x).max() < 2e-3  # the held input, 1 ms

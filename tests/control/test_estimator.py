@@ -1,0 +1,435 @@
+"""What each velocity estimator gives on polynomials, sines and noise, and inside a run."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+from scipy.signal import savgol_coeffs
+
+import smc_mujoco as smc
+from smc_mujoco.common.remade import remade
+from smc_mujoco.control.estimator import Reading, catalogue
+from smc_mujoco.simulation import reference
+from smc_mujoco.studies.paper import scenarios
+
+H = 1e-3  # s
+FROM_POSITION = [name for name in smc.estimators() if name != "measured"]
+ESTIMATORS = pytest.mark.parametrize("name", FROM_POSITION)
+LINEAR = ("filtered_difference", "high_gain", "extended_state_observer", "kalman", "integral_chain", "savitzky_golay")
+SECOND = ("extended_state_observer", "kalman", "integral_chain", "savitzky_golay", "levant")
+
+
+def both(estimator, x, v=None, h=H):
+    """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
+    function, gains, memory = (
+        remade(estimator.function, lambda f: f),
+        reference.named(estimator),
+        np.zeros(estimator.memory),
+    )
+    x = np.asarray(x, float)
+    v = np.zeros_like(x) if v is None else v
+    readings = (Reading(h, *xv) for xv in zip(x.tolist(), v.tolist(), strict=True))
+    outs = [function(y, gains, memory) for y in readings]
+    return np.array([out if isinstance(out, tuple) else (out, 0.0) for out in outs]).T
+
+
+def estimates(estimator, x, v=None, h=H):
+    """The estimator's velocity on samples x and sensor readings v, (K,)."""
+    return both(estimator, x, v, h)[0]
+
+
+def differenced(tau):
+    return smc.estimator("filtered_difference", tau=tau)
+
+
+def test_measured_is_the_sensor():
+    x, v = np.random.default_rng(0).normal(size=(2, 100))
+    np.testing.assert_array_equal(estimates(smc.estimator("measured"), x, v), v)
+
+
+@pytest.mark.parametrize("tau", [0.0, 1e-3, 5e-3, 0.1])
+@pytest.mark.parametrize("h", [1e-3, 5e-3])
+def test_filtered_difference_of_a_ramp_is_its_slope_after_an_exponential(tau, h):
+    """v_k = c (1 - a^k), a = tau / (tau + h): exact at once for tau = 0."""
+    k = np.arange(3000)
+    v = estimates(differenced(tau), 0.7 - 2.0 * k * h, h=h)
+    np.testing.assert_allclose(v, -2.0 * (1 - (tau / (tau + h)) ** k), atol=1e-9)
+
+
+@pytest.mark.parametrize("tau", [0.0, 5e-3, 0.05])
+def test_filtered_difference_lags_by_tau_and_half_a_sample(tau):
+    """On x = t^2 / 2 the velocity is t; the filter's share of the lag is tau, the difference's is h / 2."""
+    t = np.arange(4000) * H
+    lag = t - estimates(differenced(tau), t**2 / 2)
+    np.testing.assert_allclose(lag[2000:], tau + H / 2, atol=1e-9)
+
+
+@pytest.mark.parametrize("tau", [0.0, 1e-3, 5e-3, 0.05])
+def test_filtered_difference_passes_noise_by_its_formula(tau):
+    """The impulse response is (1-a)/h (1, -(1-a), -(1-a) a, ...): its energy is 2 (1-a)^2 / ((1+a) h^2)."""
+    gain = math.sqrt(2.0 / ((tau + H) * (2.0 * tau + H)))
+    impulse = np.zeros(5000)
+    impulse[1] = 1.0
+    assert np.linalg.norm(estimates(differenced(tau), impulse)) == pytest.approx(gain, rel=1e-9)
+    noise = 0.01 * np.random.default_rng(0).normal(size=200_000)
+    assert estimates(differenced(tau), noise)[2000:].std() == pytest.approx(0.01 * gain, rel=0.02)
+
+
+def test_filtered_difference_starts_from_zero_wherever_the_plant_starts():
+    assert estimates(differenced(5e-3), np.full(5, 1e3)).tolist() == [0.0] * 5
+
+
+def test_filtered_difference_does_not_read_the_velocity_sensor():
+    x, v = np.random.default_rng(0).normal(size=(2, 100))
+    np.testing.assert_array_equal(estimates(differenced(5e-3), x, v), estimates(differenced(5e-3), x))
+
+
+def test_a_negative_time_constant_is_refused():
+    """tau = -5 ms at 1 ms is a = 1.25: an estimate that grows without bound."""
+    with pytest.raises(smc.ScenarioError, match="tau"):
+        differenced(-5e-3)
+
+
+@smc.law_function()
+def show_position(y, gains, memory):
+    return 0.0, y.x
+
+
+@smc.law_function()
+def show_velocity(y, gains, memory):
+    return 0.0, y.v
+
+
+@smc.law_function()
+def show_acceleration(y, gains, memory):
+    return 0.0, y.a
+
+
+@ESTIMATORS
+@pytest.mark.parametrize("period", [1e-3, 5e-3])
+def test_in_a_run_every_channel_has_its_own_estimate_of_what_it_measures(name, period):
+    """Memory shared between channels or runs, or a dt from elsewhere, would show."""
+    estimator = smc.estimator(name)
+    common = {"plant": "pendulum_network", "duration": 0.3, "control_period": period, "seed": 2}
+    common |= {"velocity": estimator, "noise": smc.Noise(position=0.01, velocity=9.0)}
+    laws = (show_position(), show_velocity(), show_acceleration(), show_velocity())
+    x, v, a, again = (trace.s for trace in smc.run([smc.Scenario(law=law, **common) for law in laws]))
+    np.testing.assert_array_equal(again, v)
+    for i in range(5):
+        expected = both(estimator, x[:, i], h=period)
+        scale = np.abs(expected).max(axis=1) + 1e-3
+        np.testing.assert_allclose(v[:, i], expected[0], rtol=0, atol=1e-9 * scale[0])
+        np.testing.assert_allclose(a[:, i], expected[1], rtol=0, atol=1e-9 * scale[1])
+
+
+def test_in_a_run_the_estimate_follows_the_true_velocity():
+    common = {"plant": "duffing", "duration": 5.0}
+    free = smc.run(smc.Scenario(law=show_velocity(), velocity=differenced(2e-3), **common))
+    late = np.interp(free.t - 2e-3 - H / 2, free.t, free.v[:, 0])
+    np.testing.assert_allclose(free.s[50:, 0], late[50:], atol=2e-5)
+    sensed = smc.run(smc.Scenario(law=show_velocity(), **common))
+    np.testing.assert_array_equal(sensed.s, sensed.v)
+
+
+# what holds of every estimator
+
+
+@ESTIMATORS
+def test_an_estimate_starts_from_the_first_reading_without_a_kick(name):
+    np.testing.assert_array_equal(both(smc.estimator(name), np.full(50, 1e3)), np.zeros((2, 50)))
+
+
+@ESTIMATORS
+def test_an_estimate_is_odd_in_the_position_and_does_not_read_the_velocity_sensor(name):
+    x, v = np.random.default_rng(0).normal(size=(2, 200))
+    np.testing.assert_array_equal(both(smc.estimator(name), x, v), -both(smc.estimator(name), -x))
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_a_linear_estimate_takes_its_time_from_dt(name):
+    """In units of the period nothing changes: gains in 1 / s by 1 / h, q by h^-5, tau by h."""
+    exponents = {"w": -1, "q": -5, "tau": 1}
+    x = np.cumsum(np.random.default_rng(0).normal(size=300))
+    one = both(smc.estimator(name), x, h=1e-3)
+    scaled = {gain: value * 7.0 ** exponents.get(gain, 0) for gain, value in smc.estimator(name).gains.items()}
+    other = both(smc.estimator(name, **scaled), x, h=7e-3)
+    np.testing.assert_allclose(other * np.array([[7.0], [49.0]]), one, rtol=1e-7, atol=1e-7 * np.abs(one).max())
+
+
+@ESTIMATORS
+@pytest.mark.parametrize("h", [1e-3, 5e-3])
+def test_an_estimate_of_a_ramp_is_its_slope_and_no_acceleration(name, h):
+    t = np.arange(round(2.0 / h)) * h
+    estimator = smc.estimator(name)
+    v, a = both(estimator, 5.0 - 3.0 * t, h=h)[:, -100:]
+    L = estimator.gains.get("L", 0.0)
+    np.testing.assert_allclose(v, -3.0, rtol=0, atol=1e-9 + 8 * L * h**2)
+    np.testing.assert_allclose(a, 0.0, rtol=0, atol=1e-6 + 5 * L * h)
+
+
+@pytest.mark.parametrize("name", SECOND)
+def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
+    """The integral chain but for its lag: it gives the velocity of 3 / w before."""
+    t = np.arange(3000) * H
+    late = 0.0
+    if name == "integral_chain":
+        late = 3.0 / smc.estimator(name).gains["w"]
+    L = smc.estimator(name).gains.get("L", 0.0)
+    v, a = both(smc.estimator(name), 1.0 - 3.0 * t + 2.0 * t**2)[:, -100:]
+    np.testing.assert_allclose(v, -3.0 + 4.0 * (t[-100:] - late), rtol=0, atol=1e-7 + 8 * L * H**2)
+    np.testing.assert_allclose(a, 4.0, rtol=0, atol=1e-4 + 5 * L * H)
+
+
+@ESTIMATORS
+@pytest.mark.parametrize("sigma", [0.001, 0.01])
+def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name, sigma):
+    """Without a velocity sensor."""
+    laws = scenarios.LAWS if name == "levant" else ("observer_free", "classical")
+    pairs = [(plant, law) for plant in scenarios.GAINS for law in laws]
+    changes = {"velocity": name, "noise": smc.Noise(position=sigma)}
+    traces = smc.run([scenarios.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
+    for pair, trace in zip(pairs, traces, strict=True):
+        assert trace.failure is None, pair
+        assert smc.score(trace)["ultimate_bound"] <= 0.1 * np.abs(trace.x[0]).max(), pair
+
+
+# noise gains: white noise passes with the root of the impulse response's energy
+
+
+def gains_of(name, **gains):
+    """Noise gains to velocity and acceleration."""
+    impulse = np.zeros(6000)
+    impulse[1] = 1.0
+    return np.linalg.norm(both(smc.estimator(name, **gains), impulse), axis=1)
+
+
+@pytest.mark.parametrize("w", [20.0, 100.0, 1000.0])
+def test_observers_pass_noise_by_their_formulas(w):
+    b = math.exp(-w * H)
+    assert gains_of("high_gain", w=w)[0] == pytest.approx(math.sqrt(2 * (1 - b) ** 3 / (1 + b) ** 3) / H, rel=1e-6)
+    v = math.sqrt((1 - b) ** 3 * (13 + 50 * b + 49 * b * b) / (2 * (1 + b) ** 5)) / H
+    a = math.sqrt(6 * (1 - b) ** 5 / (1 + b) ** 5) / H**2
+    np.testing.assert_allclose(gains_of("extended_state_observer", w=w), [v, a], rtol=1e-6)
+
+
+@pytest.mark.parametrize("w", [10.0, 30.0])
+def test_the_integral_chain_passes_less_noise_than_the_observer_of_its_poles(w):
+    """For small w h its energies are those in continuous time, w^3 / 16 and 3 w^5 / 16, times h for sampled noise."""
+    v, a = gains_of("integral_chain", w=w)
+    np.testing.assert_allclose([v, a], np.sqrt([H * w**3 / 16, H * 3 * w**5 / 16]), rtol=0.025)
+    assert v < gains_of("extended_state_observer", w=w)[0] / 4
+
+
+@pytest.mark.parametrize("N", [5, 31, 101])
+def test_savitzky_golay_passes_noise_by_its_formula(N):
+    v = math.sqrt(12 * (2 * N - 1) * (8 * N - 11) / (N * (N**2 - 1) * (N**2 - 4))) / H
+    assert gains_of("savitzky_golay", window=N)[0] == pytest.approx(v, rel=1e-9)
+    assert gains_of("savitzky_golay", window=N, degree=1)[0] == pytest.approx(math.sqrt(12 / (N**3 - N)) / H, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_noise_in_is_noise_out_by_the_impulse_response(name):
+    noise = 0.01 * np.random.default_rng(0).normal(size=60_000)
+    assert estimates(smc.estimator(name), noise)[2000:].std() == pytest.approx(0.01 * gains_of(name)[0], rel=0.05)
+
+
+# each by itself
+
+
+@pytest.mark.parametrize("w", [20.0, 100.0, 3000.0])
+def test_high_gain_lags_by_two_over_w_on_a_parabola(w):
+    """(1 + 3 b) / (2 (1 - b)) periods, which is 2 / w for small w h; stable for any w h."""
+    t, b = np.arange(2000) * H, math.exp(-w * H)
+    lag = t - estimates(smc.estimator("high_gain", w=w), t**2 / 2)
+    np.testing.assert_allclose(lag[-100:], H * (1 + 3 * b) / (2 * (1 - b)), rtol=1e-6)
+    if w * H <= 0.1:
+        assert lag[-1] == pytest.approx(2 / w, rel=0.06)
+
+
+def test_high_gain_peaks_by_w_over_e_where_the_position_jumps():
+    for w in (20.0, 100.0):
+        jump = np.full(1000, 1.0)
+        jump[0] = 0.0
+        assert estimates(smc.estimator("high_gain", w=w), jump).max() == pytest.approx(w / math.e, rel=0.03)
+
+
+@pytest.mark.parametrize("w", [30.0, 100.0])
+def test_the_extended_state_observer_s_errors_are_bounded_by_the_jerk_and_attained(w):
+    """|x'' - z3| <= 3 J / w and |x' - z2| <= 3 J / w^2; a cubic attains both, a sine stays within."""
+    t = np.arange(4000) * 1e-4
+    v, a = both(smc.estimator("extended_state_observer", w=w), t**3 / 6, h=1e-4)
+    assert t[-1] - a[-1] == pytest.approx(3 / w, rel=0.02)
+    assert t[-1] ** 2 / 2 - v[-1] == pytest.approx(3 / w**2, rel=0.02)
+    t = np.arange(20_000) * 1e-4
+    v, a = both(smc.estimator("extended_state_observer", w=w), np.sin(7 * t), h=1e-4)
+    late = t > 20 / w
+    assert np.abs(a + 49 * np.sin(7 * t))[late].max() <= 3 * 343 / w
+    assert np.abs(v - 7 * np.cos(7 * t))[late].max() <= 3 * 343 / w**2
+
+
+@pytest.mark.parametrize("lam", [1e-15, 1e-9, 1e-3, 1.0, 1e3, 1e6])
+def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
+    """From poles a thousand periods slow to those of a jerk that swamps the noise."""
+    A, C = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]]), np.array([[1.0, 0.0, 0.0]])
+    Q = lam * np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
+    P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
+    K = P[:, 0] / (P[0, 0] + 1.0)
+    z, expected = np.array([0.5, 0.0, 0.0]), []
+    x = np.append(0.5, np.random.default_rng(0).normal(size=200))
+    for reading in x:
+        z = A @ z
+        z = z + K * (reading - z[0])
+        expected.append(z[1:])
+    for h in (1.0, 1e-3):
+        out = both(smc.estimator("kalman", sigma=0.01, q=lam * 1e-4 / h**5), x, h=h) * np.array([[h], [h * h]])
+        np.testing.assert_allclose(out, np.transpose(expected), rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+
+
+def test_kalman_is_the_best_of_the_linear_observers_on_its_own_model():
+    """Triply integrated white noise, seen under noise: no bandwidth of the others makes less error in v or a."""
+    rng, K, sigma, q = np.random.default_rng(0), 20_000, 1e-3, 1e3
+    Q = q * np.array([[H**5 / 20, H**4 / 8, H**3 / 6], [H**4 / 8, H**3 / 3, H**2 / 2], [H**3 / 6, H**2 / 2, H]])
+    kicks = rng.normal(size=(K, 3)) @ np.linalg.cholesky(Q).T
+    a = np.cumsum(kicks[:, 2])
+    v = np.cumsum(kicks[:, 1] + H * np.append(0, a[:-1]))
+    x = np.cumsum(kicks[:, 0] + H * np.append(0, v[:-1]) + H**2 / 2 * np.append(0, a[:-1]))
+    seen = x + sigma * rng.normal(size=K)
+
+    def errors(estimator):
+        return (both(estimator, seen) - (v, a))[:, 1000:].std(axis=1)
+
+    best = errors(smc.estimator("kalman", sigma=sigma, q=q))
+    for w in (60.0, 100.0, 150.0):
+        assert np.all(errors(smc.estimator("extended_state_observer", w=w)) > best)
+    for window in (21, 41):
+        assert np.all(errors(smc.estimator("savitzky_golay", window=window)) > best)
+
+
+@pytest.mark.parametrize(("window", "degree"), [(2, 1), (5, 2), (15, 3), (31, 2), (128, 4)])
+def test_savitzky_golay_is_scipy_s_filter_at_the_last_point(window, degree):
+    x = np.random.default_rng(0).normal(size=400)
+    out = both(smc.estimator("savitzky_golay", window=window, degree=degree), x)
+    for order in (1, 2):
+        c = savgol_coeffs(window, degree, deriv=order, delta=H, pos=window - 1, use="dot") if degree >= order else [0.0]
+        expected = np.convolve(x, c[::-1], "valid")[-200:]
+        np.testing.assert_allclose(out[order - 1, -200:], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+def test_savitzky_golay_is_exact_on_polynomials_of_its_degree_once_they_fill_the_window(degree):
+    t = np.arange(200) * 0.01
+    polynomial = np.polynomial.Polynomial(np.random.default_rng(degree).normal(size=degree + 1))
+    v, a = both(smc.estimator("savitzky_golay", window=20, degree=degree), polynomial(t), h=0.01)
+    np.testing.assert_allclose(v[19:], polynomial.deriv()(t)[19:], rtol=0, atol=1e-9)
+    if degree >= 2:
+        np.testing.assert_allclose(a[19:], polynomial.deriv(2)(t)[19:], rtol=0, atol=1e-7)
+    higher = polynomial + np.polynomial.Polynomial.basis(degree + 1)
+    off = estimates(smc.estimator("savitzky_golay", window=20, degree=degree), higher(t), h=0.01)
+    assert np.abs(off - higher.deriv()(t))[19:].min() > 1e-6
+
+
+def worst(estimator, h, duration=20.0):
+    """Largest errors of velocity and acceleration on sin t, in the last half."""
+    t = np.arange(round(duration / h)) * h
+    errors = np.abs(both(estimator, np.sin(t), h=h) - (np.cos(t), -np.sin(t)))
+    return errors[:, len(t) // 2 :].max(axis=1)
+
+
+def order_on_a_sine(estimator, steps):
+    errors = np.array([worst(estimator, h) for h in steps])
+    return np.diff(np.log(errors), axis=0).T / np.diff(np.log(steps)), errors
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+def test_savitzky_golay_s_order_on_a_sine_is_its_degree(degree):
+    estimator = smc.estimator("savitzky_golay", window=9, degree=degree)
+    slopes, _ = order_on_a_sine(estimator, [4e-2, 2e-2, 1e-2])
+    np.testing.assert_allclose(slopes[0], degree, atol=0.1)
+    if degree >= 2:
+        np.testing.assert_allclose(slopes[1], degree - 1, atol=0.1)
+
+
+def test_the_bare_difference_is_of_first_order_on_a_sine():
+    slopes, errors = order_on_a_sine(differenced(0.0), [1e-2, 1e-3])
+    np.testing.assert_allclose(slopes[0], 1.0, atol=0.01)
+    np.testing.assert_allclose(errors[:, 0], [5e-3, 5e-4], rtol=0.01)
+
+
+@pytest.mark.parametrize(("n", "steps"), [(1, [1e-2, 1e-3, 1e-4]), (2, [1e-2, 1e-3, 1e-4]), (3, [3e-2, 1e-2, 3e-3])])
+def test_levant_s_order_on_a_sine_is_its_order(n, steps):
+    """O(h^n) for the velocity and O(h^(n-1)) for the acceleration, with L = 1 >= |x^(n+1)|."""
+    slopes, errors = order_on_a_sine(smc.estimator("levant", L=1.0, order=n), steps)
+    np.testing.assert_allclose(slopes[0], n, atol=0.15)
+    if n == 1:
+        np.testing.assert_allclose(errors[:, 0], [3.6e-2, 3.5e-3, 3.6e-4], rtol=0.1)
+        assert not both(smc.estimator("levant", order=1), np.random.default_rng(0).normal(size=50))[1].any()
+    else:
+        np.testing.assert_allclose(slopes[1], n - 1, atol=0.25)
+
+
+@pytest.mark.parametrize(("n", "most"), [(1, (2.0,)), (2, (2.5, 2.5)), (3, (3.5, 4.5))])
+def test_levant_s_error_under_noise_is_of_the_best_order(n, most):
+    """|z_i - x^(i)| <= c_i eps^((n+1-i)/(n+1)) for L = 1, over three decades of eps; c_i measured, alike throughout."""
+    t, rng, constants = np.arange(20_000) * H, np.random.default_rng(1), []
+    for eps in (1e-4, 1e-3, 1e-2, 1e-1):
+        seen = np.sin(t) + eps * rng.uniform(-1, 1, t.size)
+        errors = np.abs(both(smc.estimator("levant", L=1.0, order=n), seen) - (np.cos(t), -np.sin(t)))[:, 10_000:]
+        constants.append([errors[i - 1].max() / eps ** ((n + 1 - i) / (n + 1)) for i in range(1, len(most) + 1)])
+    constants = np.array(constants)
+    assert np.all(constants <= most), constants
+    assert np.all(constants.max(axis=0) < 1.6 * constants.min(axis=0)), constants
+
+
+def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
+    g = max(
+        plant.nominal(np.zeros(plant.n), np.zeros(plant.n), 0, plant.values({}))[1]
+        for plant in map(smc.plant, scenarios.PLANTS)
+    )
+    lag = scenarios.fields("lag_20ms", "duffing")["actuator"].tau
+    assert smc.estimator("levant").gains["L"] == pytest.approx(2.0 * g * scenarios.U_MAX / lag, rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_levant_scales_with_its_gain_and_with_time(n):
+    """Homogeneous: L x in place of x with L in place of 1, and 2 h in place of h with 2^-(n+1) in place of 1."""
+    x = np.cumsum(np.cumsum(np.random.default_rng(0).normal(size=100))) * 1e-3
+    v, a = both(smc.estimator("levant", L=1.0, order=n), x, h=0.1)
+    np.testing.assert_allclose(both(smc.estimator("levant", L=8.0, order=n), 8 * x, h=0.1), [8 * v, 8 * a], rtol=1e-9)
+    slow = both(smc.estimator("levant", L=2.0 ** -(n + 1), order=n), x, h=0.2)
+    np.testing.assert_allclose(slow, [v / 2, a / 4], rtol=1e-9)
+
+
+def test_levant_is_lost_on_what_is_rougher_than_its_gain():
+    """|x''| = 4 against L = 1: the estimate cannot turn as fast."""
+    t = np.arange(10_000) * H
+    lost, held = (
+        np.abs(estimates(smc.estimator("levant", L=L, order=1), np.sin(2 * t)) - 2 * np.cos(2 * t)) for L in (1, 4)
+    )
+    assert held[5000:].max() < 0.02
+    assert lost[5000:].max() > 0.5
+
+
+def test_levant_without_taylor_s_terms_would_be_of_first_order():
+    """Plain Euler steps of order 2: at 1 ms the velocity's error is fifty times that with the terms."""
+    t, z, errors = np.arange(20_000) * H, np.zeros(3), []
+    for k, x in enumerate(np.sin(t)):
+        errors.append(abs(z[1] - math.cos(t[k])))
+        e = z[0] - x
+        pull = np.array([2.0 * abs(e) ** (2 / 3), 2.12 * abs(e) ** (1 / 3), 1.1]) * np.sign(e)
+        z = z + H * (np.array([z[1], z[2], 0.0]) - pull)
+    assert max(errors[10_000:]) > 50 * worst(smc.estimator("levant", L=1.0), H)[0]
+
+
+@ESTIMATORS
+def test_gains_that_would_turn_an_estimator_round_are_refused(name):
+    for gain in smc.estimator(name).gains:
+        with pytest.raises(smc.ScenarioError, match=gain):
+            smc.estimator(name, **{gain: -1.0})
+
+
+@ESTIMATORS
+def test_an_estimator_names_its_equation_and_its_source(name):
+    text = catalogue()[name].doc
+    assert "=" in text
+    assert name == "filtered_difference" or "Source" in text

@@ -1,0 +1,177 @@
+"""The laws of the study are held to what is proved of them, mostly on plant A: s' = u + d, u held between samples.
+
+What every law must have walks the catalogue in test_laws_catalogue.py.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.plants_ab import called, constant, measured, one, orders, plant_a, ramp, sine, wave
+from scipy.linalg import expm
+
+import smc_mujoco as smc
+
+
+@pytest.mark.parametrize("against", [0.0, 0.5, 1.5])
+def test_classical_reaches_in_the_time_that_the_gain_leaves(against):
+    """|s|' = -(k - D) where a constant disturbance D pushes away: reached at |s0| / (k - D)."""
+    run = plant_a(smc.law("classical", k=2.0), constant(against), s=1.0)
+    reached = run.t[np.argmax(np.abs(run.s) <= 1e-3 * (2.0 + against))]
+    assert reached == pytest.approx(1.0 / (2.0 - against), abs=0.01)
+
+
+def test_classical_fails_below_the_disturbance_and_holds_above_it():
+    held = plant_a(smc.law("classical", k=1.6), wave)
+    lost = plant_a(smc.law("classical", k=0.4), wave)
+    assert held.residual() <= 1e-3 * (1.6 + 1.5)
+    assert lost.residual() > 0.5
+
+
+def test_classical_chatters_within_one_sample_of_its_force():
+    for h in (1e-2, 1e-3):
+        assert plant_a(smc.law("classical", k=2.0), wave, h=h).residual() <= h * (2.0 + 1.5)
+
+
+def test_classical_residual_is_first_order_in_the_control_period():
+    slopes, residuals = orders(smc.law("classical", k=2.0), duration=20.0)
+    assert np.all(np.abs(slopes - 1.0) < 0.1), slopes
+    np.testing.assert_allclose(residuals[:2], [3.2e-2, 3.4e-3], rtol=0.1)
+
+
+def test_super_twisting_residual_is_second_order_in_the_control_period():
+    slopes, residuals = orders(smc.law("super_twisting", k1=1.5, k2=1.1), duration=20.0)
+    assert np.all(np.abs(slopes - 2.0) < 0.2), slopes
+    np.testing.assert_allclose(residuals[:2], [3.8e-4, 5.1e-6], rtol=0.1)
+
+
+def test_super_twisting_follows_a_ramp_of_disturbance_that_outgrows_every_constant_gain():
+    """d = 0.8 t has |d'| = 0.8 < k2: s stays at O(h^2) and u tends to -d, while a gain of 4 is lost at t = 5."""
+    run = plant_a(smc.law("super_twisting", k1=1.5, k2=1.1), ramp(0.8))
+    assert run.residual() < 20 * 1e-3**2
+    late = run.t > 8
+    assert np.abs(run.u + 0.8 * run.t)[late].max() < 20 * 1e-3
+    assert plant_a(smc.law("classical", k=4.0), ramp(0.8)).residual() > 1
+
+
+def test_super_twisting_is_lost_when_the_disturbance_is_faster_than_its_integrator():
+    """k2 = 0.5 cannot follow |d'| = 0.8: the rest grows until the square root carries it."""
+    slow = plant_a(smc.law("super_twisting", k1=1.5, k2=0.5), ramp(0.8))
+    assert slow.residual() > 0.5
+
+
+@pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
+def test_boundary_layer_ends_within_phi_d_over_k_and_a_constant_attains_it(k, phi, d):
+    law, bound = smc.law("boundary_layer", k=k, phi=phi), phi * d / k
+    assert plant_a(law, constant(d), duration=30).s[-1] == pytest.approx(bound, rel=1e-9)
+    assert plant_a(law, sine(d, 7.0), duration=30).residual() <= bound
+
+
+def test_boundary_layer_is_the_sign_outside_its_layer():
+    law, classical = smc.law("boundary_layer", k=2.0, phi=0.1), smc.law("classical", k=2.0)
+    for s in (-3.0, -0.1, 0.1, 5.0):
+        assert one(law, de=s) == one(classical, de=s)
+
+
+def gain(law, run):
+    """K of an adaptive law at every sample."""
+    return law.gains["k0"] + run.memory[:, 0]
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.05])
+def test_adaptive_gain_never_decreases(sigma):
+    law = smc.law("adaptive", k0=0.3)
+    noise = sigma * np.random.default_rng(0).normal(size=10_000)
+    run = plant_a(law, wave, noise=noise)
+    assert np.all(np.diff(gain(law, run)) >= 0.0)
+    np.testing.assert_array_equal(np.abs(run.u), gain(law, run))
+
+
+def test_adaptive_gain_ends_above_an_unknown_disturbance_and_holds_it():
+    law = smc.law("adaptive")
+    run = plant_a(law, wave, duration=20)
+    K = gain(law, run)[-1]
+    assert K > 1.5
+    assert run.residual() <= 1e-3 * (K + 1.5)
+
+
+def test_noise_winds_up_the_adaptive_gain_without_end_and_the_leak_bounds_it():
+    noise = 0.05 * np.random.default_rng(1).normal(size=80_000)
+    plain_law, leaky = smc.law("adaptive", gamma=15.0), smc.law("adaptive_leak", gamma=15.0)
+    growing = plant_a(plain_law, wave, noise=noise, duration=80)
+    bounded = plant_a(leaky, wave, noise=noise, duration=80)
+    early, late = (gain(plain_law, growing)[k] for k in (40_000, 79_999))
+    assert late - early > 15.0 * 40 * 0.05 * math.sqrt(2 / math.pi) * 0.9  # gamma T E|noise|
+    K, g = gain(leaky, bounded), leaky.gains
+    assert K[40_000:].max() < 1.3 * K[20_000:40_000].max()
+    assert K.max() <= g["gamma"] * np.abs(bounded.s + noise).max() / g["leak"]
+    assert K.max() < late / 4
+
+
+def test_the_leak_forgets_exponentially_within_the_dead_zone():
+    law = smc.law("adaptive_leak", k0=2.0, leak=3.0)
+    memory = np.zeros(law.memory)
+    for _ in range(1000):
+        called(law, measured(de=0.01), memory)
+    assert 2.0 + memory[0] == pytest.approx(2.0 * (1 - 3e-3) ** 1000, rel=1e-9)
+
+
+def test_observer_free_is_bounded_by_lam_and_saturates_there():
+    law = smc.law("observer_free", lam=2.5, k1=3.0)
+    states = np.random.default_rng(0).normal(scale=5.0, size=(1000, 2))
+    forces = np.array([one(law, e=e, de=de)[0] for e, de in states])
+    assert np.abs(forces).max() <= 2.5
+    assert one(law, e=1e9)[0] == -2.5
+    np.testing.assert_allclose(forces, -2.5 * np.tanh(states[:, 1] + 3.0 * states[:, 0]), rtol=1e-14)
+
+
+# Plant, (J, D, K) of its linearisation J x'' + D x' + K x = u at the origin, lam, k1.
+LOCAL = [
+    ("van_der_pol", (1.0, -1.0, 1.0), 0.8, 1.0),  # lam < -D
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.2, 1.0),
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.5, -0.8),  # lam k1 < -K
+    ("van_der_pol", (1.0, -1.0, 1.0), 1.5, -0.5),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 2.0, 1.0),  # lam k1 < -K
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 3.0, 1.0),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 0.5, 4.0),
+    ("inverted_pendulum", (0.125, 0.02, -2.4525), 0.5, 6.0),
+]
+
+
+@pytest.mark.parametrize(("plant", "linear", "lam", "k1"), LOCAL)
+def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, linear, lam, k1):
+    """The envelope of a tiny error grows or dies at the rate of the linearisation's slowest root."""
+    J, D, K = linear
+    law = smc.law("observer_free", lam=lam, k1=k1)
+    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=1e-6, duration=20.0, u_max=math.inf))
+    closed = np.array([[0.0, 1.0], [-(K + lam * k1) / J, -(D + lam) / J]])
+    stable = lam > -D and lam * k1 > -K
+    assert stable == bool(np.linalg.eigvals(closed).real.max() < 0)
+    states = np.array([np.linalg.norm(expm(closed * t) @ (1e-6, 0.0)) for t in trace.t[::500]])
+    norms = np.hypot(trace.x, trace.v)[::500, 0]
+    tiny = states < 1e-2
+    np.testing.assert_allclose(norms[tiny], states[tiny], rtol=0.05, atol=1e-9)
+    assert norms[tiny][-1] < 0.5e-6 if stable else norms[tiny][-1] > 3e-6
+
+
+def test_gains_that_would_turn_the_law_round_or_divide_by_zero_are_refused():
+    for name, gains in (("observer_free", {"lam": 0.0}), ("boundary_layer", {"phi": 0.0})):
+        with pytest.raises(smc.ScenarioError):
+            smc.law(name, **gains)
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])
+def test_dt_is_the_control_period(period):
+    """An immovable cart stands at e = -1, so s = -c: K = gamma c t and w = k2 t whatever the control period."""
+    anvil = smc.plant("duffing", M=1e12, alpha=0.0, beta=0.0, delta=0.0)
+    common = {"plant": anvil, "x0": 0.0, "reference": smc.Constant(1.0), "u_max": math.inf, "duration": 1.0}
+    laws = (
+        smc.law("adaptive", gamma=50.0, c=3.0),
+        smc.law("adaptive_leak", gamma=50.0, c=3.0, leak=0.0),
+        smc.law("super_twisting", k1=2.0, k2=5.0, c=3.0),
+    )
+    scenarios = [smc.Scenario(law=law, control_period=period, **common) for law in laws]
+    adaptive, leaky, twisting = smc.run(scenarios)
+    for trace in (adaptive, leaky):
+        np.testing.assert_allclose(trace.u[:, 0], 150.0 * trace.t, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(twisting.u[:, 0], 2.0 * math.sqrt(3.0) + 5.0 * twisting.t, rtol=1e-6)

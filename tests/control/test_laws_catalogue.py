@@ -1,0 +1,182 @@
+"""What every law of the library must have, walked over the catalogue: a law added is tested here without an edit.
+
+On every plant that it applies to, a law with its default gains ends within 5 % of where it began, with the model and
+without. Memory belongs to a channel and a run, dt comes from the measurement, and a law is odd in what it measures.
+"""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from helpers.plants_ab import called, constant, measured, plant_a, plant_b, plant_c
+
+import smc_mujoco as smc
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.studies.paper import scenarios as paper
+
+LAWS = pytest.mark.parametrize("name", smc.laws())
+ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])
+GENERAL = pytest.mark.parametrize(
+    "name", [name for name, law in catalogue().items() if name != "none" and not law.plants]
+)
+FIRST = pytest.mark.parametrize(
+    "name", [name for name, law in catalogue().items() if name != "none" and not law.plants and law.degree == 1]
+)
+CHAINS = {1: plant_a, 2: plant_b, 3: functools.partial(plant_c, g=20.0)}  # the last as a lag of 50 ms would be
+
+# Laws that work by the model alone, and why.
+MODELLED = {"hierarchical": "a joint without an actuator is moved through its nominal coupling"}
+
+
+def plants(name):
+    """The plants that a law applies to: those that it names, or the study's, networks of three to save time."""
+    if named := catalogue()[name].plants:
+        return named
+    return [smc.plant(plant, n=3) if plant.endswith("network") else plant for plant in paper.GAINS]
+
+
+@functools.cache
+def traces():
+    """Every law on every plant that it applies to, with and without the model: (law, Trace) of each."""
+    scenarios = [
+        smc.Scenario(plant=plant, law=name, model=model)
+        for name in smc.laws()
+        for plant in plants(name)
+        for model in (("nominal",) if name in MODELLED else ("none", "nominal"))
+    ]
+    return [(x.law.name, trace) for x, trace in zip(scenarios, smc.run(scenarios), strict=True)]
+
+
+@ACTING
+def test_default_gains_end_within_five_percent_on_every_plant_with_the_model_and_without(name):
+    bounds = {}
+    for trace in (trace for law, trace in traces() if law == name):
+        case = trace.scenario.plant.name, trace.scenario.model
+        assert trace.failure is None, (case, trace.failure)
+        bounds[case] = smc.score(trace)["ultimate_bound"] / max(map(abs, trace.scenario.x0))
+        assert np.abs(trace.u).max() <= 6.0
+    assert bounds
+    assert max(bounds.values()) <= 0.05, bounds
+
+
+def test_none_leaves_each_plant_where_its_equation_takes_it():
+    """The pendulums fall from upright, Van der Pol goes round, Duffing goes to a well beside 0, the chain swings."""
+    ends = {
+        trace.scenario.plant.name: np.abs(trace.x[-4000:]).max()
+        for law, trace in traces()
+        if law == "none" and trace.scenario.model == "none"
+    }
+    assert ends["inverted_pendulum"] > math.pi
+    assert ends["inverted_pendulum_network"] > 1.0
+    assert ends["van_der_pol"] == pytest.approx(2.0, abs=0.05)
+    assert 0.5 < ends["duffing"] < 2.0
+    assert 0.1 < ends["pendulum_network"] < 1.0
+
+
+@GENERAL
+def test_a_law_brings_its_chain_of_integrators_in_and_its_mirror_image_drives_it_out(name):
+    law = smc.law(name)
+    chain = CHAINS[law.degree]
+    right = chain(law, constant(0.5), limit=50.0)
+    wrong = chain(law, constant(0.5), limit=50.0, sign=-1.0, duration=3.0)
+    assert right.residual() < 0.3
+    assert wrong.residual() > 1.0
+
+
+@LAWS
+def test_nothing_is_commanded_where_there_is_no_error(name):
+    law = smc.law(name)
+    memory = np.zeros(law.memory)
+    for _ in range(3):
+        assert called(law, measured(limit=6.0), memory) == (0.0, 0.0)
+
+
+@LAWS
+@pytest.mark.parametrize("model", [0.0, 1.0])
+def test_a_law_is_odd_in_what_it_measures(name, model):
+    law = smc.law(name)
+    ours, mirrored = np.zeros(law.memory), np.zeros(law.memory)
+    for k, (e, de, f, a) in enumerate(np.random.default_rng(0).normal(size=(300, 4))):
+        common = {"g": 2.0, "t": k * 1e-3, "limit": 6.0, "model": model}
+        u, s = called(law, measured(e, de, f=f, a=a, **common), ours)
+        assert called(law, measured(-e, -de, f=-f, a=-a, **common), mirrored) == (-u, -s)
+
+
+@FIRST
+def test_a_first_order_law_pushes_towards_its_surface(name):
+    law = smc.law(name)
+    for e, de in np.random.default_rng(0).normal(size=(200, 2)):
+        u, s = called(law, measured(e, de, limit=6.0), np.zeros(law.memory))
+        assert u * s <= 0.0
+
+
+def held(name, dt, told=None, seconds=0.1):
+    """u and memory of a law whose measurement stands still for some seconds."""
+    law = smc.law(name)
+    memory, u = np.zeros(law.memory), 0.0
+    for k in range(round(seconds / dt)):
+        u, _ = called(law, measured(0.05, 0.02, dt=told or dt, t=k * dt, limit=6.0), memory)
+    return u, memory
+
+
+@LAWS
+def test_time_is_that_of_the_measurement(name):
+    """After the same time at half the period a law commands the same."""
+    (coarse, _), (fine, _) = held(name, 1e-3), held(name, 0.5e-3)
+    assert fine == pytest.approx(coarse, rel=0.02, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "name", ["adaptive", "adaptive_leak", "super_twisting", "integral", "dynamic", "observer_free_integral"]
+)
+def test_a_period_taken_from_elsewhere_is_seen(name):
+    (_, right), (_, half), (_, wrong) = held(name, 1e-3), held(name, 0.5e-3), held(name, 0.5e-3, told=1e-3)
+    np.testing.assert_allclose(half, right, rtol=0.02)
+    assert np.any(np.abs(wrong) > 1.5 * np.abs(right))
+
+
+@functools.cache
+def swings():
+    """Uncoupled pendulums, one at rest and two mirrored, under every law, each twice: name -> two traces."""
+    plant = smc.plant("pendulum_network", n=3, kc=0.0)
+    names = [name for name in smc.laws() if not catalogue()[name].plants]
+    scenarios = [smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.3) for name in names]
+    ran = smc.run(scenarios + scenarios[::-1])
+    return {name: (ran[i], ran[-1 - i]) for i, name in enumerate(names)}
+
+
+@pytest.mark.parametrize("name", [name for name, law in catalogue().items() if not law.plants])
+def test_memory_belongs_to_a_channel_and_a_run(name):
+    """The pendulum at rest stays at rest, the others stay mirrored; a second run beside the first is the same."""
+    trace, again = swings()[name]
+    assert not trace.x[:, 1].any()
+    np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
+    np.testing.assert_array_equal(trace.u[:, 2], -trace.u[:, 0])
+    np.testing.assert_array_equal(again.u, trace.u)
+    np.testing.assert_array_equal(again.x, trace.x)
+
+
+@LAWS
+def test_a_law_names_its_equation_and_its_source(name):
+    text = catalogue()[name].doc
+    title, formula = text.splitlines()[0].split(": ", 1)
+    assert title[0].isupper()
+    assert "u = " in formula or "u' = " in formula
+    assert name == "none" or "Source" in text
+
+
+@LAWS
+def test_no_gain_takes_nan_or_infinity_unless_infinity_is_what_it_is(name):
+    for gain, default in catalogue()[name].defaults.items():
+        for value in (math.nan, math.inf, -math.inf):
+            if value == default:
+                continue
+            with pytest.raises(smc.ScenarioError, match=gain):
+                smc.law(name, **{gain: value})
+
+
+@pytest.mark.filterwarnings("error")
+@LAWS
+def test_default_gains_meet_the_conditions_that_they_quote(name):
+    smc.law(name)

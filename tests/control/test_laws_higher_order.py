@@ -1,0 +1,490 @@
+"""Super-twisting laws, laws of relative degree 2 and 3, and terminal laws, each held to what is proved of it.
+
+On the chains of plants_ab.py, sampled without error; relative degree 3 on mechanisms behind an actuator lag.
+"""
+
+import math
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers.plants_ab import called as call
+from helpers.plants_ab import (
+    constant,
+    measured,
+    on_surface,
+    one,
+    orders,
+    plant_a,
+    plant_b,
+    plant_c,
+    ramp,
+    rest,
+    sine,
+    wave,
+)
+from scipy.integrate import quad
+
+import smc_mujoco as smc
+from smc_mujoco.control.component import GainWarning
+from smc_mujoco.control.surface import surface
+
+STEPS = (1e-2, 1e-3, 2e-4)
+HUM = sine(1 / 6, 6.0) + constant(0.3)  # |d'| <= 1, of a period that the last 20 % of 6 s hold
+DECADES = math.log10(STEPS[0] / STEPS[2])
+TWISTED = ("implicit_super_twisting", "proper_super_twisting", "conditioned_super_twisting")
+
+
+def law(name, **gains):
+    return smc.law(name, **gains)
+
+
+# super-twisting, discretised
+
+
+def test_implicit_super_twisting_residual_is_the_period_times_the_disturbance_whatever_the_gains():
+    for gains in ({"k1": 1.5, "k2": 1.1}, {"k1": 6.0, "k2": 8.0}):
+        slopes, residuals = orders(law("implicit_super_twisting", **gains), steps=STEPS)
+        assert np.all(np.abs(slopes - 1.0) < 0.01), slopes
+        assert np.all(residuals <= 1.001 * np.array(STEPS) * 1.5)
+        held = plant_a(law("implicit_super_twisting", **gains), constant(0.7))
+        assert held.s[-1] == pytest.approx(1e-3 * 0.7, rel=1e-6)
+
+
+def test_proper_super_twisting_ends_within_the_least_residual_a_sampled_law_can_promise():
+    slopes, residuals = orders(law("proper_super_twisting", k1=1.5, k2=1.1), steps=STEPS)
+    assert np.all(np.abs(slopes - 2.0) < 0.01), slopes
+    np.testing.assert_allclose(residuals, np.array(STEPS) ** 2, rtol=0.01)  # L dt^2, and the sine attains it
+    assert np.all(residuals <= np.array(STEPS) ** 2 * (1 + 1e-5))
+
+
+def test_conditioned_super_twisting_residual_is_second_order_as_of_the_plain_law():
+    slopes, residuals = orders(law("conditioned_super_twisting", k1=1.5, k2=1.1), HUM, steps=STEPS, duration=6.0)
+    plain = orders(law("super_twisting", k1=1.5, k2=1.1), HUM, steps=STEPS, duration=6.0)[1]
+    assert math.log10(residuals[0] / residuals[2]) / DECADES == pytest.approx(2.0, abs=0.3), slopes
+    np.testing.assert_array_equal(residuals, plain)
+
+
+def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explicit_one_chatters():
+    d, turns = constant(0.5), {}
+    for name in ("super_twisting", "implicit_super_twisting", "proper_super_twisting", "classical"):
+        gains = {"k": 2.0} if name == "classical" else {"k1": 1.5, "k2": 1.1}
+        turns[name] = plant_a(law(name, **gains), d).variation()
+    assert max(turns["implicit_super_twisting"], turns["proper_super_twisting"]) < 1e-6
+    assert turns["super_twisting"] > 0.3
+    assert turns["classical"] > 1000 * turns["super_twisting"]
+
+
+@pytest.mark.parametrize("name", ["implicit_super_twisting", "proper_super_twisting"])
+def test_implicit_laws_solve_their_inclusion(name):
+    """20,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2 sgn(z)."""
+    rng = np.random.default_rng(12)
+    k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (20_000, 3)).T
+    s, w = rng.normal(size=(2, 20_000)) * 10.0 ** rng.uniform(-6, 0, (2, 20_000))
+    s *= np.where(rng.random(20_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
+    function, on = law(name).function, 0
+    assert function is not None
+    for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
+        k1_, k2_, h, s_, w_ = values
+        memory = np.array([w_])
+        u, _ = function(on_surface(s_, dt=h), SimpleNamespace(k1=k1_, k2=k2_, c=0.0), memory)
+        after = memory[0]
+        ahead, root = s_ + h * u, (after - u) / k1_
+        if name == "proper_super_twisting":
+            ahead, root = s_ + h * (u - after), (2.0 * after - w_ - u) / k1_
+        z, scale = root * abs(root), abs(s_) + h * (abs(u) + abs(w_) + abs(after))
+        assert abs(ahead - z) <= 1e-12 * (scale + abs(z)), values
+        if abs(z) <= 1e-12 * scale:
+            on += 1
+            assert abs(after - w_) <= h * k2_ * (1.0 + 1e-12) + 1e-15, values
+        else:
+            assert after == pytest.approx(w_ - h * k2_ * math.copysign(1.0, z), rel=1e-12, abs=1e-15), values
+    assert 1_000 < on < 19_000
+
+
+@pytest.mark.parametrize("name", TWISTED)
+def test_a_disturbance_of_slope_below_k2_is_followed_and_one_above_is_not(name):
+    followed = plant_a(law(name, k1=1.5, k2=1.1), ramp(0.8))
+    lost = plant_a(law(name, k1=1.5, k2=0.5), ramp(0.8))
+    assert followed.residual() <= 1.01e-3 * 8.0
+    assert np.abs(followed.u + 0.8 * followed.t)[-100:].max() < 0.02
+    assert lost.residual() > 0.5
+
+
+@pytest.mark.parametrize(("k1", "k2"), [(1.5, 1.1), (3.0, 4.4), (5.0, 2.0)])
+def test_conditioned_super_twisting_does_not_wind_up(k1, k2):
+    """From s = 20 with |u| <= 2, s goes beyond 0 by no more than a bounded integrator does; the plain law winds up."""
+    run = plant_a(law("conditioned_super_twisting", k1=k1, k2=k2), s=20.0, limit=2.0, duration=30.0)
+    plain = plant_a(law("super_twisting", k1=k1, k2=k2), s=20.0, limit=2.0, duration=30.0)
+    assert 0.0 < -run.s.min() <= min(2.0**2 / (2 * k2), (2.0 / k1) ** 2)
+    assert -plain.s.min() > 10 * -run.s.min()
+    assert np.abs(run.memory[:, 0]).max() <= 2.0 + 1e-3 * k2
+    assert run.reached(1e-3) < 14.0
+
+
+def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_model():
+    """With f and g known, the plant s' = -5 + 4 u + d is the plant s' = v + d with v in [-13, 3]."""
+    given = {"f": -5.0, "g": 4.0, "model": 1.0, "limit": 2.0}
+    run = plant_a(law("conditioned_super_twisting", k1=1.5, k2=1.1), wave, s=-20.0, duration=20.0, **given)
+    assert run.residual() < 20 * 1e-3**2
+    assert run.s.max() < 3.0**2 / (2 * 1.1)
+    assert run.memory[:, 0].max() <= 3.0 + 2e-3
+
+
+def test_super_twisting_without_a_clamp_is_the_law_as_published():
+    gains = {"k1": 1.5, "k2": 1.1}
+    plain, published = (plant_a(law(n, **gains), wave) for n in ("super_twisting", "super_twisting_unclamped"))
+    np.testing.assert_array_equal(plain.x, published.x)
+    np.testing.assert_array_equal(plain.u, published.u)
+    for sign in (1.0, -1.0):  # w grows at k2 without end
+        assert plant_a(law("super_twisting", **gains), s=sign * 1e9, limit=1.0).memory[-1, 0] == pytest.approx(
+            -sign * 1.1 * 9.999
+        )
+
+
+def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy_below_it():
+    gains = {"k1": 1.5, "k2": 1.1, "w_max": 0.5}
+    for sign in (1.0, -1.0):
+        beyond = plant_a(law("super_twisting", **gains), constant(sign * 0.8), duration=40.0)
+        assert np.abs(beyond.memory).max() == 0.5
+        assert beyond.s[-1] == pytest.approx(sign * (0.3 / 1.5) ** 2, rel=1e-6)
+    below = constant(0.2) + sine(0.2, 3.0)  # |d| <= 0.4
+    clamped, plain = (plant_a(law("super_twisting", **gains | {"w_max": w}), below) for w in (0.5, math.inf))
+    assert clamped.residual() == pytest.approx(plain.residual(), rel=0.2)
+    assert clamped.residual() < 10 * 1e-3**2
+
+
+def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integration():
+    """The study's first gains, held input, Runge and Kutta's rule in steps of 0.25 ms: to 1e-3 m over 10 s."""
+    k1, k2, c, bound, h = 4.567, 45.47, 2.16, 6.0, 1e-3
+    u, w, states = 0.0, 0.0, np.empty((10_001, 2))
+
+    def rate(state):
+        x, v = state
+        return np.array([v, (1.0 - x * x) * v - x + u])
+
+    state = np.array([2.0, 0.0])
+    for sample in range(len(states)):
+        states[sample] = state
+        s = state[1] + c * state[0]
+        u = min(max(-k1 * math.sqrt(abs(s)) * np.sign(s) + w, -bound), bound)
+        w = min(max(w - h * k2 * np.sign(s), -bound), bound)
+        for _ in range(4):
+            a = rate(state)
+            b = rate(state + h / 8 * a)
+            d = rate(state + h / 8 * b)
+            state = state + h / 24 * (a + 2 * b + 2 * d + rate(state + h / 4 * d))
+    trace = smc.run(smc.paper.scenario("van_der_pol", "super_twisting"))
+    assert trace.scenario.law == law("super_twisting", k1=k1, k2=k2, c=c, w_max=bound)
+    np.testing.assert_allclose(trace.x[:, 0], states[: len(trace.x), 0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(trace.v[:, 0], states[: len(trace.x), 1], rtol=0, atol=1e-2)
+    assert smc.score(trace)["overshoot"] == pytest.approx(2.3, abs=0.05)
+    plain = smc.score(smc.run(smc.paper.scenario("van_der_pol", "super_twisting_unclamped")))
+    assert plain["overshoot"] > 100.0
+    assert math.isinf(plain["settling_time"])
+
+
+def test_adaptive_super_twisting_finds_gains_for_disturbances_of_any_size_and_lets_them_go():
+    rule = law("adaptive_super_twisting")
+    k0, least, mu = rule.gains["k0"], rule.gains["least"], rule.gains["mu"]
+    for size in (0.5, 5.0, 20.0):
+        run = plant_a(rule, sine(size), duration=20.0)
+        assert run.residual() < 10 * mu
+    K = k0 + run.memory[:, 1]
+    assert 10.0 < K[-1] < 40.0
+    assert plant_a(law("super_twisting", k1=k0, k2=k0), sine(20.0), duration=20.0).residual() > 100 * mu
+    quiet = plant_a(rule, rest, duration=20.0)
+    assert k0 + quiet.memory[-1, 1] == pytest.approx(least, abs=0.01)
+    assert (k0 + quiet.memory[:, 1]).min() >= least - 1e-3 * rule.gains["rate"] - 1e-12
+
+
+@pytest.mark.parametrize("h", [1e-3, 20e-3])
+def test_memory_grows_by_the_clock_and_not_by_the_sample(h):
+    """1 s of e = de = s = 1, where nothing comes nearer: w' = -k2, K' = rate, w' = -L (k3 + k4)."""
+    due = {
+        "conditioned_super_twisting": [-4.4],
+        "implicit_super_twisting": [-4.4],
+        "proper_super_twisting": [-4.4],
+        "adaptive_super_twisting": [-3.0, 2.0],  # w' = -(2 + 2 t)
+        "continuous_twisting": [-3.4],
+    }
+    for name, final in due.items():
+        rule = law(name)
+        memory = np.zeros(rule.memory)
+        for _ in range(round(1 / h)):
+            call(rule, on_surface(1.0, dt=h)._replace(e=1.0), memory)
+        np.testing.assert_allclose(memory, final, rtol=0.01)
+
+
+# relative degree 2
+
+
+@pytest.mark.parametrize(("r1", "r2"), [(3.7, 2.3), (4.0, 1.0)])
+def test_twisting_takes_the_time_of_its_geometric_spiral(r1, r2):
+    q = (r1 - r2) / (r1 + r2)
+    finite = math.sqrt(2 / (r1 - r2)) * (1 + q) / (1 - math.sqrt(q))
+    run = plant_b(law("twisting", r1=r1, r2=r2), h=2e-4, duration=8.0)
+    assert run.reached(1e-5) == pytest.approx(finite, rel=0.01)
+    assert run.s.min() == pytest.approx(-q, rel=1e-2)
+    four = plant_b(law("twisting", r1=r1, r2=r2), x=(4.0, 0.0), h=4e-4, duration=13.0)
+    assert four.reached(4e-5) == pytest.approx(2 * finite, rel=0.01)
+
+
+def test_suboptimal_stops_without_overshoot_at_a_fixed_part_of_where_it_was():
+    r1, r2 = 4.0, 1.5
+    run = plant_b(law("suboptimal", r1=r1, r2=r2), h=1e-4, duration=4.0)
+    v = run.x[:, 1]
+    stops = run.s[1:][(v[:-1] < 0) & (v[1:] >= 0)]
+    np.testing.assert_allclose(stops[:4], (r2 / (r1 + r2)) ** np.arange(1, 5), rtol=0.02)
+    assert run.s.min() > -1e-6
+
+
+def test_suboptimal_takes_no_value_of_the_velocity_but_its_sign():
+    rule = law("suboptimal")
+    known, scaled = np.zeros(rule.memory), np.zeros(rule.memory)
+    for e, de in np.random.default_rng(0).normal(size=(500, 2)):
+        assert call(rule, measured(e, de), known) == call(rule, measured(e, 7.0 * de), scaled)
+
+
+def test_prescribed_convergence_and_quasi_continuous_come_in_along_their_curves():
+    b = 2.0
+    run = plant_b(law("prescribed_convergence", a=5.0, b=b), x=(1.0, -b), h=1e-4, duration=3.0)
+    assert run.reached(1e-5) == pytest.approx(2 / b, rel=0.01)
+    slow = law("quasi_continuous", a=6.0, b=1.0)
+    r = min(root.real for root in np.roots([1.0, 1.0, -12.0, 12.0]) if root.real > 1.0)
+    run = plant_b(slow, x=(1.0, -r), h=1e-4, duration=3.0)
+    assert run.reached(1e-5) == pytest.approx(2 / r, rel=0.01)
+    sliding = (run.s > 1e-3) & (run.t > 0.1)
+    np.testing.assert_allclose(run.x[sliding, 1], -r * np.sqrt(run.s[sliding]), rtol=0.02)
+
+
+SECOND = ("twisting", "quasi_continuous", "prescribed_convergence", "suboptimal")
+
+
+@pytest.mark.parametrize("name", SECOND)
+def test_discontinuous_laws_of_degree_2_are_accurate_to_the_second_power_of_the_period(name):
+    runs = [plant_b(law(name), HUM, h=h, duration=6.0) for h in STEPS]
+    e = np.log10([run.residual() for run in runs])
+    de = np.log10([np.abs(run.x[-len(run.t) // 5 :, 1]).max() for run in runs])
+    assert (e[0] - e[2]) / DECADES == pytest.approx(2.0, abs=0.25)
+    assert (de[0] - de[2]) / DECADES == pytest.approx(1.0, abs=0.2)
+    assert runs[1].reached(1e-3) < 4.0
+
+
+@pytest.mark.parametrize(
+    ("name", "power"), [("terminal", 1 / 0.6), ("nonsingular_terminal", 1.6), ("nonsingular_fast_terminal", 1.6)]
+)
+def test_terminal_laws_are_accurate_to_the_power_of_their_surface_or_better(name, power):
+    """de = O(dt), and on the surface |e| goes as |de|^power."""
+    runs = [plant_b(law(name), HUM, h=h, duration=6.0) for h in STEPS]
+    e = np.log10([run.residual() for run in runs])
+    assert power - 0.25 < (e[0] - e[2]) / DECADES < 2.1
+
+
+def test_continuous_twisting_is_accurate_to_the_third_power_and_its_command_becomes_the_disturbance():
+    runs = [plant_b(law("continuous_twisting"), HUM, h=h, duration=6.0) for h in STEPS]
+    e = np.log10([run.residual() for run in runs])
+    de = np.log10([np.abs(run.x[-len(run.t) // 5 :, 1]).max() for run in runs])
+    assert (e[0] - e[2]) / DECADES == pytest.approx(3.0, abs=0.25)
+    assert (de[0] - de[2]) / DECADES == pytest.approx(2.0, abs=0.25)
+    late = runs[2].t > 4.0
+    assert np.abs(runs[2].u + [HUM(t) for t in runs[2].t])[late].max() < 0.01
+
+
+def test_continuous_twisting_scales_with_the_slope_that_it_is_made_for():
+    """From states 9 times as far, under 9 times the disturbance, L = 9 gives 9 times the run."""
+    near = plant_b(law("continuous_twisting", L=1.0), HUM, x=(1.0, 0.5))
+    far = plant_b(law("continuous_twisting", L=9.0), sine(1.5, 6.0) + constant(2.7), x=(9.0, 4.5))
+    np.testing.assert_allclose(far.s, 9.0 * near.s, atol=1e-6)
+    assert plant_b(law("continuous_twisting", L=1.0), sine(8.0, 2.0)).residual() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("name", "speed"),
+    [
+        ("terminal", lambda g, e: g["b"] * e ** g["p"]),
+        ("nonsingular_terminal", lambda g, e: (g["B"] * e) ** (1 / g["p"])),
+        ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
+    ],
+)
+def test_terminal_laws_end_when_their_surface_says_whatever_the_disturbance(name, speed):
+    rule = law(name)
+    due = quad(lambda e: 1 / speed(rule.gains, e), 0.0, 1.0)[0]
+    if name == "terminal":
+        assert due == pytest.approx(1 / (rule.gains["b"] * (1 - rule.gains["p"])), rel=1e-6)
+    if name == "nonsingular_terminal":
+        B, p = rule.gains["B"], rule.gains["p"]
+        assert due == pytest.approx(1 / (B ** (1 / p) * (1 - 1 / p)), rel=1e-6)
+    for d in (rest, HUM):
+        run = plant_b(rule, d, x=(1.0, -speed(rule.gains, 1.0)), h=2e-4, duration=2.5)
+        assert run.reached(1e-3) == pytest.approx(quad(lambda e: 1 / speed(rule.gains, e), 1e-3, 1.0)[0], rel=0.01)
+        assert run.reached(1e-4) < 1.01 * due
+        assert np.abs(run.sigma).max() < 5e-3
+    mirrored = plant_b(rule, x=(-1.0, 0.0))
+    np.testing.assert_array_equal(mirrored.s, -plant_b(rule, x=(1.0, 0.0)).s)
+
+
+@pytest.mark.parametrize("name", ["terminal", "nonsingular_terminal", "nonsingular_fast_terminal"])
+def test_a_terminal_law_is_the_classical_law_on_its_surface(name):
+    rule, slid, first = law(name), surface(name), law("classical", k=4.0)
+    if "rate" in rule.gains:
+        first = law("exponential_reaching", k=4.0, q=rule.gains["rate"])
+    assert {key: rule.gains[key] for key in slid.gains} == dict(slid.gains)
+    for e, de in np.random.default_rng(1).normal(size=(200, 2)):
+        s, eq = call(slid, measured(e, de), np.zeros(slid.memory))
+        assert one(rule, e=e, de=de) == call(first, on_surface(s, eq=eq), np.zeros(first.memory))
+
+
+def test_the_linear_term_of_the_fast_terminal_law_brings_it_in_from_afar():
+    """From e = 5, and no later than the law without a; without the term it needs 15 s."""
+    fast, slow, plain = (
+        plant_b(law(name, **gains), x=(5.0, 0.0), duration=20.0).reached(1e-2)
+        for name, gains in (
+            ("nonsingular_fast_terminal", {}),
+            ("nonsingular_fast_terminal", {"rate": 0.0}),
+            ("nonsingular_terminal", {}),
+        )
+    )
+    assert fast < plain < 4.0
+    assert slow > 15.0
+
+
+@pytest.mark.parametrize(
+    ("name", "speed"),
+    [
+        ("terminal", lambda g, e: g["b"] * e ** g["p"]),
+        ("nonsingular_terminal", lambda g, e: (g["B"] * e) ** (1 / g["p"])),
+        ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
+    ],
+)
+def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_too(name, speed):
+    """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k g > |f| alone."""
+    e, f, g = 1.5, 1.0, 3.0
+    rule = law(name)
+    start = (e, -speed(rule.gains, e))
+    slid = surface(name)
+    eq = call(slid, measured(*start), np.zeros(slid.memory))[1]
+    needed = (abs(f) + (g - 1.0) * abs(eq)) / g
+    for share, stays in ((1.1, True), (0.9, False)):
+        assert share * needed * g > abs(f)
+        run = plant_b(law(name, k=share * needed), x=start, f=math.copysign(f, eq), g=g, duration=0.1)
+        assert (np.diff(np.sign(run.sigma[2:50])) != 0.0).any() == stays, share
+
+
+@pytest.mark.parametrize("name", ["twisting", "suboptimal", "terminal", "nonsingular_terminal", "continuous_twisting"])
+def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
+    """f = -9.81 and g = 4 known: the run is that of e'' = v + d."""
+    bare = plant_b(law(name), HUM, duration=3.0)
+    given = plant_b(law(name), HUM, duration=3.0, f=-9.81, g=4.0, model=1.0)
+    np.testing.assert_allclose(given.s, bare.s, atol=1e-3)
+    assert plant_b(law(name), HUM, duration=3.0, f=-9.81, g=1.0).residual() > 0.05
+
+
+def test_twisting_is_siconos_explicit_one():
+    """An independent implementation, x'' = 19 x - 2 x' + u, u held over 50 ms: the published (x, x')."""
+    plant = smc.plant("duffing", M=1.0, delta=2.0, alpha=-19.0, beta=0.0)
+    scenario = smc.Scenario(
+        plant=plant,
+        law=law("twisting", r1=300.0, r2=60.0),
+        x0=-15.0,
+        v0=20.0,
+        control_period=0.05,
+        physics_step=1e-3,
+        u_max=math.inf,
+        duration=1.5,
+        integrator="RK4",
+    )
+    trace = smc.run(scenario)
+    published = {
+        0.05: (-14.09545908221278, 16.38486565996921),
+        0.85: (2.395615641163373, 52.44596952716989),
+        1.5: (-3.460806002951802, 6.786006803216882),
+    }
+    for t, state in published.items():
+        k = round(t / 0.05)
+        np.testing.assert_allclose((trace.x[k, 0], trace.v[k, 0]), state, rtol=0, atol=1e-8)
+
+
+# relative degree 3
+
+
+def test_nested_law_of_degree_3_is_accurate_to_the_third_power_of_the_period():
+    runs = [plant_c(law("nested_third_order", a=5.0, w=1.0), sine(0.5, 2.0), h=h, duration=10.0) for h in STEPS]
+    for i, power in enumerate((3.0, 2.0, 1.0)):
+        last = np.log10([np.abs(run.x[-len(run.t) // 5 :, i]).max() for run in runs])
+        assert (last[0] - last[2]) / DECADES == pytest.approx(power, abs=0.3)
+    assert runs[1].reached(1e-4) < 7.0
+
+
+def test_nested_law_converges_w_times_as_fast_with_w_cubed_the_force():
+    slow = plant_c(law("nested_third_order", a=5.0, w=1.0), h=2e-3, duration=8.0)
+    fast = plant_c(law("nested_third_order", a=40.0, w=2.0), h=1e-3, duration=4.0)
+    np.testing.assert_allclose(fast.s, slow.s, atol=1e-9)
+
+
+def test_observer_free_law_of_degree_3_is_locally_stable_just_where_its_condition_says():
+    """On a mass behind a lag, J = 1: stable for (1 + lam) lam k2 > tau lam k1."""
+    for tau, k1, k2, lam in (
+        (0.05, 6.25, 5.0, 6.0),
+        (2.0, 6.25, 5.0, 1.0),
+        (2.0, 6.25, 8.0, 1.0),
+        (1.0, 9.0, 1.0, 6.0),
+    ):
+        rule = law("observer_free_third", lam=lam, k1=k1, k2=k2)
+        e, h, run = 1e-6 * np.ones(3), 1e-3, []
+        for _ in range(20_000):
+            u, _ = one(rule, e=e[0], de=e[1], a=e[2])
+            e = e + h * np.array([e[1], e[2], (u - e[2]) / tau])
+            run.append(abs(e[0]))
+        assert ((1 + lam) * k2 > tau * k1) == (max(run[-4000:]) < max(run[-12_000:-8000]))
+
+
+BEHIND_A_LAG = [("duffing", 200.0), ("van_der_pol", 200.0), ("inverted_pendulum", 1000.0), ("pendulum_network", 1000.0)]
+
+
+@pytest.mark.parametrize("name", ["observer_free_third", "nested_third_order"])
+@pytest.mark.parametrize(("plant", "L"), BEHIND_A_LAG)
+def test_laws_of_degree_3_settle_a_plant_behind_an_actuator_lag(plant, L, name):
+    """With a differentiator of order 2 whose L is of the size of x''': claim 15 of the paper."""
+    common = {"plant": plant, "law": name, "actuator": smc.Lag(0.05)}
+    trace = smc.run(smc.Scenario(velocity=smc.estimator("levant", order=2, L=L), **common))
+    score, size = smc.score(trace), np.abs(trace.x[0]).max()
+    assert trace.failure is None
+    assert score["ultimate_bound"] <= 0.02 * size
+    assert score["settling_time"] < 6.0
+
+
+def test_a_differentiator_made_for_slower_motion_loses_the_plant_behind_the_lag():
+    """x''' of the pendulums reaches (6 / 0.05) / J = 960: L = 20 cannot follow it."""
+    common = {"plant": "inverted_pendulum", "law": "observer_free_third", "actuator": smc.Lag(0.05)}
+    trace = smc.run(smc.Scenario(velocity=smc.estimator("levant", order=2, L=20.0), **common))
+    assert np.abs(trace.x).max() > 1.0
+
+
+def test_a_law_of_one_degree_takes_no_surface_of_another():
+    for name in (*SECOND, "terminal", "continuous_twisting", "nested_third_order", "observer_free_third"):
+        with pytest.raises(smc.ScenarioError, match="takes no surface"):
+            smc.Scenario(plant="duffing", law=name, surface="linear")
+
+
+BAD = [
+    ("twisting", {"r1": 2.0, "r2": 3.0}, "r1 > r2"),
+    ("suboptimal", {"r1": 1.0}, "r1 > r2"),
+    ("quasi_continuous", {"a": 2.0, "b": 2.0}, "some r > b"),
+    ("prescribed_convergence", {"a": 1.0}, "b\\^2/2"),
+    ("continuous_twisting", {"k3": 1.5}, "k3 > k4"),
+    ("terminal", {"p": 0.4}, "1/2 < p"),
+    ("nonsingular_terminal", {"p": 2.5}, "p < 2"),
+    ("nonsingular_fast_terminal", {"q": 1.2}, "q > p"),
+    *[(name, {"k2": 20.0}, "sqrt") for name in TWISTED],
+]
+
+
+@pytest.mark.parametrize(("name", "gains", "words"), BAD)
+def test_gains_that_miss_a_condition_are_warned_of_in_its_words(name, gains, words):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        law(name)
+    with pytest.warns(GainWarning, match=words):
+        law(name, **gains)

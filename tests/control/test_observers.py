@@ -1,0 +1,202 @@
+"""Laws with an observer of the disturbance, held to what is proved of them on plant B: x1' = x2, x2' = f + g u + d."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.plants_ab import called, constant, measured, plant_a, plant_b, sine
+
+import smc_mujoco as smc
+from smc_mujoco.studies.paper import scenarios as paper
+
+H = 1e-3  # s
+LAWS = ("extended_state", "disturbance_observer")
+OBSERVERS = pytest.mark.parametrize("name", LAWS)
+ESTIMATE = {"extended_state": 3, "disturbance_observer": 1}  # cell of the memory that holds it
+SPEED = {"extended_state": "w", "disturbance_observer": "l"}
+
+
+def observer(name, **gains):
+    """The law with b = g = 1."""
+    return smc.law(name, **({"b": 1.0, "c": 2.5} | gains))
+
+
+def estimate(name, run):
+    """d^ at every sample, as the law left it."""
+    return run.memory[1:, ESTIMATE[name]]
+
+
+def slid(run, c=2.5):
+    """s = x2 + c x1 at every sample."""
+    return run.x[:, 1] + c * run.x[:, 0]
+
+
+@OBSERVERS
+def test_a_constant_disturbance_is_found_and_taken_away(name):
+    """Exactly, and so whatever k: k = 0 leaves no steady error."""
+    run = plant_b(observer(name, k=0.0), constant(2.0))
+    assert estimate(name, run)[-1] == pytest.approx(2.0, abs=1e-9)
+    assert run.u[-1] == pytest.approx(-2.0, abs=1e-9)
+
+
+@OBSERVERS
+@pytest.mark.parametrize("speed", [20.0, 60.0])
+@pytest.mark.parametrize("omega", [1.0, 5.0, 50.0])
+def test_the_estimate_is_within_the_bound_that_the_rate_of_the_disturbance_gives(name, speed, omega):
+    """|d - d^| <= J / l, or 3 J / w, J = 2 omega, and half a period's change that sampling adds to each."""
+    run = plant_b(observer(name, **{SPEED[name]: speed}), sine(2.0, omega))
+    J, share = 2.0 * omega, 3.0 if name == "extended_state" else 1.0
+    miss = np.abs(2.0 * np.sin(omega * run.t[:-1]) - estimate(name, run))[3000:]
+    assert miss.max() <= share * J / speed + J * H
+
+
+@OBSERVERS
+def test_a_ramp_attains_the_bound(name):
+    """A steady rate J is followed by J / l, or 3 J / w, late."""
+    run = plant_b(observer(name, **{SPEED[name]: 30.0}), sine(100.0, 0.01), duration=5.0)
+    late = (100.0 * np.sin(0.01 * run.t[:-1]) - estimate(name, run))[-1]
+    assert late == pytest.approx((3.0 if name == "extended_state" else 1.0) / 30.0, rel=0.03)
+
+
+@OBSERVERS
+def test_a_gain_above_the_estimate_s_error_keeps_the_surface_though_it_is_far_below_the_disturbance(name):
+    """d = 5 sin t: k = 1 > |d - d^|, and the residual is k's, not d's. Classical needs k > 5 and chatters with it."""
+    d = sine(5.0, 1.0)
+    ours = np.abs(slid(plant_b(observer(name, k=1.0, **{SPEED[name]: 60.0}), d))[8000:]).max()
+    assert ours <= 2.0 * H * (1.0 + 3.0 * 5.0 / 60.0)
+    for k in (1.0, 6.0):
+        classical = np.abs(slid(plant_b(smc.law("classical", k=k, c=2.5), d))[8000:]).max()
+        assert ours < classical / 3
+
+
+@OBSERVERS
+def test_the_surface_is_reached_in_the_time_that_the_gain_leaves(name):
+    """s' = -k sgn(s) where nothing disturbs and the model is right: reached at |s0| / k."""
+    run = plant_b(observer(name, k=2.0), f=-1.0, model=1.0)
+    outside = np.flatnonzero(np.abs(slid(run)) > 2.0 * H * 2.0)
+    assert run.t[outside[-1]] == pytest.approx(2.5 / 2.0, abs=0.02)
+
+
+@OBSERVERS
+@pytest.mark.parametrize("g", [0.5, 1.0, 4.0, 8.0])
+def test_defaults_hold_for_the_input_gains_of_the_plants(name, g):
+    """b = 3 against g of 0.5 to 8, f unknown: no steady error, and nothing rings."""
+    run = plant_b(smc.law(name), constant(1.0), f=-2.0, g=g, limit=6.0)
+    assert run.residual() < 2e-3
+
+
+def test_the_extended_state_law_s_observer_has_all_its_poles_where_it_says():
+    """Without input its error moves by a matrix whose characteristic polynomial is (z - exp(-w h))^3."""
+    for w, h in 10.0 ** np.random.default_rng(3).uniform((0, -4), (3, -1), (200, 2)):
+        law = smc.law("extended_state", w=w)
+        moved = np.empty((3, 3))
+        for column in range(3):
+            memory = np.zeros(law.memory)
+            memory[0], memory[1 + column] = 1.0, h**-column  # so that the columns are of one size
+            called(law, measured(dt=h, limit=0.0), memory)
+            moved[:, column] = memory[1:4] * (1.0, h, h * h)
+        pole = math.exp(-w * h)
+        np.testing.assert_allclose(np.poly(moved), np.poly([pole] * 3), rtol=0, atol=1e-11)
+
+
+def test_the_extended_state_observer_s_loop_rings_above_nine_times_its_input_gain():
+    """(g / b - 1) w^3 / (p + w)^3 has the gain margin 8; sampled at w h = 0.04 a little less."""
+    law = smc.law("extended_state", k=0.0, c=0.0, b=1.0)
+    for ratio, stable in ((8.0, True), (10.0, False)):
+        run = plant_b(law, constant(1.0), x=(0.0, 0.0), g=ratio, limit=50.0)
+        assert (np.abs(run.u[-500:] * ratio + 1.0).max() < 0.1) == stable
+
+
+def test_the_disturbance_observer_s_loop_is_stable_just_where_its_condition_says():
+    """g / b < 2 / (1 - exp(-l h)), 2.3 for l h = 2."""
+    q = 1.0 - math.exp(-2.0)
+    for ratio, stable in ((1.9 / q, True), (2.1 / q, False)):
+        law = smc.law("disturbance_observer", k=0.0, c=0.0, b=1.0, l=2000.0)
+        run = plant_b(law, constant(1.0), x=(0.0, 0.0), g=ratio, duration=0.5, limit=50.0)
+        assert (np.abs(run.u[-50:] * ratio + 1.0).max() < 0.1) == stable
+
+
+@OBSERVERS
+def test_saturation_does_not_wind_the_estimate_up(name):
+    """Thrown at 2 m/s with |u| <= 0.7, the estimate stays at the d there is, and the way back does not overshoot."""
+    run = plant_b(observer(name, k=0.5, c=0.2), constant(0.3), x=(0.0, 2.0), limit=0.7, duration=50.0)
+    assert (run.u == -0.7).sum() > 1000
+    assert np.abs(estimate(name, run)[500:] - 0.3).max() < 1e-4
+    assert run.x[:, 0].min() >= -1e-3
+    assert run.residual() < 0.01
+
+
+@OBSERVERS
+def test_with_the_model_the_estimate_is_what_the_model_misses(name):
+    run = plant_b(smc.law(name), constant(0.7), f=-3.0, g=8.0, model=1.0, limit=6.0)
+    assert estimate(name, run)[-1] == pytest.approx(0.7, abs=0.02)
+    assert run.residual() < 2e-3
+
+
+@OBSERVERS
+def test_with_the_model_gravity_and_the_reference_s_acceleration_are_fed_forward_and_not_estimated(name):
+    """At rest on a reference that accelerates with the plant's own f + g u, u is (r'' - f) / g and d^ stays 0."""
+    law = smc.law(name)
+    memory = np.zeros(law.memory)
+    for _ in range(50):
+        u, s = called(law, measured(f=-3.0, g=4.0, model=1.0)._replace(ddr=2.0), memory)
+        assert (u, s) == (pytest.approx((2.0 + 3.0) / 4.0, abs=1e-12), 0.0)
+        assert abs(memory[ESTIMATE[name]]) < 1e-12
+
+
+@OBSERVERS
+def test_a_wrong_sign_shows(name):
+    d = sine(2.0, 5.0)
+    assert plant_b(observer(name), d, duration=5.0).residual() < 0.01
+    assert plant_b(observer(name), d, duration=5.0, sign=-1.0, limit=6.0).residual() > 10.0
+
+
+@OBSERVERS
+def test_a_wrong_period_shows_in_the_estimate(name):
+    """u held at nothing: a law that is told five times its period sees a fifth of the acceleration, or less."""
+    for told, least, most in ((H, 0.0, 0.6), (5 * H, 1.2, 3.0)):
+        run = plant_b(observer(name), sine(2.0), dt=told, limit=1e-12)
+        miss = np.abs(2.0 * np.sin(run.t[:-1]) - estimate(name, run))[2000:].max()
+        assert least <= miss <= most
+
+
+def test_the_disturbance_observer_takes_any_surface_of_its_degree():
+    """On plant A, where s' = u + d by itself, it holds s against d = 5 sin t with k = 1."""
+    run = plant_a(smc.law("disturbance_observer", k=1.0, b=1.0, l=60.0), sine(5.0))
+    assert run.residual() <= 2.0 * H * (1.0 + 5.0 / 60.0)
+    with pytest.raises(smc.ScenarioError, match="degree"):
+        smc.Scenario(plant="duffing", law="extended_state", surface="linear")
+
+
+@OBSERVERS
+@pytest.mark.parametrize("model", ["none", "nominal"])
+def test_defaults_settle_every_plant_of_the_paper(name, model):
+    scenarios = [smc.Scenario(plant=plant, law=name, model=model) for plant in paper.GAINS]
+    for trace in smc.run(scenarios):
+        assert trace.failure is None
+        assert smc.score(trace)["ultimate_bound"] <= 0.05 * np.abs(trace.x[0]).max()
+
+
+@OBSERVERS
+def test_residual_beats_the_classical_law_on_a_plant_under_a_sine(name):
+    """Duffing's cart, |u| <= 6, 2 sin 5t N: the classical law of the same bound chatters with all of it."""
+    common = {"plant": "duffing", "disturbance": smc.Sine(amplitude=2.0, omega=5.0)}
+    laws = (smc.law(name, k=0.5, b=1.0, **{SPEED[name]: 80.0}), smc.law("classical", k=6.0, c=2.5))
+    ours, classical = (np.abs(t.s[-2000:]).max() for t in smc.run([smc.Scenario(law=law, **common) for law in laws]))
+    assert ours < classical / 3
+
+
+@OBSERVERS
+def test_position_noise_and_no_velocity_sensor_do_not_blow_it_up(name):
+    changes = {"velocity": "kalman", "noise": smc.Noise(position=0.001)}
+    for trace in smc.run([smc.Scenario(plant=plant, law=name, **changes) for plant in paper.GAINS]):
+        assert trace.failure is None
+        assert smc.score(trace)["ultimate_bound"] <= 0.1 * np.abs(trace.x[0]).max()
+
+
+@pytest.mark.parametrize("h", [1e-3, 0.02, 0.05])
+def test_the_extended_state_observer_believes_its_first_reading(h):
+    """A start at speed is no disturbance: u is that of the law without an observer, at any period."""
+    law = smc.law("extended_state")
+    u, _ = called(law, measured(de=2.0, dt=h), np.zeros(law.memory))
+    assert u == pytest.approx(-(law.gains["c"] * 2.0 + law.gains["k"]) / law.gains["b"], rel=1e-12)

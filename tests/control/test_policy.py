@@ -1,0 +1,396 @@
+"""Policies as laws: what they see and give, and what they are asked for; of torch and onnxruntime, stand-ins.
+
+The libraries themselves are no dependency: where they are installed, the last tests here ask them.
+"""
+
+import contextlib
+import pickle
+import sys
+import types
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.episodes import columns, dm_control_suite, driven_by_dm, run_of
+
+import smc_mujoco as smc
+from smc_mujoco.control import policy
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.studies import run_key
+
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+
+
+Y = Measurement(t=0.0, dt=0.001, x=0.5, v=0.0, e=0.5, de=0.0, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
+
+
+def flat(timestep):
+    """An observation as one array, as gymnasium has it."""
+    return np.concatenate([*timestep.observation.values()])
+
+
+def proportional(observation):
+    return -0.7 * observation[:1] - 0.5 * observation[1:2]
+
+
+def briefly(law, **fields):
+    """A run of three samples, and the start of it in parts of u_max, at x = 0.5, v = 0."""
+    return smc.run(smc.Scenario(plant="duffing", law=law, duration=0.002, x0=0.5, u_max=6.0, **fields))
+
+
+# callables
+
+
+def test_a_policy_as_a_law_gives_the_episode_that_it_has_as_an_agent():
+    environment = dm_control_suite().load("duffing", changes={"duration": 0.2, "x0": 0.7})
+    states = driven_by_dm(environment, lambda timestep: proportional(flat(timestep)))
+    trace = smc.run(run_of(environment.task.setting, smc.policy(proportional)))
+    assert np.abs(states - columns(trace)).max() < 1e-9
+
+
+def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
+    environment = dm_control_suite().load("cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]})
+
+    def act(observation):
+        return np.array([observation @ np.arange(0.1, 0.8, 0.1)])
+
+    states = driven_by_dm(environment, lambda timestep: np.clip(act(flat(timestep)), -1.0, 1.0))
+    trace = smc.run(run_of(environment.task.setting, smc.policy(act, reference=True)))
+    assert np.abs(states - columns(trace)).max() < 1e-9
+
+
+def test_a_joint_that_nothing_couples_where_it_is_stays_in_the_observation():
+    seen = []
+    law = smc.policy(lambda o: seen.append(o) or [0.0])
+    alone = Measurement(t=0.0, dt=0.001, x=0.1, v=0.2, e=0.1, de=0.2, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
+    for y in (alone, alone._replace(q=1.5, fq=2.0, gq=1.0), alone._replace(q=1.6, fq=2.0, gq=0.0)):
+        assert law.function
+        law.function(y, None, np.zeros(1))
+    assert [o.tolist() for o in seen] == [[0.1, 0.2], [0.1, 1.5, 0.2, 0.0], [0.1, 1.6, 0.2, 0.0]]
+
+
+def test_the_warning_tells_who_asked_for_a_policy_what_it_costs_and_nothing_of_compilers():
+    with pytest.warns(smc.PlainLoopWarning) as caught:
+        briefly(smc.policy(proportional))
+    sentence = str(caught[0].message)
+    assert sentence.startswith("law 'proportional' is a policy, which is Python: several times slower")
+    assert "compile:" not in sentence
+    assert "umba" not in sentence
+
+
+def test_policies_of_one_callable_are_one_law_that_can_be_sent_away():
+    assert smc.policy(proportional) == smc.policy(proportional) != smc.policy(proportional, reference=True)
+    assert pickle.loads(pickle.dumps(smc.policy(proportional).function)) == smc.policy(proportional).function
+
+
+@pytest.mark.parametrize(
+    ("act", "fields", "words"),
+    [
+        (lambda o: [1.0, 2.0], {}, "2 numbers"),
+        (lambda o: [np.nan], {}, "returned u = nan"),
+        (lambda o: "left", {}, "could not convert"),
+        (lambda o: o[:1], {"u_max": np.inf}, "u_max is inf"),
+    ],
+)
+def test_an_action_that_is_none_ends_the_run_in_words(act, fields, words):
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.01, **fields))
+    assert words in str(trace.failure)
+
+
+def test_an_action_beyond_its_bounds_saturates():
+    assert np.all(briefly(smc.policy(lambda o: [-3.0])).u == -6.0)
+
+
+def test_a_policy_may_look_ahead_in_environments_of_its_own():
+    gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+
+    def act(observation):
+        many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2)
+        many.reset(seed=0, options={"x0": observation[0], "v0": observation[1]})
+        x = many.step([[-1.0], [1.0]])[0][:, 0]
+        return [-1.0 if abs(x[0]) < abs(x[1]) else 1.0]
+
+    trace = briefly(smc.policy(act))
+    assert trace.failure is None
+    assert np.all(trace.u[:-1] == -6.0)
+
+
+def test_a_policy_may_look_ahead_in_runs_of_its_own():
+    ahead = smc.Scenario(plant="inverted_pendulum", law="classical", contact="stops", duration=0.01)
+    ends = []
+
+    def act(observation):
+        ends.append(smc.run(ahead).x[-1, 0])
+        return [0.0]
+
+    assert briefly(smc.policy(act)).failure is None
+    assert ends == 3 * [smc.run(ahead).x[-1, 0]]
+
+
+# files and modules, with stand-ins for their libraries
+
+
+def onnx(monkeypatch, kind="tensor(float)", shape=("batch", 2), more=()):
+    """A stand-in for onnxruntime, whose networks give -x/2; what it was asked."""
+    seen = []
+
+    class Session:
+        def __init__(self, path, options, providers):
+            assert options.intra_op_num_threads == 1
+            if Path(path).read_bytes() == b"bad":
+                raise RuntimeError("protobuf\n parsing failed")
+
+        def get_inputs(self):
+            return [types.SimpleNamespace(name="obs", type=kind, shape=list(shape)), *more]
+
+        def run(self, names, inputs):
+            seen.append(inputs["obs"])
+            return [-0.5 * inputs["obs"][:, :1]]
+
+    library = types.SimpleNamespace(InferenceSession=Session, SessionOptions=types.SimpleNamespace)
+    monkeypatch.setitem(sys.modules, "onnxruntime", library)
+    return seen
+
+
+@pytest.mark.parametrize(("kind", "dtype"), [("float", np.float32), ("double", np.float64), ("float16", np.float16)])
+def test_a_file_of_onnx_is_asked_for_a_batch_of_one_in_its_own_type(kind, dtype, tmp_path, monkeypatch):
+    seen = onnx(monkeypatch, f"tensor({kind})")
+    (tmp_path / f"{kind}.onnx").write_bytes(kind.encode())
+    trace = briefly(smc.policy(tmp_path / f"{kind}.onnx"))
+    assert trace.u[0, 0] == pytest.approx(-1.5, rel=1e-3)
+    assert (seen[0].shape, seen[0].dtype) == ((1, 2), dtype)
+
+
+def test_a_file_that_changed_is_another_law_to_a_study(tmp_path, monkeypatch):
+    onnx(monkeypatch)
+    file = tmp_path / "net.onnx"
+    file.write_bytes(b"x")
+    first, again = (run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file))) for _ in range(2))
+    file.write_bytes(b"y")
+    assert first == again != run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file)))
+
+
+def test_a_file_that_changed_before_its_run_is_not_taken_for_what_it_was(tmp_path, monkeypatch):
+    onnx(monkeypatch)
+    (tmp_path / "net.onnx").write_bytes(b"first")
+    law = smc.policy(tmp_path / "net.onnx")
+    (tmp_path / "net.onnx").write_bytes(b"second")
+    policy.opened.cache_clear()  # as in another process
+    assert "'net.onnx' is gone, or another than it was: call smc.policy again" in str(briefly(law).failure)
+
+
+@pytest.mark.parametrize(
+    "taken",
+    [
+        {"shape": (2,)},
+        {"shape": (5, 2)},
+        {"kind": "tensor(int64)"},
+        {"more": [types.SimpleNamespace(name="h", type="tensor(float)", shape=[1, 1])]},
+    ],
+    ids=str,
+)
+def test_a_network_that_takes_more_or_less_than_an_observation_is_refused_before_the_run(taken, tmp_path, monkeypatch):
+    onnx(monkeypatch, **taken)
+    (tmp_path / "net.onnx").write_bytes(str(taken).encode())
+    with pytest.raises(smc.ScenarioError, match=r"'net.onnx' takes obs tensor.*export it for one input of floats"):
+        smc.policy(tmp_path / "net.onnx")
+
+
+class Module:
+    """A stand-in for a torch module, which gives -x/2 in evaluation and nonsense in training."""
+
+    def __init__(self, dtype=np.float32):
+        self.training, self.gain, self.dtype = True, -0.5, dtype
+
+    def eval(self):
+        self.training = False
+        return self
+
+    def to(self, device):
+        assert device == "cpu"
+        return self
+
+    def parameters(self):
+        return [types.SimpleNamespace(dtype=self.dtype, is_floating_point=lambda: True)]
+
+    def __call__(self, batch):
+        assert (batch.shape, batch.dtype) == ((1, 2), self.dtype)
+        return np.inf * batch if self.training else self.gain * batch[:, :1]
+
+
+class Tensor(np.ndarray):
+    def double(self):
+        return self.astype(float)
+
+    def numpy(self):
+        return np.asarray(self)
+
+
+@pytest.fixture
+def torch(monkeypatch):
+    library = types.SimpleNamespace(
+        nn=types.SimpleNamespace(Module=Module),
+        no_grad=contextlib.nullcontext,
+        as_tensor=lambda array, dtype: array.astype(dtype).view(Tensor),
+        float32=np.float32,
+    )
+    monkeypatch.setitem(sys.modules, "torch", library)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_torch_module_is_asked_in_evaluation_and_in_its_own_type(dtype, torch):
+    module = Module(dtype)
+    law = smc.policy(module)
+    assert module.training  # its owner's is as it was
+    module.gain = 7.0  # training goes on
+    assert briefly(law).u[0, 0] == pytest.approx(-1.5, rel=1e-6)
+
+
+# what predicts, as stable-baselines3 has it
+
+
+class Predicts:
+    """A stand-in for a model that gives its action, and what it remembers, when asked for the deterministic one."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.shape == (2,)
+        return np.array([-0.5 * observation[0] if deterministic else 1.0], np.float32), state
+
+
+class Alone:
+    """One that gives its action alone."""
+
+    def predict(self, observation, deterministic=False):
+        return Predicts().predict(observation, deterministic=deterministic)[0]
+
+
+@pytest.mark.parametrize("kind", [Predicts, Alone])
+def test_what_predicts_is_asked_for_its_deterministic_action(kind):
+    law = smc.policy(kind())
+    assert law.name == kind.__name__
+    assert briefly(law).u[0, 0] == -1.5
+
+
+def test_a_callable_that_predicts_too_is_called():
+    class Both(Predicts):
+        def __call__(self, observation):
+            return [0.25]
+
+    assert briefly(smc.policy(Both())).u[0, 0] == 1.5
+
+
+class Head(Module):
+    """A stand-in for the policy of a model of stable-baselines3: a torch module that predicts."""
+
+    def predict(self, observation, deterministic=False):
+        assert deterministic
+        assert not self.training
+        return self.gain * observation[:1], None
+
+
+def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
+    model = types.SimpleNamespace(predict=lambda *_, **__: pytest.fail("the model is trained on"), policy=Head())
+    law = smc.policy(model)
+    model.policy.gain = 7.0
+    assert briefly(law).u[0, 0] == pytest.approx(-1.5, rel=1e-6)
+    assert briefly(smc.policy(model.policy)).u[0, 0] == 6.0  # itself, as it is now
+
+
+# errors
+
+
+@pytest.mark.parametrize(
+    ("act", "words"), [(3, "policy is 3"), ("net.h5", "file of .onnx"), ("net.onnx", "no policy 'net.onnx'")]
+)
+def test_what_is_no_policy_is_one_sentence(act, words):
+    with pytest.raises(smc.ScenarioError, match=words) as raised:
+        smc.policy(act)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt", "torch"), ("a.pt2", "torch")])
+def test_a_library_that_is_missing_is_named(file, library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    (tmp_path / file).write_bytes(b"x")
+    with pytest.raises(smc.ScenarioError, match=f"pip install {library}"):
+        smc.policy(tmp_path / file)
+
+
+def test_a_file_that_is_no_network_is_one_sentence(tmp_path, monkeypatch):
+    onnx(monkeypatch)
+    (tmp_path / "bad.onnx").write_bytes(b"bad")
+    with pytest.raises(smc.ScenarioError, match=r"'bad.onnx' cannot be read \(protobuf parsing failed\): give what"):
+        smc.policy(tmp_path / "bad.onnx")
+
+
+# the libraries themselves
+
+
+@pytest.fixture
+def network():
+    """(torch, a small module with dropout in training, what it gives for 0.5, 0 in evaluation)."""
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    torch.manual_seed(0)
+    module = torch.nn.Sequential(
+        torch.nn.Linear(2, 8), torch.nn.Tanh(), torch.nn.Dropout(0.5), torch.nn.Linear(8, 1), torch.nn.Tanh()
+    )
+    with torch.no_grad():
+        expected = module.eval()(torch.tensor([[0.5, 0.0]])).item()
+    return torch, module.train(), expected
+
+
+def test_torch_s_modules_control_and_are_told_apart(network):
+    torch, module, expected = network
+    law, double = smc.policy(module), smc.policy(torch.nn.Sequential(torch.nn.Linear(2, 1)).double())
+    key = run_key.key(smc.Scenario(plant="duffing", law=law))
+    assert briefly(double).failure is None
+    with torch.no_grad():
+        module[0].weight.add_(1.0)
+    assert briefly(law).u[0, 0] == pytest.approx(6.0 * expected, rel=1e-6)
+    assert run_key.key(smc.Scenario(plant="duffing", law=law)) == key
+    assert run_key.key(smc.Scenario(plant="duffing", law=smc.policy(module))) != key
+
+
+@pytest.mark.parametrize("kind", [".pt", ".pt2", ".onnx"])
+def test_what_torch_writes_is_read(kind, network, tmp_path):
+    torch, module, expected = network
+    path, given = tmp_path / f"net{kind}", (torch.zeros(1, 2),)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if kind == ".pt":
+            torch.jit.script(module).save(path)
+        elif kind == ".pt2":
+            torch.export.save(torch.export.export(module.eval(), given), path)
+        else:
+            for library in ("onnx", "onnxruntime"):
+                pytest.importorskip(library, reason=f"{library} is not installed")
+            torch.onnx.export(module.eval(), given, path, dynamo=False)
+    assert briefly(smc.policy(path)).u[0, 0] == pytest.approx(6.0 * expected, rel=1e-6)
+
+
+def test_torch_s_weights_alone_are_no_policy(network, tmp_path):
+    torch, module, _ = network
+    torch.save(module.state_dict(), tmp_path / "weights.pt")
+    with pytest.raises(smc.ScenarioError, match="give TorchScript"):
+        smc.policy(tmp_path / "weights.pt")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_models_of_stable_baselines3_learn_here_and_are_laws():
+    library = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    gymnasium = pytest.importorskip("gymnasium")
+    changes = {"duration": 0.2, "control_period": 0.01, "u_max": 6.0}
+    environment = gymnasium.make("smc_mujoco:Duffing-v0", changes=changes)
+    checker.check_env(environment.unwrapped)
+    model = library.PPO("MlpPolicy", environment, n_steps=32, batch_size=16, device="cpu", seed=0).learn(64)
+    law = smc.policy(model)
+    expected = 6.0 * float(model.predict(np.array([0.5, 0.0]), deterministic=True)[0][0])
+    assert law.name == "PPO"
+    assert pickle.loads(pickle.dumps(law.function))(Y, None, np.zeros(1))[0] == pytest.approx(expected, rel=1e-6)
+    model.learn(64)
+    assert briefly(law).u[0, 0] == pytest.approx(expected, rel=1e-6)
+    assert run_key.key(smc.Scenario(plant="duffing", law=law)) != run_key.key(
+        smc.Scenario(plant="duffing", law=smc.policy(model))
+    )

@@ -1,0 +1,273 @@
+"""Surfaces: what eq keeps, what the error does on s = 0, and first-order laws on every one of them.
+
+On a free mass, which is the double integrator e'' = u + d, unless a test names a plant.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.plants_ab import measured
+from scipy.integrate import quad
+
+import smc_mujoco as smc
+from smc_mujoco.control.component import GainWarning
+from smc_mujoco.control.surface import catalogue, surface, surfaces
+from smc_mujoco.simulation import reference
+
+SURFACES = pytest.mark.parametrize("name", surfaces())
+SECOND = [name for name in surfaces() if name != "higher_order"]  # those that an acceleration of the error keeps
+MASS = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)
+HUM = smc.Sine(amplitude=0.4, omega=3.0)
+SHAKEN = 1.2e-3 * 3.0  # bound on s from sampling: (k + D) dt for k = 2, and half as much again
+
+
+def at(slid, memory, e, de, t=0.0, a=0.0, h=1e-3):
+    """s and eq of a surface."""
+    return slid.function(measured(e, de, dt=h, t=t, a=a), reference.named(slid), memory)
+
+
+def slide(name, e=1.0, de=0.0, duration=6.0, k=2.0, disturbance=HUM, **gains):
+    """The free mass under the classical law on a surface."""
+    return smc.run(
+        smc.Scenario(
+            plant=MASS,
+            law=smc.law("classical", k=k),
+            surface=surface(name, **gains),
+            x0=e,
+            v0=de,
+            duration=duration,
+            disturbance=disturbance,
+            u_max=math.inf,
+        )
+    )
+
+
+@pytest.mark.parametrize("name", SECOND)
+def test_eq_is_the_acceleration_that_keeps_s(name):
+    """From any state, one short step under e'' = eq changes s by O(h^2), and under another e'' by O(h)."""
+    slid, h, random = surface(name), 1e-6, np.random.default_rng(0)
+    for _ in range(100):
+        e, de = np.sign(random.normal(size=2)) * random.uniform(0.2, 1.5, size=2)
+        for extra in (0.0, 1.0):
+            memory, t = np.zeros(slid.memory), 0.0
+            for before in random.normal(size=(3, 2)):
+                at(slid, memory, *before, t=t, h=h)
+                t += h
+            s, eq = at(slid, memory, e, de, t=t, h=h)
+            a = eq + extra
+            moved, _ = at(slid, memory, e + h * de + h * h * a / 2, de + h * a, t=t + h, h=h)
+            if extra:
+                assert (moved - s) / h > 0.05
+            else:
+                assert abs(moved - s) / h < 2e-3
+
+
+@SURFACES
+def test_eq_is_finite_everywhere(name):
+    slid = surface(name)
+    values = [0.0, 5e-324, 1e-300, 1e-12, 1.0, 1e3, 1e6]
+    for e in values:
+        for de in values:
+            for sign in (1.0, -1.0):
+                assert np.isfinite(at(slid, np.zeros(slid.memory), sign * e, de)).all()
+
+
+@SURFACES
+def test_every_surface_is_odd_and_zero_at_rest(name):
+    slid = surface(name)
+    ours, mirrored, rest = (np.zeros(slid.memory) for _ in range(3))
+    for k, (e, de, a) in enumerate(np.random.default_rng(0).normal(size=(200, 3))):
+        s, eq = at(slid, ours, e, de, t=k * 1e-3, a=a)
+        assert at(slid, mirrored, -e, -de, t=k * 1e-3, a=-a) == (-s, -eq)
+        assert at(slid, rest, 0.0, 0.0, t=k * 1e-3) == (0.0, 0.0)
+
+
+def test_on_the_linear_surface_the_error_decays_at_c():
+    trace = slide("linear", de=-2.0, c=2.0)
+    np.testing.assert_allclose(trace.x[:, 0], np.exp(-2.0 * trace.t), atol=2 * SHAKEN / 2.0)
+
+
+def second_order(k2, k1, t):
+    """The response of e'' + k2 e' + k1 e = 0 from e = 1 at rest, for real poles."""
+    fast, slow = np.roots([1.0, k2, k1])
+    return (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
+
+
+def test_the_integral_surface_has_no_reaching_phase_and_leaves_the_nominal_response():
+    trace = slide("integral", k1=2.0, k2=3.0)
+    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
+    np.testing.assert_allclose(trace.x[:, 0], second_order(3.0, 2.0, trace.t), atol=2 * SHAKEN)
+    moving = slide("integral", de=1.5)
+    assert np.abs(moving.s[:, 0]).max() <= SHAKEN
+    assert np.abs(slide("linear").s[:500, 0]).min() > 0.5  # as the linear surface has
+
+
+def test_on_the_pid_surface_the_error_follows_its_polynomial():
+    """From s(0) = 0: de = -kp e, with e'(0) as it is."""
+    kp, ki = 3.0, 2.0
+    trace = slide("pid", de=-kp, kp=kp, ki=ki)
+    fast, slow = sorted(np.roots([1.0, kp, ki]))
+    due = ((-kp - slow) * np.exp(fast * trace.t) - (-kp - fast) * np.exp(slow * trace.t)) / (fast - slow)
+    np.testing.assert_allclose(trace.x[:, 0], due, atol=2 * SHAKEN)
+    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
+
+
+def test_the_global_surface_has_no_reaching_phase_and_becomes_the_linear_one():
+    c, q = 2.5, 1.5
+    trace = slide("global_", c=c, q=q)
+    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
+    t, s0 = trace.t, c
+    due = np.exp(-c * t) + s0 * (np.exp(-q * t) - np.exp(-c * t)) / (c - q)
+    np.testing.assert_allclose(trace.x[:, 0], due, atol=2 * SHAKEN)
+    assert np.abs(trace.v + c * trace.x)[-1, 0] < s0 * math.exp(-q * 6.0) + SHAKEN
+
+
+TERMINAL = [  # speed on s = 0, and the time it takes from e
+    (
+        "terminal",
+        lambda g, e: g["b"] * e ** g["p"],
+        lambda g, e: e ** (1 - g["p"]) / (g["b"] * (1 - g["p"])),
+    ),
+    (
+        "fast_terminal",
+        lambda g, e: g["a"] * e + g["b"] * e ** g["p"],
+        lambda g, e: math.log(1 + g["a"] * e ** (1 - g["p"]) / g["b"]) / (g["a"] * (1 - g["p"])),
+    ),
+    (
+        "nonsingular_terminal",
+        lambda g, e: (g["B"] * e) ** (1 / g["p"]),
+        lambda g, e: e ** (1 - 1 / g["p"]) / (g["B"] ** (1 / g["p"]) * (1 - 1 / g["p"])),
+    ),
+    (
+        "nonsingular_fast_terminal",
+        lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]),
+        None,
+    ),
+    (
+        "predefined_time",
+        lambda g, e: math.exp(e ** g["p"]) * e ** (1 - g["p"]) / (g["p"] * g["T"]),
+        lambda g, e: g["T"] * (1 - math.exp(-(e ** g["p"]))),
+    ),
+]
+
+
+@pytest.mark.parametrize("e", [0.3, 1.0, 2.0])
+@pytest.mark.parametrize(("name", "speed", "due"), TERMINAL, ids=[row[0] for row in TERMINAL])
+def test_on_a_terminal_surface_the_error_ends_at_the_stated_time(name, speed, due, e):
+    slid = surface(name)
+    assert at(slid, np.zeros(slid.memory), e, -speed(slid.gains, e))[0] == pytest.approx(0.0, abs=1e-12)
+    whole = quad(lambda r: 1 / speed(slid.gains, r), 0.0, e)[0]
+    if due is not None:
+        assert due(slid.gains, e) == pytest.approx(whole, rel=1e-6)
+    trace = slide(name, e=e, de=-speed(slid.gains, e))
+    outside = np.flatnonzero(np.abs(trace.x[:, 0]) > 0.01)
+    assert trace.t[outside[-1]] == pytest.approx(quad(lambda r: 1 / speed(slid.gains, r), 0.01, e)[0], rel=0.02)
+    assert np.abs(trace.x[trace.t > 1.05 * whole + 0.05]).max() < 2e-3
+
+
+@pytest.mark.parametrize("e", [1e-3, 1.0, 1e3, 1e6])
+def test_the_predefined_time_surface_ends_before_t_from_anywhere(e):
+    """e' = -v(e) in the variable w = |e|^p, in which it is w' = -exp(w) / T."""
+    slid = surface("predefined_time", T=2.0)
+    speed = -at(slid, np.zeros(slid.memory), -e, 0.0)[0] if e < 1e5 else math.inf
+    p = slid.gains["p"]
+    if math.isfinite(speed):
+        assert p * e ** (p - 1) * speed == pytest.approx(math.exp(e**p) / 2.0, rel=1e-9)
+    assert 2.0 * (1 - math.exp(-(e**p))) <= 2.0
+
+
+@pytest.mark.parametrize("law", ["classical", "boundary_layer", "observer_free"])
+@SURFACES
+def test_first_order_laws_settle_every_plant_on_every_surface(name, law):
+    """But for tanh on the non-singular terminal ones: there s is a length, of which its layer takes 1 whole unit."""
+    plants = ("duffing", "van_der_pol", "inverted_pendulum")
+    shares = []
+    for trace in smc.run([smc.Scenario(plant=p, law=law, surface=name, duration=8.0) for p in plants]):
+        assert trace.failure is None
+        shares.append(smc.score(trace)["ultimate_bound"] / np.abs(trace.x[0]).max())
+    if law == "observer_free" and name.startswith("nonsingular"):
+        assert shares[0] < 0.05 < shares[2] < 0.2
+    else:
+        assert max(shares) <= 0.05
+
+
+@pytest.mark.parametrize("law", ["classical", "boundary_layer", "observer_free", "super_twisting"])
+def test_first_order_laws_take_the_surface_of_order_3_behind_an_actuator_lag(law):
+    common = {
+        "surface": "higher_order",
+        "actuator": smc.Lag(0.05),
+        "velocity": smc.estimator("levant", order=2, L=200.0),
+    }
+    for trace in smc.run([smc.Scenario(plant=p, law=law, **common) for p in ("duffing", "van_der_pol")]):
+        assert trace.failure is None
+        assert smc.score(trace)["ultimate_bound"] <= 0.05 * np.abs(trace.x[0]).max()
+
+
+def test_the_surface_of_order_3_holds_its_polynomial_on_s_equal_to_zero():
+    """An acceleration of eq lies on it, and with it e'' + k2 e' + k1 e = 0."""
+    slid = surface("higher_order")
+    for e, de in np.random.default_rng(0).normal(size=(50, 2)):
+        _, eq = at(slid, np.zeros(1), e, de)
+        assert at(slid, np.zeros(1), e, de, a=eq)[0] == pytest.approx(0.0, abs=1e-12)
+        assert eq == pytest.approx(-5.0 * de - 6.25 * e)
+
+
+def test_the_surface_replaces_the_laws_own():
+    """c of the law is of no account, and the trace's s is the surface's."""
+    common = {"plant": "duffing", "duration": 0.5, "surface": surface("linear", c=2.0)}
+    one, other = smc.run([smc.Scenario(law=smc.law("classical", c=c), **common) for c in (1.0, 9.0)])
+    np.testing.assert_array_equal(one.u, other.u)
+    np.testing.assert_allclose(one.s, one.v + 2.0 * one.x, atol=1e-12)
+
+
+def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():
+    plant = smc.plant("pendulum_network", n=3, kc=0.0)
+    scenario = smc.Scenario(plant=plant, law="classical", surface="integral", x0=(0.5, 0.0, -0.5), duration=0.5)
+    trace, again = smc.run([scenario, scenario])
+    assert not trace.x[:, 1].any()
+    np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
+    np.testing.assert_array_equal(trace.u, again.u)
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])
+def test_dt_of_a_surface_is_the_control_period(period):
+    """An immovable cart stands at e = -1: s of PID is -(kp + ki t), of the integral surface -k1 t."""
+    anvil = smc.plant("duffing", M=1e12, alpha=0.0, beta=0.0, delta=0.0)
+    common = {"plant": anvil, "x0": 0.0, "reference": smc.Constant(1.0), "duration": 1.0, "control_period": period}
+    pid, integral, decaying = smc.run(
+        [
+            smc.Scenario(law="classical", surface=slid, **common)
+            for slid in (surface("pid", kp=3.0, ki=2.0), surface("integral", k1=2.0), surface("global_", c=2.0, q=1.5))
+        ]
+    )
+    np.testing.assert_allclose(pid.s[:, 0], -(3.0 + 2.0 * pid.t), rtol=1e-6)
+    np.testing.assert_allclose(integral.s[:, 0], -2.0 * integral.t, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(decaying.s[:, 0], -2.0 * (1 - np.exp(-1.5 * decaying.t)), rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "gains", "words"),
+    [
+        ("terminal", {"p": 0.3}, "1/2 < p < 1"),
+        ("fast_terminal", {"p": 1.2}, "1/2 < p < 1"),
+        ("nonsingular_terminal", {"p": 1.0}, "1 < p < 2"),
+        ("nonsingular_fast_terminal", {"q": 1.5}, "q > p"),
+        ("predefined_time", {"p": 0.5}, "0 < p < 1/2"),
+    ],
+)
+def test_gains_that_miss_a_condition_are_warned_of_in_its_words(name, gains, words):
+    with pytest.warns(GainWarning, match=words):
+        surface(name, **gains)
+
+
+@SURFACES
+def test_every_surface_names_its_equation_and_its_source(name):
+    text = catalogue()[name].doc
+    assert "s = " in text
+    assert "Source" in text
+    for gain in catalogue()[name].defaults:
+        with pytest.raises(smc.ScenarioError, match=gain):
+            surface(name, **{gain: math.nan})
+        with pytest.raises(smc.ScenarioError, match=gain):
+            surface(name, **{gain: -1.0})

@@ -1,0 +1,497 @@
+"""Films: the right frames, moving machines in their laws' colours, arrows that push, failures that show."""
+
+import dataclasses
+import itertools
+import os
+import signal
+import subprocess
+import sys
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw import states, style
+from smc_mujoco.draw.film import camera, film, stage
+from smc_mujoco.draw.film.arrows import Arrow, Longest, acts, arrows, longest
+from smc_mujoco.draw.film.caption import Caption, key
+from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
+from smc_mujoco.mechanisms.plant import Variant
+from smc_mujoco.metrics.channel_groups import groups
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation.trace import ARRAYS
+
+LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
+SIZE = (480, 270)
+renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+
+
+def runs(plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration: float = 0.3) -> list[smc.Trace]:
+    return smc.run(list(smc.paper.comparison(plant, condition, laws, duration=duration).values()))
+
+
+def driven(traces):
+    """The first group of channels of a trace's plant."""
+    return groups(traces[0].scenario.plant)[0]
+
+
+def broken(trace: smc.Trace, at: int) -> smc.Trace:
+    """The trace as if it had diverged at sample `at`."""
+    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
+    for array in arrays.values():
+        array[at:] = np.nan
+    return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
+
+
+def pictures(traces, times, **options) -> list[np.ndarray]:
+    return list(film.frames(traces, np.array(times), options.get("labels"), None, options.get("size", SIZE)))
+
+
+def machines(picture: np.ndarray) -> np.ndarray:
+    """The part of a frame between the title and the labels."""
+    return picture[int(0.13 * len(picture)) : int(0.53 * len(picture))]
+
+
+def share(picture: np.ndarray, colour: str) -> float:
+    """Share of pixels whose hue is that of a colour, whatever the light."""
+    pixels, wanted = machines(picture).reshape(-1, 3).astype(float), np.array(style.rgb(colour), float)
+    pixels, wanted = pixels - pixels.min(axis=1, keepdims=True), wanted - wanted.min()
+    strong = pixels.max(axis=1) > 60
+    alike = pixels @ wanted > 0.985 * np.linalg.norm(pixels, axis=1) * np.linalg.norm(wanted)
+    return float((strong & alike).mean())
+
+
+@renders
+def test_film_has_a_frame_every_thirtieth_of_a_second(tmp_path):
+    written = []
+    path = film.film(runs(), tmp_path / "new" / "a.mp4", size=SIZE, report=written.append)
+    read = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(read, capture_output=True, check=True)
+    assert len(done.stdout) == 10 * 270 * 480 * 3
+    assert b"480x270" in done.stderr
+    assert b" 30 fps" in done.stderr
+    assert sum(written) == 10
+    assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
+
+
+@renders
+def test_every_machine_moves():
+    traces = runs(duration=1.0)
+    first, last = pictures(traces, [0.0, 1.0])
+    moved = np.abs(machines(first).astype(int) - machines(last)).max(axis=2) > 40
+    rows = np.flatnonzero(moved.any(axis=1))
+    assert moved.mean() > 0.02
+    assert np.ptp(rows) > 0.5 * len(moved)  # from the nearest rail to the farthest
+
+
+@renders
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "duffing", "pendulum_network"])
+def test_every_law_has_its_colour(plant):
+    (picture,) = pictures(runs(plant), [0.1], size=(640, 360))
+    for law in LAWS:
+        assert share(picture, style.law_colour(law)) > 3e-4, law
+
+
+@renders
+def test_a_large_control_draws_an_arrow():
+    (with_control,) = pictures(runs(laws=LAWS[:1]), [0.2])
+    quiet = dataclasses.replace(runs(laws=LAWS[:1])[0], u=np.zeros((301, 1)), applied=np.zeros((301, 1)))
+    (without,) = pictures([quiet], [0.2])
+    blue = style.law_colour(LAWS[0])
+    assert share(with_control, blue) > share(without, blue) + 1e-3
+
+
+def test_arrows_are_to_scale_and_a_bar_shows_switching():
+    (trace,) = runs("van_der_pol", "sine", LAWS[:1])
+    u = np.where(np.arange(301) % 2, 6.0, -3.0)[:, None]
+    acting = acts(dataclasses.replace(trace, applied=u), np.array([0.1, 0.2]), gap=0.1)
+    arrow, bar, push = arrows(acting, 1, 0, Longest(6.0, 0.2), "#0072B2")
+    assert arrow.high == pytest.approx(0.25, abs=0.02)
+    assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
+    assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
+
+
+@renders
+@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum", "cart_pole"])
+def test_an_arrow_ends_where_the_bar_of_its_range_does(plant):
+    """MuJoCo draws an arrow in half the length of a capsule between the same points."""
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
+    ends = []
+    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
+        scene.pose(0, trace.x[0])
+        empty = scene.render().astype(int)
+        for head in (True, False):
+            arrow = Arrow(0.0, 1.0, (1.0, 0.0, 0.0, 1.0), head=head)
+            drawn = np.abs(scene.render([(0, 0, arrow)]) - empty).max(axis=2) > 60
+            ends.append(np.flatnonzero(drawn.any(axis=0)).max())
+    assert ends[0] == pytest.approx(ends[1], abs=4)
+
+
+@renders
+def test_the_drum_on_a_crane_s_trolley_hides_none_of_its_arrow():
+    trace = smc.run(smc.Scenario(plant="overhead_crane", law="none", duration=0.01))
+    seen = []
+    with Stage([trace], ["#0072B2"], (1280, 720), camera.Room(20, 20, 1260, 700)) as scene:
+        scene.pose(0, trace.x[0])
+        for height in (0.0, -50.0):  # where it is, and away
+            scene.model.geom("m0/drum").pos[2] += height
+            empty, arrow = scene.render().astype(int), Arrow(0.0, -0.3, (1.0, 0.0, 0.0, 1.0))
+            seen.append((np.abs(scene.render([(0, 0, arrow)]) - empty).max(axis=2) > 60).sum())
+    assert seen[0] == pytest.approx(seen[1], rel=0.02)
+
+
+@renders
+def test_a_failed_machine_turns_grey_and_stays_where_it_was():
+    good, bad = runs("inverted_pendulum", laws=LAWS[:2])
+    before, after, later = pictures([good, broken(bad, 150)], [0.1, 0.2, 0.3])
+    orange = style.law_colour(LAWS[1])
+    assert share(before, orange) > 3e-4
+    assert share(after, orange) < 0.2 * share(before, orange)  # brass is left
+    right = machines(after).shape[1] // 2
+    assert np.abs(machines(after)[:, right:].astype(int) - machines(later)[:, right:]).max() < 30
+
+
+@renders
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "pendulum_network"])
+def test_a_machine_that_fails_at_once_is_grey_from_the_start(plant):
+    good, bad = runs(plant, laws=LAWS[::3])
+    first, last = pictures([broken(bad, 0)], [0.0, 0.3])
+    assert share(first, style.law_colour(LAWS[3])) == 0.0
+    assert np.abs(machines(first).astype(int) - machines(last)).max() < 30
+    pictures([good, broken(bad, 0)], [0.0, 0.3])
+
+
+@renders
+def test_a_jump_changes_the_machine_and_is_told():
+    jump = smc.Jump(0.2, {"l": 1.5})
+    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.4, jump=jump))
+    room = camera.Room(10, 10, 470, 160)
+    with Stage([trace], ["#0072B2"], (480, 170), room) as stage:
+        lengths = []
+        for time in (0.1, 0.3, 0.1):
+            stage.dress(0, time)
+            lengths.append(float(stage.model.geom("m0/bob").pos[2]))
+    assert lengths == pytest.approx([0.5, 0.75, 0.5])
+    before, after = pictures([trace], [0.1, 0.3])
+    corner = slice(10, 50), slice(300, None)
+    assert (after[corner].mean(axis=2) < 80).sum() > 2 * (before[corner].mean(axis=2) < 80).sum()
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
+def test_long_words_stay_in_the_picture(plant):
+    bad = [broken(trace, 150) for trace in runs(plant)]
+    names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
+    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, {driven(bad): Longest(6.0, 0.2)})
+    caption.put(np.array([[300.0 * k, 80.0 * k, 300.0 * k + 290, 80.0 * k + 200] for k in range(4)]))
+    assert (caption.pills[:, :2] >= 0).all()
+    assert (caption.pills[:, 2:] <= size).all()
+    assert (caption.pills[:, 2] - caption.pills[:, 0] >= [caption.width(text) for text in caption.texts()]).all()
+    assert all(text.endswith("…: failed at 0.15 s") for text in caption.texts())
+    assert caption.title.endswith("…")
+    assert 24 + style.width(caption.title, 24, bold=True) < 1280 - 24 - style.width("10.00 s", 24, bold=True)
+
+
+@renders
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to interrupt")
+def test_ctrl_c_ends_a_film_as_itself_and_leaves_nothing(tmp_path):
+    code = """
+import sys
+import smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=100.0))
+smc.film([trace], sys.argv[1], size=(320, 180), report=lambda n: print(n, flush=True))
+"""
+    command = [sys.executable, "-c", code, str(tmp_path / "a.mp4")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, start_new_session=True, env=environment, **pipes) as process:
+        assert process.stdout is not None
+        for _ in range(5):
+            process.stdout.readline()
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        _, error = process.communicate(timeout=60)
+    assert error.strip().endswith("KeyboardInterrupt")
+    assert "RuntimeError" not in error
+    assert not list(tmp_path.iterdir())
+
+
+@renders
+def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
+    many = smc.plant("inverted_pendulum_network", n=30)
+    traces = smc.run([smc.Scenario(plant=many, law="none", duration=0.2)])
+    still = film.still(traces, 0.1, tmp_path / "a.png", size=SIZE)
+    with Image.open(still) as image:
+        assert image.size == SIZE
+    with Image.open(film.clip(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE)) as clip:
+        assert (clip.n_frames, clip.size) == (5, SIZE)
+
+
+def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
+    (trace,) = runs(laws=LAWS[:1], duration=0.1)
+    for name, given in (("a.png", trace), ("b.png", [trace])):
+        film.still(given, 0.05, tmp_path / name, size=SIZE)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert film.film(trace, tmp_path / "a.mp4", size=SIZE).stat().st_size
+    assert film.clip(trace, tmp_path / "a.webp", size=SIZE).stat().st_size
+
+
+def test_camera_sees_all_points_as_near_as_it_can():
+    points = np.random.default_rng(0).uniform((-3, 0, 0), (3, 2, 1), (200, 3))
+    turn = np.array([[1.0, 0, 0], [0, 0.3, -(0.91**0.5)], [0, 0.91**0.5, 0.3]])
+    room = camera.Room(100, 50, 1200, 400)
+    px = camera.project(points, turn, camera.fit(points, turn, (1280, 460), room), (1280, 460))
+    (left, top), (right, bottom) = px.min(axis=0), px.max(axis=0)
+    assert left >= 100 - 1e-6
+    assert right <= 1200 + 1e-6
+    assert top >= 50 - 1e-6
+    assert bottom <= 400 + 1e-6
+    assert right - left == pytest.approx(1100) or bottom - top == pytest.approx(350)
+
+
+@pytest.mark.parametrize(
+    ("traces", "options", "sentence"),
+    [
+        (0, {}, "no traces"),
+        (1, {"size": (481, 270)}, "two even numbers"),
+        (1, {"fps": 0.0}, "give 1 to 120"),
+        (9, {"size": SIZE}, "at most 8"),
+    ],
+)
+def test_refuses_what_makes_no_film(traces, options, sentence, tmp_path):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        film.film(runs(laws=LAWS[:1]) * traces, tmp_path / "a.mp4", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_opengl_one_sentence_says_what_to_do(monkeypatch, tmp_path):
+    monkeypatch.setattr(gl, "missing", lambda: "no film: install a renderer")
+    with pytest.raises(smc.ScenarioError, match="install a renderer"):
+        film.film(runs(laws=LAWS[:1]), tmp_path / "a.mp4")
+
+
+# realistic mechanisms
+
+ROOM = camera.Room(10, 10, 470, 160)
+VARIANTS = [
+    (plant, field, name)
+    for plant in smc.plants()
+    for field, offered in (("contact", "contacts"), ("mechanism", "mechanisms"))
+    for name in getattr(smc.plant(plant), offered)
+]
+
+
+def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
+    given = smc.paper.scenario(plant, law).law
+    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 2.0} | parts)))
+
+
+def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
+    """What a film tells of a trace, and for how many frames."""
+    told = states.told(trace, film.clock([trace], fps))
+    return [(now.words if now else None, len(list(run))) for now, run in itertools.groupby(told)]
+
+
+@pytest.fixture(scope="module")
+def hit() -> smc.Trace:
+    """A cart that hits its stop once, at about 0.07 s."""
+    return realistic(contact="stops", v0=3.0)
+
+
+@pytest.fixture(scope="module")
+def stuck() -> smc.Trace:
+    return realistic(friction=Coulomb(0.5))
+
+
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
+def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
+    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    model = stage.compose([scenario] * 2, SIZE)
+    shown = {model.geom(i).name for i in range(model.ngeom)}
+    wanted = [geom.name for geom in assembly.spec([scenario]).geoms if geom.name not in ("", "floor")]
+    assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
+    assert model.nskin == 2 * len(assembly.spec([scenario]).skins)
+
+
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
+def test_machines_side_by_side_keep_apart(plant, field, name):
+    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    corners = stage.still(assembly.model([scenario]))[..., :2]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    step = stage.lane([scenario] * 3)[:2]
+    for by in (step, 2 * step):
+        apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(axis=2)
+        assert apart.min() >= 0.0
+
+
+def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
+    (trace,) = runs(laws=LAWS[:1])
+    assert np.linalg.norm(stage.lane([trace.scenario])) == pytest.approx(np.linalg.norm(trace.scenario.plant.lane))
+    assert moods(trace) == [(None, 10)]
+    assert longest([trace])[driven([trace])].reaction == 0.0
+    assert not any("violet" in words for words in key([trace], longest([trace])))
+
+
+def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
+    (first, slides), (second, _) = moods(stuck)
+    assert (first, second) == ("slides", "sticks")
+    moving = np.flatnonzero(np.abs(stuck.v) > 1e-3 * np.abs(stuck.v).max())[-1]
+    assert slides / 30 == pytest.approx(stuck.t[moving] + states.HOLD, abs=0.04)  # it has rested for HOLD
+
+
+def test_a_cart_rests_beside_the_speed_of_carts_and_not_of_its_pole():
+    trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=0.0, duration=0.01))
+    fast = dataclasses.replace(trace, v=np.column_stack([np.full(11, 0.05), np.linspace(100.0, 0.0, 11)]))
+    assert not states.resting(fast)[:, 0].any()
+    assert states.resting(fast)[:, 1].tolist() == [False] * 10 + [True]
+
+
+def test_only_dry_friction_sticks():
+    assert moods(realistic(friction=smc.Viscous(1.0))) == [(None, 61)]
+    assert moods(realistic(friction=Coulomb(0.0))) == [(None, 61)]
+    assert moods(realistic(friction=LuGre(0.5, 0.8, 0.05)))[-1][0] == "sticks"
+    assert moods(realistic("none", contact="floor", x0=0.9, duration=1.0))[-1][0] == "sticks"
+
+
+def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
+    touching = hit.t[states.touching(hit)[:, 0]]
+    assert 0.0 < np.ptp(touching) < 0.05
+    (before, _), (blow, frames), (after, _) = moods(hit)
+    assert (before, blow, after) == (None, "contact", None)
+    assert frames / 30 >= states.HOLD
+    words = [now.words if now else None for now in states.told(hit, film.clock([hit], 30.0))]
+    assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
+
+
+def test_touch_is_where_the_stop_pushes_and_there_only(hit):
+    pushed = np.abs(hit.reaction[:, 0]) > 1e-6
+    touch = states.touching(hit)[:, 0]
+    assert touch.any()
+    # the reaction is that of the step before, and a dashpot lets go before the buffers part
+    assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
+
+
+def test_flanks_are_told_by_where_they_push():
+    slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.15), duration=1.0)
+    names = {-1: "left flank", 1: "right flank", 0: "in play"}
+    flank = np.sign(slack.reaction[:, 0]).astype(int)
+    told = states.told(slack, slack.t)
+    for now, k in zip(told, range(len(slack.t)), strict=True):
+        near = slice(max(k - 300, 0), k + 300)
+        assert now is not None
+        assert now.words == "rattles" or now.words in {names[f] for f in flank[near].tolist()}
+    rattling = np.where(np.arange(1001) // 20 % 2, 1.0, -1.0)
+    assert (states.lying(rattling, slack.t, states.HOLD)[200:] == 2).all()
+    assert (states.lying(np.ones(1001), slack.t, states.HOLD) == 1).all()
+
+
+def test_what_is_held_lasts_and_has_no_short_gaps():
+    t = np.arange(100) * 0.01
+    on = np.zeros(100, bool)
+    on[[10, 40, 70]] = True
+    assert np.flatnonzero(np.diff(states.held(on, t, 0.16).astype(int))).tolist() == [9, 85]
+    assert np.flatnonzero(np.diff(states.held(on, t, 0.1).astype(int))).tolist() == [9, 19, 39, 49, 69, 79]
+    assert not states.held(on & False, t, 0.15).any()
+
+
+def test_words_never_flicker():
+    rng, times = np.random.default_rng(0), np.arange(300) / 30
+    names = [states.State("a", states.CALM), states.State("b", states.HELD), states.State("hit", states.STRUCK)]
+    found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
+    shown = states.steady(found, times, states.HOLD)
+    runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
+    assert all(frames >= 5 or now == names[2] for now, frames in runs[1:-1])
+    assert all(after == now for after, now in zip(shown, found, strict=True) if now == names[2])
+    assert shown.index(names[2]) == found.index(names[2])  # nothing is told to hit before it does
+
+
+def test_several_channels_are_told_in_one():
+    assert states.stick_words(np.array([True, True, False])) == "2 of 3 stick"
+    assert states.stick_words(np.ones(3, bool)) == "sticks"
+    assert states.stick_words(np.zeros(3, bool)) == "slides"
+    assert states.play_words([0, 0, 1]) == "2 of 3 in play"
+    assert states.play_words([-1, -1]) == "left flank"
+
+
+def test_a_failed_machine_has_no_state(stuck):
+    told = states.told(broken(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
+    assert [now is None for now in told] == [False, False, True, True]
+    assert states.told(film.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
+
+
+@renders
+def test_a_tendon_that_a_mechanism_shows_is_drawn_where_it_is():
+    def add(spec):
+        spec.body("machine").add_site(name="post", pos=(0, -0.5, 0.8))
+        spec.body("cart").add_site(name="hook", pos=(0, 0, 0.2))
+        line = spec.add_tendon(name="line", width=0.03, rgba=(0.5, 0.0, 1.0, 1.0))
+        line.wrap_site("post")
+        line.wrap_site("hook")
+
+    base = smc.plant("duffing")
+    tied = dataclasses.replace(base, mechanisms={"tied": Variant(add, base.fields)})
+    trace = smc.run(smc.Scenario(plant=tied, law="none", mechanism="tied", duration=0.1))
+    (with_line,), (without,) = pictures([trace], [0.1]), pictures(runs(laws=LAWS[:1]), [0.1])
+    assert share(with_line, style.REACTION) > share(without, style.REACTION) + 3e-3
+
+
+@renders
+def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
+    slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
+    with Stage([slack], ["#0072B2"], (480, 170), ROOM) as shown:
+        rotor, joint = (shown.data.joint(f"m0/{name}") for name in ("rotor:hinge", "hinge"))
+        for flank in (-1.0, 0.0, 1.0):
+            shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
+            assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
+    pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
+    ahead = film.rotors(slack, slack.t, 1e-3)
+    assert ahead[pushed + 1, 0] == pytest.approx(0.1)
+    assert np.abs(ahead).max() <= 0.1
+    resting = realistic(contact="floor", duration=0.2)
+    with Stage([resting], ["#0072B2"], (480, 170), ROOM) as shown:
+        shown.pose(0, np.array([0.4]))
+        assert shown.data.joint("m0/lift").qpos[0] == 0.0
+
+
+@renders
+@pytest.mark.parametrize("at", [0, 1, 100])
+def test_a_realistic_machine_that_fails_is_filmed(at):
+    for parts in ({"actuator": smc.Backlash(0.2)}, {"friction": Coulomb(0.3), "contact": "stops"}):
+        pictures([broken(realistic(duration=0.2, **parts), at)], [0.0, 0.2])
+
+
+@renders
+def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
+    bare = dataclasses.replace(stuck, reaction=np.zeros_like(stuck.reaction))
+    (rubbed,), (smooth,) = pictures([stuck], [0.5]), pictures([bare], [0.5])
+    assert share(rubbed, style.REACTION) > share(smooth, style.REACTION) + 3e-4
+    assert "violet arrow: friction, longest 0.5 N" in key([stuck], longest([stuck]))
+
+
+def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
+    scales = longest([hit])
+    scale = scales[driven([hit])]
+    assert scale.reaction == scale.control < np.abs(hit.reaction).max()
+    assert f"violet arrow: contact, longest {scale.control:.2g} N or more" in key([hit], scales)
+
+
+@renders
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
+def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
+    traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
+    told = [states.told(trace, film.clock(traces, 30.0)) for trace in traces]
+    names = style.labels(traces, None)
+    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, longest(traces), told)
+    with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:
+        caption.put(shown.boxes)
+    boxes = np.concatenate([caption.pills, caption.badges])
+    assert (boxes[:, :2] >= 0).all()
+    assert (boxes[:, 2:] <= (1280, 460)).all()
+    for i, j in itertools.combinations(range(8), 2):
+        assert np.maximum(boxes[i, :2] - boxes[j, 2:], boxes[j, :2] - boxes[i, 2:]).max() >= -1e-9
+    (early,), (late,) = pictures(traces, [0.1], size=(1280, 720)), pictures(traces, [1.9], size=(1280, 720))
+    left, top, right, bottom = caption.badges[0].round().astype(int)
+    assert early[top + 4 : bottom - 4, left + 4 : right - 4].mean() > 170  # pale: it slides
+    assert late[top + 4 : bottom - 4, left + 4 : right - 4].mean() < 120  # dark: it is held

@@ -1,0 +1,78 @@
+"""A model that nobody here wrote has its picture and its figure."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw.film import camera
+from smc_mujoco.draw.film.arrows import Arrow, longest
+from smc_mujoco.draw.film.caption import key
+from smc_mujoco.draw.film.stage import Stage
+
+pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+SUITE = importlib.util.find_spec("dm_control")
+if SUITE is None or not SUITE.submodule_search_locations:
+    pytest.skip("dm_control is not installed", allow_module_level=True)
+FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
+
+
+@pytest.mark.parametrize(
+    ("name", "channels"),
+    [
+        ("cartpole", {"slider": smc.Channel(partner="hinge_1")}),
+        ("acrobot", {"elbow": None}),
+        ("manipulator", {"arm_root": None, "arm_shoulder": None}),
+    ],
+)
+def test_a_foreign_model_has_its_picture(tmp_path, name, channels):
+    plant = smc.plant_from(FOREIGN / f"{name}.xml", channels)
+    runs = [smc.Scenario(plant=plant, law=law, duration=0.2) for law in ("none", "super_twisting")]
+    traces = smc.run(runs)
+    still = smc.still(traces, 0.1, tmp_path / "a.png", size=(640, 360))
+    assert np.asarray(Image.open(still))[60:200].std() > 5.0
+    assert all(path.stat().st_size for path in smc.figure(traces, tmp_path / "a.svg"))
+
+
+def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture():
+    """The arrow lies before the pole, which stands where it begins; the rail is longer than what moves on it."""
+    plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
+    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
+        scene.pose(0, trace.x[0])
+        empty = scene.render().astype(int)
+        for push in (0.2, -0.2):
+            arrow = Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0))
+            red = np.abs(scene.render([(0, 0, arrow)]) - empty).max(axis=2) > 60
+            assert red.sum() > 50
+        left, _, right, _ = scene.boxes[0]
+        fixed = scene.data.geom_xpos[
+            [geom for geom in range(scene.model.ngeom) if "rail" in scene.model.geom(geom).name]
+        ]
+        assert len(fixed) == 2
+        assert right - left > 500  # the rail's 4 m fill the room, not the cart's 0.4 m
+        assert scene.grips[0][0].unit == pytest.approx(0.25 * plant.load().stat.extent)
+
+
+def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
+    plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0)))
+    assert trace.reaction.any()  # the joint's limit
+    words = [word for word in key([trace], longest([trace])) if "violet" in word]
+    assert len(words) == 1
+    assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
+
+
+def test_a_body_without_a_shape_has_no_arrow_and_no_error(tmp_path):
+    (tmp_path / "bare.xml").write_text("""
+      <mujoco><worldbody><geom size="1 1 .1" type="plane"/><body>
+        <inertial pos="0 0 .2" mass="1" diaginertia="1 1 1"/><joint name="j" axis="0 1 0"/></body>
+        <body pos="0 0 .5"><joint name="i" axis="0 1 0"/><geom size=".1"/></body></worldbody>
+      <actuator><motor joint="j"/><motor joint="i"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "bare.xml", ["j", "i"])
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.2, x0=0.3))
+    assert smc.still([trace], 0.1, tmp_path / "a.png", size=(640, 360)).stat().st_size

@@ -1,0 +1,423 @@
+"""Figures: readable, small, and honest about what failed."""
+
+import dataclasses
+import itertools
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.draw import decimate, panels, rows, style
+from smc_mujoco.draw import figure as draw_figure
+from smc_mujoco.draw.figure import figure, signals
+from smc_mujoco.draw.film import charts
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.trace import ARRAYS
+
+LAWS = ("observer_free", "classical")
+
+
+def runs(plant: str = "duffing", condition: str = "nominal", duration: float = 1.0) -> list[smc.Trace]:
+    return smc.run(list(smc.paper.comparison(plant, condition, LAWS, duration=duration).values()))
+
+
+@pytest.fixture(scope="module")
+def pair() -> list[smc.Trace]:
+    return runs()
+
+
+def broken(trace: smc.Trace, at: int, failure: str = reference.LEFT_THE_WORLD) -> smc.Trace:
+    """The trace as if it had diverged at sample `at`, on its way to 1e5."""
+    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
+    arrays["x"][max(at - 5, 0) : at] = 1e5
+    for array in arrays.values():
+        array[at:] = np.nan
+    at_time = float(trace.t[at])
+    return dataclasses.replace(trace, **arrays, diverged_at=at_time, failure=f"{failure}, at t = {at_time:g} s")
+
+
+def words(path) -> str:
+    """The text of a figure: letters are paths, with what they say in comments."""
+    ET.parse(path)
+    return " ".join(re.findall(r"<!-- (.*?) -->", path.read_text()))
+
+
+def test_writes_svg_and_png_with_names_and_units(pair, tmp_path):
+    svg, png = figure(pair, tmp_path / "deep" / "a.svg", title="A title")
+    assert [svg.name, png.name] == ["a.svg", "a.png"]
+    text = words(svg)
+    for word in (
+        "A title",
+        "Observer-free",
+        "Classical",
+        "position x (m)",
+        "velocity v (m/s)",
+        "control u (N)",
+        "time (s)",
+    ):
+        assert word in text
+    with Image.open(png) as image:
+        assert image.size == (1920, 1080)
+    assert [p.name for p in svg.parent.iterdir()] in (["a.svg", "a.png"], ["a.png", "a.svg"])  # nothing else
+
+
+def test_same_traces_give_the_same_files(pair, tmp_path):
+    first, second = figure(pair, tmp_path / "a"), figure(pair, tmp_path / "b")
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_network_shows_mean_and_spread_and_stays_small(tmp_path):
+    svg, _ = figure(runs("pendulum_network", "noise", 10.0), tmp_path / "a")
+    assert "mean x (rad)" in words(svg)
+    assert "max − min x (rad)" in words(svg)
+    assert "light: single channels" in words(svg)
+    assert "mean u (N·m)" in words(svg)
+    assert "control u (N·m), channel 0" in words(svg)
+    assert svg.stat().st_size < 1_000_000
+
+
+def test_a_diverged_run_is_named_and_does_not_squash_the_others(pair, tmp_path):
+    traces = [pair[0], broken(pair[1], 400)]
+    svg, _ = figure(traces, tmp_path / "a")
+    assert "Classical (diverged at 0.4 s)" in words(svg)
+    assert panels.limits(traces, "x") == panels.limits(pair[:1], "x")
+    figure([broken(pair[1], 1)], tmp_path / "b")  # one finite sample
+
+
+@pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])
+def test_a_run_that_fails_at_once_is_an_x_where_it_started(plant, tmp_path):
+    good, bad = runs(plant, duration=0.5)
+    gone = broken(bad, 0, "law 'classical' raised ValueError (no)")
+    assert "Classical (failed at 0 s)" in words(figure([gone], tmp_path / "a")[0])
+    figure([good, gone], tmp_path / "b")
+    signals([good, gone], tmp_path / "c", ["all", "all"])
+    cut = decimate.finite(gone)
+    assert cut.x.tolist() == [list(gone.scenario.x0)]
+    assert np.isnan(cut.u).all()
+    low, high = panels.limits([cut], "x")
+    assert low < min(gone.scenario.x0) <= max(gone.scenario.x0) < high
+
+
+def test_a_jump_is_marked_with_what_has_changed(tmp_path):
+    factors = {"jump": smc.Jump(0.5, {"mass": 25.9, "delta": 2.0})}
+    jumping = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0, **factors))
+    assert "mass × 25.9, delta × 2" in words(figure([jumping], tmp_path / "a")[0])
+    still = dataclasses.replace(jumping, scenario=dataclasses.replace(jumping.scenario, jump=None))
+    assert style.jumps([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
+
+
+def test_signals_has_a_column_for_each_condition(pair, tmp_path):
+    noisy = runs(condition="noise")
+    svg, _ = signals([*pair, *noisy], tmp_path / "a", ["nominal", "nominal", "noise", "noise"])
+    text = words(svg)
+    assert all(word in text for word in ("nominal", "noise", "Observer-free", "Classical", "u (N)"))
+    with pytest.raises(smc.ScenarioError, match="one law under one condition"):
+        signals([pair[0], pair[0]], tmp_path / "a", ["nominal", "nominal"])
+
+
+def cart_and_pole(**fields) -> smc.Trace:
+    return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields))
+
+
+def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
+    text = words(figure([cart_and_pole()], tmp_path / "a")[0])
+    for name in ("position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"):
+        assert name in text
+    assert "reaction" not in text
+    assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
+    rubbed = words(figure([cart_and_pole(friction=Coulomb(0.01))], tmp_path / "b")[0])
+    assert "reaction (N)" in rubbed
+    assert "reaction on q (N·m)" in rubbed
+
+
+def test_the_band_around_each_joint_is_that_of_its_own_scale():
+    trace = cart_and_pole()
+    shown = rows.rows_of([trace])
+    widths = []
+    for row in shown[:2]:
+        ax = Figure().subplots()
+        panels.target(ax, row.traces)
+        (band,) = ax.collections
+        widths.append(band.get_datalim(ax.transData).height)
+    assert [row.name for row in shown] == ["x", "x", "u", "s"]
+    assert widths == pytest.approx([2 * 0.02, 2 * 0.02 * 0.3])  # the cart starts at 0: 1 m; the pole at 0.3 rad
+
+
+def test_a_film_has_a_chart_of_each_joint():
+    trace = cart_and_pole()
+    parts = charts.shown([trace])
+    assert [(name, group.unit) for name, group, _ in parts] == [("x", "m"), ("x", "rad"), ("u", "m")]
+    np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
+
+
+def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
+    (tmp_path / "arm.xml").write_text("""
+      <mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/><geom size=".1" contype="0"/>
+        <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
+      <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "arm.xml", ["lift", "turn"])
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.5, x0=0.1))
+    text = words(figure([trace], tmp_path / "a")[0])
+    for name in ("position x (m)", "angle x (rad)", "control u (N)", "control u (N·m)"):
+        assert name in text
+    assert "mean" not in text.replace("line: mean over", "")
+    with pytest.raises(smc.ScenarioError, match="u of arm has several units: draw it with"):
+        signals([trace], tmp_path / "b", ["all"])
+
+
+def test_refuses_what_shares_no_axes(pair, tmp_path):
+    with pytest.raises(smc.ScenarioError, match="no traces"):
+        figure([], tmp_path / "a")
+    with pytest.raises(smc.ScenarioError, match="share no axes"):
+        figure([pair[0], runs("van_der_pol", duration=0.1)[0]], tmp_path / "a")
+    with pytest.raises(smc.ScenarioError, match="one string a trace"):
+        figure(pair, tmp_path / "a", labels=["one"])
+    (tmp_path / "file").write_text("")
+    with pytest.raises(smc.ScenarioError, match="cannot write"):
+        figure(pair, tmp_path / "file" / "a")
+
+
+def test_laws_keep_their_colours_and_traces_never_share_one(pair):
+    assert style.colours(pair) == [style.COLOURS[law] for law in LAWS]
+    assert len(set(style.colours(pair * 4))) == 8
+    assert style.law_colour("my_own") == style.law_colour("my_own") in style.OTHERS
+
+
+def test_labels_are_the_laws_names_unless_given(pair):
+    assert style.labels([*pair, pair[0]], None) == ["Observer-free 1", "Classical", "Observer-free 2"]
+    assert style.labels(pair, ["observer_free", "heavy"]) == ["observer_free", "heavy"]  # as they are given
+
+    @smc.law_function
+    def my_law(y, gains, memory):
+        return 0.0, y.e
+
+    own = smc.run(smc.Scenario(plant="duffing", law=my_law, duration=0.01))
+    assert style.labels([own], None) == style.labels([own], ["my_law"]) == ["my_law"]
+
+
+def test_long_and_odd_labels_stay_inside(pair, tmp_path):
+    labels = ["_lambda $6: " + "the law that the paper proposes, " * 3, "x" * 80]
+    svg, _ = figure(pair, tmp_path / "a", labels=labels, title="A long title " * 20)
+    text = words(svg)
+    assert "_lambda $6" in text
+    assert labels[0] not in text
+    assert text.count("…") == 3
+    assert style.cropped("short", 100.0, 11) == "short"
+    assert style.width(style.cropped("x" * 80, 100.0, 11), 11) <= 100.0
+
+
+def test_another_ending_is_refused(pair, tmp_path):
+    with pytest.raises(smc.ScenarioError, match="end the name in"):
+        figure(pair, tmp_path / "a.pdf")
+    with pytest.raises(smc.ScenarioError, match="end the name in"):
+        signals(pair, tmp_path / "a.pdf", ["all", "all"])
+    assert not list(tmp_path.iterdir())
+    assert figure(pair, tmp_path / "lam_0.5")[0].name == "lam_0.5.svg"
+
+
+def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
+    t, y = np.arange(5) * 0.1, np.array([[0.0], [4.0], [2.0], [6.0], [1.0]])
+    e = decimate.windows(t, y, np.array([-0.05, 0.0, 0.25, 0.26, 0.4]))
+    assert e.low.ravel().tolist() == [0.0, 0.0, 2.0, 1.0]
+    assert e.high.ravel().tolist() == [0.0, 4.0, 2.0, 6.0]
+    assert e.mean.ravel().tolist() == [0.0, 2.0, 2.0, 3.0]
+
+
+def test_chattering_is_drawn_as_its_mean_without_teeth():
+    t, rng = np.arange(10_001) * 1e-3, np.random.default_rng(0)
+    switching = np.where(np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0)  # each value held 1 sample, or more
+    drift = np.clip(np.cumsum(rng.normal(size=10_001)), -0.1, 0.1)
+    for u in (np.where(np.arange(10_001) % 2, 6.0, -6.0), np.tile([6.0, 6.0, -6.0, -6.0, 6.0, -6.0], 1667)[:10_001]):
+        mean = decimate.smooth(u, 100)
+        assert np.abs(mean).max() < 0.15  # to the ends
+        assert np.abs(mean[50:-50]).max() < 0.02
+        band = decimate.columns(t, u[:, None], 360)
+        assert len(band.t) <= 360
+        assert (band.low.min(), band.high.max()) == (-6.0, 6.0)
+    assert np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max() < 0.2
+
+
+def test_what_does_not_chatter_is_drawn_as_it_is():
+    t = np.arange(10_001) * 1e-3
+    bang = np.where(t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0)))
+    mean = decimate.smooth(bang, 100)
+    assert (mean[:2000] == bang[:2000]).all()
+    assert np.abs(mean[2002:]).max() < 0.15
+    slow = 6 * np.sign(np.sin(2 * np.pi * 10 * t))  # ten times a second
+    assert (decimate.smooth(slow, 100) == slow).all()
+    x, y = decimate.line(t, slow, 100)
+    assert len(x) <= 2 * decimate.POINTS + 2
+    assert (x[0], x[-1]) == (t[0], t[-1])
+    assert np.abs(np.diff(np.sign(y))).sum() == np.abs(np.diff(np.sign(slow))).sum()
+
+
+def triangle(y: np.ndarray, half: int) -> np.ndarray:
+    """Each mean of y that is whole, with weights 1, 2, ... half, ... 2, 1."""
+    weights = np.convolve(np.ones(half), np.ones(half))
+    return np.convolve(y, weights / weights.sum(), "valid")
+
+
+def switching(lengths) -> np.ndarray:
+    """+-6, each held as long as told."""
+    return np.concatenate([np.full(n, 6.0 if i % 2 else -6.0) for i, n in enumerate(lengths)])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_than_the_window(seed):
+    rng = np.random.default_rng(seed)
+    within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])  # 40: the window
+    u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
+    (part,) = decimate.stretches(u, 40)
+    assert (part.start, part.stop) == (300, 300 + len(within))
+    mean, line = triangle(within, 20), decimate.smooth(u, 40)
+    np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)
+    np.testing.assert_allclose(line[300:319], mean[0])  # no needle where it begins, no dip where it ends
+    np.testing.assert_allclose(line[-319:-300], mean[-1])
+    assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
+
+
+def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
+    u = switching([400, *[1, 2, 2, 1] * 100, 39])
+    line = decimate.smooth(u, 40)
+    assert (line[:400] == -6.0).all()
+    np.testing.assert_allclose(line[-20:], triangle(u, 20)[-1])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_line_is_the_same_read_backwards(seed):
+    rng = np.random.default_rng(seed)
+    u = switching(rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03]))
+    u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
+    np.testing.assert_allclose(decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12)
+
+
+def test_steps_without_chatter_and_swings_slower_than_the_window_are_their_own_lines():
+    t = np.arange(3001) * 1e-3
+    for u in (np.where(t < 1.0, -6.0, 6.0), switching([500, 3, 500, 30, 500]), np.sin(2 * np.pi * 4 * t)):
+        assert (decimate.smooth(u, 40) == u).all()
+
+
+def test_the_line_of_a_late_and_noisy_control_stays_within_its_means():
+    late = {"input_delay": 0.005, "noise": smc.Noise(0.01, 0.05), "duration": 3.0}
+    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law=smc.law("classical", k=6.0, c=8.0), **late))
+    t, u = panels.curve(trace, trace.u[:, 0], "u")
+    assert np.ptp(trace.u[500:]) == 12.0
+    assert np.abs(u[t > 0.5]).max() < 2.0
+
+
+def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
+    chattering = runs(duration=1.5)
+    text = words(figure(chattering, tmp_path / "a")[0])
+    alone = words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
+    assert "band: range of u, s" in text
+    assert "band: range of u" in alone
+    assert "band: range of u, s" not in alone
+    assert "line: mean over 40 ms where it chatters" in text
+    assert "line: mean over 40 ms where it chatters" in alone
+    assert "band:" not in words(figure(pair, tmp_path / "c")[0])
+
+
+# realistic mechanisms
+
+
+def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
+    given = smc.paper.scenario(plant, law).law
+    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 3.0} | parts)))
+
+
+def test_an_overview_of_friction_has_a_panel_of_the_reaction_and_marks_where_it_holds(pair, tmp_path):
+    rubbed = realistic(friction=Coulomb(0.5))
+    text = words(figure([pair[0], rubbed], tmp_path / "a")[0])
+    assert "reaction (N)" in text
+    assert "held by friction for 0.15 s or longer" in text
+    assert "range of u, reaction, s" in text or "band" not in text
+    ideal = words(figure(pair, tmp_path / "b")[0])
+    assert "reaction" not in ideal
+    assert "held by friction" not in ideal
+
+
+def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
+    late = realistic(actuator=smc.Lag(0.05), duration=1.0)
+    text = words(figure([late], tmp_path / "a")[0])
+    assert "delivered (N)" in text
+    assert "reaction" not in text  # nothing rubs or touches
+
+
+def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can_hold_it():
+    rubbed = realistic(friction=Coulomb(0.5))
+    (sample,) = panels.rests(rubbed)
+    place = rubbed.x[sample, 0]
+    assert place == pytest.approx(rubbed.x[-1, 0], abs=1e-9)
+    assert abs(place) > 1e-3  # friction stopped it before the goal
+    assert panels.rests(realistic(friction=smc.Viscous(5.0))) == []
+    assert panels.rests(realistic(friction=Coulomb(0.0))) == []
+
+
+def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
+    hit = realistic(contact="stops", v0=3.0)
+    text = words(figure([hit], tmp_path / "a")[0])
+    assert f"blows up to {np.abs(hit.reaction).max():.3g} N" in text
+    assert "blows" not in words(figure([realistic(friction=Coulomb(0.5))], tmp_path / "b")[0])
+
+
+def test_a_realistic_network_has_the_mean_of_its_reactions(tmp_path):
+    rubbed = realistic(plant="pendulum_network", friction=Coulomb(0.2), duration=1.0)
+    assert "mean reaction (N·m)" in words(figure([rubbed], tmp_path / "a")[0])
+
+
+def test_a_realistic_run_that_fails_at_once_is_drawn(tmp_path):
+    rubbed = realistic(friction=Coulomb(0.5), duration=1.0)
+    for at in (0, 1, 400):
+        figure([broken(rubbed, at)], tmp_path / "a")
+
+
+def test_one_trace_is_drawn_like_a_list_of_one(pair, tmp_path):
+    alone, listed = figure(pair[0], tmp_path / "a"), figure(pair[:1], tmp_path / "b")
+    assert alone[0].read_bytes() == listed[0].read_bytes()
+    assert signals(pair[0], tmp_path / "c", ["all"])[0].stat().st_size
+
+
+@pytest.mark.parametrize("level", [-0.596, 0.0])
+def test_the_close_up_shows_no_round_off(pair, level):
+    """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
+    held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
+    ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
+    for u in (ends, held, np.full_like(held, level)):
+        ax = Figure().subplots()
+        panels.last_samples(ax, [dataclasses.replace(pair[0], u=u)], ["#000000"])
+        low, high = ax.get_ylim()
+        assert high - low >= 0.0199 * np.abs(u).max()
+        assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
+    full = Figure().subplots()
+    panels.last_samples(full, [dataclasses.replace(pair[0], u=np.sign(held - level))], ["#000000"])
+    assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
+
+
+def test_names_of_axes_never_touch(tmp_path, monkeypatch):
+    pages = []
+    monkeypatch.setattr(draw_figure, "_write", lambda page, base: pages.append(page))
+    parts = {"friction": Coulomb(0.05), "actuator": smc.DCMotor(), "duration": 0.2}
+    figure([realistic(plant="pendulum_network", **parts)], tmp_path / "a")
+    figure([realistic(**parts)], tmp_path / "a")
+    figure(runs(duration=0.2), tmp_path / "a")
+    for page in pages:
+        page.draw_without_rendering()
+        left = [ax for ax in page.axes if ax.get_subplotspec().is_first_col() and ax.get_position().x0 < 0.2]
+        spans = [ax.yaxis.label.get_window_extent() for ax in left]
+        assert len(spans) >= 3
+        assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(spans))
+
+
+def test_where_a_joint_is_is_drawn_as_it_is(pair):
+    """x that chatters has no mean for a line: the legend speaks of none."""
+    t, ripple = pair[0].t, 0.01 * np.where(np.arange(len(pair[0].t)) % 2, 1.0, -1.0)
+    x = np.exp(-t / 0.02) + ripple
+    for name in ("x", "spread"):
+        _, y = panels.curve(pair[0], x, name)
+        assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
+    assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9

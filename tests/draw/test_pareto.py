@@ -1,0 +1,89 @@
+"""The figure of Pareto fronts: every law with its staircase and its chosen gains, and no unfair comparison."""
+
+import dataclasses
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import FAILED, Objective
+from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.analysis.tuning.search import tune
+from smc_mujoco.draw import figure
+from smc_mujoco.draw.pareto import REST, pareto
+
+LEAN = Objective(conditions=("nominal",), duration=0.5)
+
+
+@pytest.fixture(scope="module")
+def pair() -> list[Tuned]:
+    return [tune("duffing", law, budget=24, objective=LEAN) for law in ("observer_free", "classical")]
+
+
+@pytest.fixture
+def page(monkeypatch) -> list[Figure]:
+    """The pages that are drawn."""
+    pages, write = [], figure._write
+    monkeypatch.setattr(figure, "_write", lambda page, base: (pages.append(page), write(page, base))[1])
+    return pages
+
+
+def test_writes_svg_and_png_that_name_the_laws_what_they_cost_and_the_axes(pair, tmp_path):
+    svg, png = pareto(pair, tmp_path / "fronts.png")
+    assert [svg.name, png.name] == ["fronts.svg", "fronts.png"]
+    ET.parse(svg)
+    text = " ".join(re.findall(r"<!-- (.*?) -->", svg.read_text()))
+    for words in (
+        "duffing",
+        "Observer-free: J = ",
+        "Classical: J = ",
+        "chosen gains",
+        "tracking",
+        "variation",
+        "(1/s)",
+    ):
+        assert words in text
+    with Image.open(png) as image:
+        assert image.size == (1920, 960)
+    again = pareto(pair, tmp_path / "again")
+    assert [p.read_bytes() for p in again] == [svg.read_bytes(), png.read_bytes()]
+
+
+def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_are_on_it(pair, page, tmp_path):
+    pareto(pair, tmp_path / "fronts")
+    (ax,) = page[0].axes
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    stairs, rings = ax.lines[0:4:2], ax.lines[1:4:2]
+    for tuned, stair, ring in zip(sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True):
+        assert stair.get_drawstyle() == "steps-post"
+        corners = [(float(x), float(y)) for x, y in zip(*stair.get_data(), strict=True)]
+        for one in tuned.finals:
+            reached = [y for x, y in corners if x <= one.tracking]  # the stair's height above what was tried
+            assert one.failed or min(reached) <= max(one.variation, REST)
+        (place,) = zip(*ring.get_data(), strict=True)
+        assert place in corners
+        assert place[0] + 1e-3 * place[1] == pytest.approx(tuned.objective)
+    assert stairs[0].get_marker() != stairs[1].get_marker()
+    assert stairs[0].get_color() != stairs[1].get_color()
+
+
+def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
+    first = pair[0]
+    failed = [dataclasses.replace(one, tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.finals]
+    resting = [dataclasses.replace(one, variation=0.0) for one in pair[1].finals]
+    both = [dataclasses.replace(first, finals=tuple(failed)), dataclasses.replace(pair[1], finals=tuple(resting))]
+    svg, _ = pareto(both, tmp_path / "fronts")
+    assert "Observer-free: every run failed" in svg.read_text()
+    assert page[0].axes[0].lines[0].get_ydata()[0] == REST
+
+
+def test_unfair_comparisons_and_no_tunings_are_refused(pair, tmp_path):
+    for unlike in ([], [pair[0], dataclasses.replace(pair[1], seed=1)]):
+        with pytest.raises(smc.ScenarioError):
+            pareto(unlike, tmp_path / "fronts")
+    with pytest.raises(smc.ScenarioError, match="svg"):
+        pareto(pair, tmp_path / "fronts.pdf")
+    assert list(tmp_path.iterdir()) == []

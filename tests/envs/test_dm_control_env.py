@@ -1,0 +1,355 @@
+"""dm_env environments: their physics are those of smc.run, its own tests pass, laws act, policies control."""
+
+import dataclasses
+import math
+import threading
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from dm_env import StepType, test_utils
+from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, run_of, start
+
+import smc_mujoco as smc
+from smc_mujoco.common import extras, gl
+from smc_mujoco.envs import tasks
+from smc_mujoco.envs.core import setting
+from smc_mujoco.simulation import callback
+
+suite = dm_control_suite()
+
+import dm_control.suite  # noqa: E402
+from dm_control.rl import control  # noqa: E402
+from dm_control.utils import rewards  # noqa: E402
+
+# the physics are the benchmark's
+
+
+@pytest.mark.parametrize(("plant", "task"), EVERY)
+def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
+    law = smc.law("hierarchical") if "hierarchical" in smc.laws(plant) else LAW
+    changes = {"duration": 0.3, "x0": start(plant, task)}
+    environment = suite.load(plant, task, changes=changes)
+    trace = smc.run(run_of(environment.task.setting, law))
+    states = driven_by_dm(environment, smc.agent(law, environment))
+    assert np.abs(states - columns(trace)).max() < 1e-9
+    assert np.abs(states[:, : trace.x.shape[1]] - start(plant, task)).max() > 1e-4  # it moved
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"control_period": 0.01, "x0": 0.4, "v0": -0.2},
+        {"friction": smc.Coulomb(0.1), "actuator": smc.Lag(0.02)},
+        {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "x0": 0.3},
+        {"mismatch": {"mass": 1.3}, "u_max": 2.0},
+        {"control_period": 0.01, "actuator": (smc.Lag(0.02), smc.DCMotor(), smc.Backlash(0.01))},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_what_makes_a_mechanism_real_is_in_the_environment_too(changes):
+    changes = {"duration": 0.3, "x0": 0.5} | changes
+    environment = suite.load("inverted_pendulum", changes=changes)
+    trace, act = smc.run(run_of(environment.task.setting, LAW)), smc.agent(LAW, environment)
+    for _ in range(2):  # nothing is left of the episode before
+        assert np.abs(driven_by_dm(environment, act) - columns(trace)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("law", "fields"),
+    [
+        ("adaptive", {}),
+        ("super_twisting", {"model": "nominal"}),
+        ("classical", {"surface": "terminal"}),
+        ("quasi_continuous", {"velocity": "levant"}),
+    ],
+)
+def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, fields):
+    environment = suite.load("duffing", "track", changes={"duration": 0.2, "x0": 0.7})
+    trace = smc.run(run_of(environment.task.setting, smc.law(law), fields))
+    act = smc.agent(law, environment, **fields)
+    first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
+    assert np.abs(first - columns(trace)).max() < 1e-9
+    assert np.array_equal(first, second)  # nothing is left of the episode before
+
+
+def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
+    """What the other channel was told last is part of the model, and must not come from the episode before."""
+    links = {joint: smc.Channel(motor=True) for joint in ("shoulder", "elbow")}
+    arm = smc.plant_from(Path(dm_control.suite.__file__).parent / "acrobot.xml", links)
+    environment = suite.load(arm, changes={"x0": [1.0, 0.5], "duration": 0.05, "u_max": 500.0})
+    act = smc.agent(smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal")
+    first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
+    assert np.array_equal(first, second)
+
+
+def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
+    path = tmp_path / "pair.xml"
+    path.write_text("""
+<mujoco><worldbody>
+  <body name="a"><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 -1" mass="1"/></body>
+  <body name="b" pos="2 0 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 -1" mass="1"/></body>
+</worldbody><actuator><motor joint="a"/></actuator><keyframe><key name="up" qpos="0.2 3"/></keyframe></mujoco>""")
+    environment = suite.load(smc.plant_from(path, ["a"], keyframe="up"), changes={"u_max": 1.0})
+    environment.reset()
+    assert environment.physics.data.qpos[1] == 3.0  # a joint without a channel, where the keyframe has it
+
+
+def test_what_makes_an_environment_waits_for_other_threads_runs_in_the_plain_loop():
+    """Which would go on without their laws: MuJoCo's callback, which it takes away for a moment, is everybody's."""
+    made = threading.Event()
+
+    def other():
+        suite.load("duffing")
+        made.set()
+
+    thread = threading.Thread(target=other)
+    with callback.installed(lambda model, data: None):
+        thread.start()
+        assert not made.wait(0.3)
+        assert mujoco.get_mjcb_control() is not None
+    thread.join(30.0)
+    assert made.is_set()
+
+
+# rewards, observations, ends
+
+
+def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
+    found, random = setting("duffing"), np.random.default_rng(0)
+    for x, v in random.normal(scale=(1.0, 5.0), size=(20, 2)):
+        calm = rewards.tolerance(v, margin=5.0)
+        expected = rewards.tolerance(x, margin=1.0) * (4.0 + calm) / 5.0
+        assert found.reward(np.array([x]), np.array([v]), 0) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("plant", "task", "goal", "miss"),
+    [
+        ("duffing", "regulate", [0.0], [1.0]),
+        ("inverted_pendulum", "swing_up", [2.0 * np.pi], [np.pi]),
+        ("cart_pole", "swing_up", [0.0, 0.0], [0.0, np.pi]),
+        ("cart_pole", "swing_up", [0.0, 0.0], [1.5, 0.0]),
+        ("pendulum_network", "synchronise", [0.7] * 5, [0.7, 0.7, 0.7, 0.7, -1.0]),
+    ],
+)
+def test_the_reward_is_one_at_the_goal_and_small_far_from_it(plant, task, goal, miss):
+    found = setting(plant, task)
+    still = np.zeros(len(goal))
+    assert found.reward(np.array(goal), still, 0) == pytest.approx(1.0)
+    assert found.reward(np.array(miss), still, 0) < 0.35
+    assert found.reward(np.array(goal), still + np.arange(len(goal)) + 50.0, 0) < 0.999 or task == "synchronise"
+
+
+def test_tracking_is_rewarded_where_the_plant_follows():
+    found = setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
+    r, dr, _ = found.reference(300)
+    assert (r, dr) == pytest.approx((0.5 * np.sin(0.6), np.cos(0.6)))
+    assert found.reward(np.array([r, 0.0]), np.array([dr, 0.0]), 300) == pytest.approx(1.0)
+    assert found.reward(np.array([r, r]), np.array([dr, dr]), 300) < 0.95  # the pole is to stand
+    assert found.observe(np.zeros(2), np.zeros(2), 300).shape == (7,)
+
+
+def test_tasks_are_for_the_plants_that_have_them():
+    assert tasks.tasks("overhead_crane") == ["regulate", "track"]  # its load hangs: nothing to swing up
+    assert tasks.tasks("cart_pole") == ["regulate", "track", "swing_up"]
+    assert "swing_up" not in tasks.tasks("pendulum_network")
+    assert {"swing_up", "synchronise"} <= set(tasks.tasks("inverted_pendulum_network"))
+
+
+def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
+    environment = suite.load("inverted_pendulum", "swing_up", random=0)
+    last = driven_by_dm(environment, lambda timestep: np.array([1.5]))[:, 0]
+    assert np.abs(last - np.pi).max() < 2.0
+    act = smc.agent(smc.law("swing_up"), environment)
+    assert np.cos(driven_by_dm(environment, act)[-1, 0]) > 0.999
+
+
+def test_an_episode_ends_where_the_finite_world_does():
+    environment = suite.load("inverted_pendulum", changes={"x0": 9e5, "v0": 9e5})
+    environment.reset()
+    timestep = environment.step(np.zeros(1))
+    assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
+
+
+def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_begins():
+    environment = suite.load("duffing", changes={"u_max": 1e9, "control_period": 0.1, "x0": 1e5})
+    environment.reset()
+    timestep = environment.step([1.0])
+    assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
+    assert np.abs(flat(timestep)).max() <= 1e6  # numbers: 0 times NaN is no target
+    assert environment.step([0.0]).first()
+
+
+def test_who_writes_into_an_observation_changes_nothing():
+    environment = suite.load("duffing", "track", random=0)
+    for _ in range(2):
+        environment.reset()
+        timestep = environment.step([0.0])
+        assert timestep.observation["reference"][1] == pytest.approx(0.5)
+        for value in timestep.observation.values():
+            value[:] = 99.0
+
+
+@pytest.mark.parametrize("action", [[5.0], [1e100]])
+def test_an_action_beyond_its_bounds_saturates(action):
+    environment = suite.load("duffing", changes={"x0": 1.0})
+    states = []
+    for given in (action, [1.0]):
+        environment.reset()
+        states.append(flat(environment.step(given)))
+    assert np.array_equal(*states)
+
+
+def test_seeds_reproduce_starts_and_different_seeds_differ():
+    starts = [suite.load("cart_pole", "swing_up", random=seed).reset().observation["position"] for seed in (3, 3, 4)]
+    assert np.array_equal(starts[0], starts[1])
+    assert not np.array_equal(starts[0], starts[2])
+
+
+def flat(timestep):
+    """An observation as one array, as gymnasium has it."""
+    return np.concatenate([*timestep.observation.values()])
+
+
+# what dm_control and dm_env have
+
+
+class Checked(test_utils.EnvironmentTestMixin):
+    """dm_env's own tests; `make_action_sequence` goes beyond an episode's end."""
+
+    plant, task = "duffing", "regulate"
+
+    def make_object_under_test(self, **unused_kwargs):
+        return suite.load(self.plant, self.task, random=0, changes={"duration": 0.015})
+
+
+def checker(plant, task):
+    from absl.testing import absltest
+
+    made = type("Case", (Checked, absltest.TestCase), {"plant": plant, "task": task})
+    return [made(name) for name in absltest.TestLoader().getTestCaseNames(made)]
+
+
+@pytest.mark.parametrize(("plant", "task"), EVERY)
+def test_dm_env_s_own_tests_pass(plant, task):
+    cases = checker(plant, task)
+    assert len(cases) >= 4
+    for case in cases:
+        case.debug()  # raises what fails
+
+
+def test_it_runs_in_the_runtime_of_dm_control_s_viewer():
+    from dm_control.viewer import runtime
+
+    environment = suite.load("duffing", random=0)
+    shown, faults = runtime.Runtime(environment, smc.agent(LAW, environment)), []
+    shown.on_error += faults.append
+    for _ in range(3):
+        shown.tick(0.02, paused=False)
+    assert not faults
+    assert environment.physics.time() > 0.01
+
+
+@pytest.mark.skipif(bool(gl.missing()), reason=str(gl.missing()))
+def test_it_is_seen():
+    environment = suite.load("duffing", random=0)
+    environment.reset()
+    assert environment.physics.render(48, 64, camera_id="look").std() > 5.0
+
+
+def test_environments_are_dm_control_s_own():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        environment = suite.load("duffing", flat_observation=True, random=np.random.RandomState(0))
+    assert type(environment) is control.Environment
+    timestep = environment.reset()
+    assert timestep.observation["observations"].shape == (2,)
+    assert smc.agent("classical", environment)(timestep).shape == (1,)
+
+
+def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
+    assert {("duffing", "regulate"), ("cart_pole", "swing_up")} < {*suite.ALL_TASKS} == {*EVERY}
+    ours = {"changes": {"duration": 0.2, "control_period": 0.02}, "random": 3, "flat_observation": True}
+    theirs = {"random": 3, "time_limit": 0.2}, {"control_timestep": 0.02, "flat_observation": True}
+    one, other = suite.load("duffing", "track", *theirs), suite.load("duffing", "track", **ours)
+    assert one.control_timestep() == 0.02
+    for k in range(12):
+        first, second = one.step([0.5]), other.step([0.5])
+        assert first.observation["observations"].tolist() == second.observation["observations"].tolist()
+        assert (first.last(), second.last()) == (k == 10, k == 10)
+    both = suite.load("duffing", "track", {"time_limit": 0.2}, changes={"u_max": 2.0, "duration": 3.0})
+    scenario = both.task.setting.scenario
+    assert (scenario.duration, scenario.u_max) == (0.2, 2.0)
+
+
+def test_a_mujoco_that_dm_control_does_not_know_is_one_sentence(monkeypatch):
+    def unknown(model):
+        raise AttributeError("'MjModel' object has no attribute 'flex_vertedge'")
+
+    monkeypatch.setattr(suite.PlantPhysics, "from_model", unknown)
+    with pytest.raises(
+        extras.MissingPackageError, match=r"dm_control \S+ does not know MuJoCo \d\S+ \(.*flex"
+    ) as raised:
+        suite.load("duffing")
+    assert "smc-mujoco[dm]" in str(raised.value) or "take Python 3.12" in str(raised.value)
+
+
+# errors
+
+
+@dataclasses.dataclass(frozen=True)
+class Lost(smc.Signal):
+    """A reference that is NaN from some time on."""
+
+    after: float
+
+    @staticmethod
+    def value(t, p):
+        return (math.nan if t > p.after else 0.0), 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: suite.load("dufing"), "did you mean 'duffing'"),
+        (lambda: suite.load("duffing", "swing_up"), "task 'swing_up' is not for duffing: choose from regulate, track"),
+        (lambda: suite.load("duffing", "regulat"), "did you mean 'regulate'"),
+        (lambda: suite.load(3), "give smc.plant"),
+        (lambda: suite.load("duffing", random="a"), "random is 'a'"),
+        (lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}), "unknown field of an environment"),
+        (lambda: suite.load("duffing", changes={"u_max": np.inf}), "u_max is inf"),
+        (lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}), "take 'track'"),
+        (lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}), "finite number at t = 1.001 s"),
+        (lambda: suite.load("duffing", changes=3), "changes is 3"),
+        (lambda: suite.load("duffing", "track", {"time_limit": 1.0}, changes=3), "changes is 3"),
+        (lambda: suite.load("duffing", "track", 3), "task_kwargs is 3: give a mapping of random, time_limit"),
+        (lambda: suite.load("duffing", "track", {"randon": 1}), "in task_kwargs 'randon': did you mean 'random'"),
+        (lambda: suite.load("duffing", "track", None, {"n_sub_steps": 1}), "in environment_kwargs 'n_sub_steps'"),
+        (lambda: suite.load("duffing", "track", {"time_limit": -1.0}), "duration is -1"),
+        (lambda: suite.load("duffing").task.setting.command([np.inf]), "action is \\[inf\\]: give finite numbers"),
+        (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
+        (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),
+        (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.envs.dm_control_env"),
+        (lambda: smc.agent("clasical", suite.load("duffing")), "did you mean 'classical'"),
+    ],
+)
+def test_bad_input_is_one_sentence(make, words):
+    with pytest.raises(smc.ScenarioError, match=words) as raised:
+        make()
+    assert "\n" not in str(raised.value)
+
+
+def test_an_agent_whose_law_fails_says_so():
+    @smc.law_function
+    def broken(y, gains, memory):
+        return 1.0 / (y.t - 0.001), 0.0
+
+    environment = suite.load("duffing")
+    timestep = environment.reset()
+    act = smc.agent(broken, environment)
+    timestep = environment.step(act(timestep))
+    with pytest.raises(smc.ScenarioError, match=r"law 'broken' raised ZeroDivisionError .* at t = 0.001 s"):
+        act(timestep)

@@ -1,0 +1,401 @@
+"""gymnasium environments, single and in batches: the physics of smc.run, its own checkers pass, ids are found."""
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from helpers.episodes import EVERY, LAW, SHORT, columns, driven_by_gym, run_of, start
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.envs import registration
+
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+
+from mujoco.batch import Batch, SimulationError  # noqa: E402
+
+from smc_mujoco.envs.gymnasium_env import PlantEnv  # noqa: E402
+from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
+
+# the physics are the benchmark's
+
+
+@pytest.mark.parametrize(("plant", "task"), EVERY)
+def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
+    law = smc.law("hierarchical") if "hierarchical" in smc.laws(plant) else LAW
+    single = PlantEnv(plant, task, {"duration": 0.2, "x0": start(plant, task)})
+    trace = smc.run(run_of(single.setting, law))
+    assert np.abs(driven_by_gym(single, smc.agent(law, single)) - columns(trace)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("plant", "task"), EVERY)
+def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
+    many, random = BatchEnv(plant, 3, task, SHORT), np.random.default_rng(0)
+    singles = [PlantEnv(plant, task, SHORT) for _ in range(3)]
+    observations, _ = many.reset(seed=5)
+    assert np.array_equal(observations, [e.reset(seed=5 + i)[0] for i, e in enumerate(singles)])
+    truncated = np.zeros(3, bool)
+    for _ in range(50):
+        u = random.uniform(-1.5, 1.5, many.action_space.shape)
+        o, r, terminated, truncated, _ = many.step(u)
+        expected = [e.step(one) for e, one in zip(singles, u, strict=True)]
+        assert np.abs(o - [e[0] for e in expected]).max() < 1e-12
+        assert np.abs(r - [e[1] for e in expected]).max() < 1e-12
+        assert [*zip(terminated, truncated, strict=True)] == [e[2:4] for e in expected]
+    assert truncated.all()
+
+
+@pytest.mark.parametrize("drives", [(smc.DCMotor(),), (smc.Lag(0.01), smc.Lag(0.02))], ids=["motor", "two lags"])
+def test_friction_and_drives_hold_in_a_batch_too(drives):
+    changes = {"friction": smc.Coulomb(0.1), "actuator": (*drives, smc.Backlash(0.01)), "duration": 0.1}
+    many, single = BatchEnv("inverted_pendulum", 2, changes=changes), PlantEnv("inverted_pendulum", changes=changes)
+    for _ in range(2):  # nothing is left of the episode before
+        many.reset(seed=0)
+        single.reset(seed=0)
+        for _ in range(100):
+            o, *_ = many.step([[1.0], [0.0]])
+            assert np.abs(o[0] - single.step([1.0])[0]).max() < 1e-12
+
+
+class Giving(Batch):
+    """A Batch in which MuJoCo raises at the third call in the last simulation, which `asked` shows to be left alone."""
+
+    asked = ()
+
+    def step(self, ids=None, nstep=1):  # pyright: ignore[reportIncompatibleMethodOverride]
+        self.asked = (*self.asked, list(range(self.nsim)) if ids is None else list(ids))
+        super().step(ids, nstep=nstep)
+        if len(self.asked) == 3:
+            raise SimulationError(np.array([self.nsim - 1]), "gave up")
+
+
+def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypatch):
+    changes = {"actuator": (smc.Lag(0.01), smc.Lag(0.02)), "duration": 0.1, "control_period": 0.05}
+    monkeypatch.setattr("smc_mujoco.envs.vector_env.Batch", Giving)
+    many, single = BatchEnv("cart_pole", 2, changes=changes), PlantEnv("cart_pole", changes=changes)
+    many.reset(seed=0)
+    single.reset(seed=0)
+    o, _, terminated, *_ = many.step([[0.5], [0.5]])
+    assert terminated.tolist() == [False, True]
+    assert np.abs(o[0] - single.step([0.5])[0]).max() < 1e-12
+    assert many.batch.asked == ([0, 1],) * 3 + ([0],) * 197  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_start_from_options_is_the_start_that_the_scenario_sets():
+    """The rotor behind a backlash starts with its joint."""
+    loose = {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "duration": 0.1}
+    one, other = (PlantEnv("inverted_pendulum", changes=loose | x) for x in ({}, {"x0": 0.3, "v0": 0.4}))
+    assert np.array_equal(one.reset(seed=0, options={"x0": 0.3, "v0": 0.4})[0], other.reset(seed=0)[0])
+    assert np.array_equal([one.step([0.5])[0] for _ in range(100)], [other.step([0.5])[0] for _ in range(100)])
+
+
+@pytest.mark.parametrize(
+    ("plant", "task", "middle", "most"),
+    [
+        ("duffing", "regulate", [0.0], [1.5]),
+        ("cart_pole", "swing_up", [0.0, np.pi], [0.0, 0.1]),
+        ("inverted_pendulum_network", "synchronise", [0.0] * 5, [0.8] * 5),
+    ],
+)
+def test_episodes_start_all_over_the_task_s_own_range(plant, task, middle, most):
+    starts = BatchEnv(plant, 200, task).reset(seed=0)[0][:, : len(most)]
+    reach = np.abs(starts - middle).max(axis=0)
+    assert np.all(reach <= most)
+    assert np.all(reach >= 0.95 * np.array(most))
+
+
+FLOOR = """
+<mujoco><worldbody>
+  <geom type="plane" size="5 5 .1"/>
+  <body pos="0 0 .5"><joint name="a" axis="0 1 0" damping=".1"/>
+    <geom type="capsule" fromto="0 0 0 .6 0 0" size=".03" mass="1"/>
+    <body pos=".6 0 0"><geom size=".05" mass=".2"/></body>
+  </body>
+</worldbody><actuator><motor joint="a"/></actuator></mujoco>"""
+
+
+def test_a_model_of_one_s_own_keeps_its_floor_in_a_batch(tmp_path):
+    (tmp_path / "arm.xml").write_text(FLOOR)
+    arm, changes = smc.plant_from(tmp_path / "arm.xml", ["a"]), {"x0": 0.6, "u_max": 5.0}
+    many, single = BatchEnv(arm, 2, changes=changes), PlantEnv(arm, changes=changes)
+    many.reset(seed=0)
+    single.reset(seed=0)
+    for _ in range(500):
+        assert np.abs(many.step(np.zeros((2, 1)))[0] - single.step([0.0])[0]).max() < 1e-12
+    assert 0.8 < single.data.qpos[0] < 0.9  # it lies on the floor
+
+
+def resets(mode):
+    """gymnasium's SyncVectorEnv of single environments, and a BatchEnv, that reset in the same way."""
+    changes = {"duration": 0.01}
+    theirs = gymnasium.vector.SyncVectorEnv([lambda: PlantEnv("duffing", "track", changes)] * 3, autoreset_mode=mode)
+    return theirs, BatchEnv("duffing", 3, "track", changes, autoreset_mode=mode)
+
+
+def same(theirs, ours):
+    """Whether two answers of a step or a reset agree, infos and all."""
+    *values, infos = theirs
+    *found, told = ours
+    for a, b in zip(values, found, strict=True):
+        np.testing.assert_allclose(b, a, atol=1e-12)
+        assert a.dtype == b.dtype
+    for i in np.flatnonzero(infos.get("_final_obs", [])):
+        np.testing.assert_allclose(told["final_obs"][i], infos["final_obs"][i], atol=1e-12)
+    np.testing.assert_equal(told | {"final_obs": None}, infos | {"final_obs": None})
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_a_batch_resets_as_gymnasium_s_own_vector_does(mode):
+    theirs, ours = resets(gymnasium.vector.AutoresetMode(mode))
+    assert ours.metadata["autoreset_mode"] is theirs.metadata["autoreset_mode"]
+    same(theirs.reset(seed=[3, 4, 5]), ours.reset(seed=[3, 4, 5]))
+    random, over, ends = np.random.default_rng(0), np.zeros(3, bool), 0
+    for k in range(45):
+        if k == 4 or (mode == "Disabled" and over.any()):  # a part, and those that are over
+            which = over if k != 4 else np.array([False, True, False])
+            options = {"reset_mask": which, "x0": 0.25}
+            same(theirs.reset(seed=k, options=dict(options)), ours.reset(seed=k, options=options))
+        u = random.uniform(-1.0, 1.0, (3, 1))
+        answer = ours.step(u)
+        same(theirs.step(u), answer)
+        over = answer[2] | answer[3]
+        ends += over.sum()
+    assert ends >= 9
+
+
+def test_max_episode_steps_truncates_copies_as_it_does_one():
+    many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, max_episode_steps=5)
+    single = gymnasium.make("smc_mujoco:Duffing-v0", max_episode_steps=5)
+    many.reset(seed=0)
+    single.reset(seed=0)
+    ends = [(many.step(np.zeros((2, 1)))[3].tolist(), single.step(np.zeros(1))[3]) for _ in range(5)]
+    assert ends == 4 * [([False, False], False)] + [([True, True], True)]
+
+
+@pytest.mark.parametrize("named", [{}, {"max_episode_steps": 7}])
+def test_the_spec_tells_how_long_an_episode_is(named):
+    changes = {"duration": 0.2, "control_period": 0.01}
+    one = gymnasium.make("smc_mujoco:Duffing-v0", changes=changes, **named)
+    many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, changes=changes, **named)
+    again = gymnasium.make(one.spec)
+    for environment in (one, many, again):
+        assert environment.spec.max_episode_steps == named.get("max_episode_steps", 20)
+        environment.reset(seed=0)
+        action = environment.action_space.sample()
+        assert action.dtype == np.float32
+        steps = next(k for k in range(1, 50) if np.any(environment.step(action)[3]))
+        assert steps == environment.spec.max_episode_steps
+    assert gymnasium.spec("Duffing-v0").max_episode_steps is None  # which the duration decides
+    assert PlantEnv("duffing").spec is None
+
+
+def test_a_copy_that_is_over_starts_anew_and_the_others_go_on():
+    many = BatchEnv("duffing", 3, changes={"duration": 0.02})
+    many.reset(seed=0)
+    for _ in range(5):
+        many.step(np.zeros((3, 1)))
+    many.begin(np.array([False, True, False]))
+    for _ in range(14):
+        many.step(np.zeros((3, 1)))
+    _, rewards_, terminated, truncated, _ = many.step(np.zeros((3, 1)))
+    assert truncated.tolist() == [True, False, True]
+    assert (rewards_ > 0.0).all()
+    o, rewards_, terminated, truncated, _ = many.step(np.ones((3, 1)))
+    assert many.samples.tolist() == [0, 16, 0]
+    assert rewards_[0] == rewards_[2] == 0.0 < rewards_[1]  # the step that starts anew gives none
+    assert (o[[0, 2], 1] == 0.0).all()  # nor does it move
+    assert not (terminated | truncated).any()
+
+
+def test_an_episode_ends_where_the_finite_world_does_with_numbers_of_its_space():
+    changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
+    single, many = PlantEnv("inverted_pendulum", changes=changes), BatchEnv("inverted_pendulum", 2, changes=changes)
+    single.reset(seed=0)
+    observation, reward, terminated, *_ = single.step([0.0])
+    assert (terminated, reward) == (True, 0.0)
+    assert single.observation_space.contains(observation)
+    assert single.data.qpos[0] > 1e6
+    many.reset(seed=0)
+    observations, found, terminated, *_ = many.step(np.zeros((2, 1)))
+    assert terminated.all()
+    assert (found == 0.0).all()
+    assert many.observation_space.contains(observations)
+
+
+def test_seeds_reproduce_starts_and_different_seeds_differ():
+    many = BatchEnv("duffing", 4)
+    first, again = many.reset(seed=1)[0], many.reset(seed=1)[0]
+    assert np.array_equal(first, again)
+    assert np.array_equal(many.reset(seed=2)[0][:3], first[1:])  # copy i has seed + i
+    assert np.array_equal(many.reset(seed=[4, 3, 2, 1])[0], first[::-1])
+    assert not np.array_equal(many.reset()[0], many.reset()[0])
+
+
+def test_an_environment_is_copied_and_sent_away_as_it_stands():
+    one = PlantEnv("cart_pole", "swing_up", {"control_period": 0.01})
+    one.reset(seed=0)
+    one.step([0.5])
+    for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        assert np.array_equal(other.step([1.0])[0], copy.deepcopy(one).step([1.0])[0])
+        assert np.array_equal(other.reset()[0], copy.deepcopy(one).reset()[0])  # the generator of starts, too
+
+
+def test_a_reference_beyond_the_finite_world_is_in_the_space_of_observations():
+    one = PlantEnv("duffing", "track", {"reference": smc.Sine(1.0, 5000.0), "duration": 0.01})
+    one.reset(seed=0)
+    observation = one.step([0.0])[0]
+    assert observation[-1] > 1e6
+    assert one.observation_space.contains(observation)
+
+
+# what gymnasium has
+
+
+@pytest.mark.parametrize(("plant", "task"), EVERY)
+def test_gymnasium_s_own_checker_passes(plant, task):
+    from gymnasium.utils.env_checker import check_env
+
+    drawn = "rgb_array" if task == "regulate" and not gl.missing() else None
+    environment = gymnasium.make(f"smc_mujoco:smc/{registration.camel(plant)}-v0", task=task, render_mode=drawn)
+    check_env(environment.unwrapped, skip_render_check=drawn is None)
+
+
+def test_environments_step_in_processes_of_their_own():
+    workers = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="async", changes=SHORT)
+    try:
+        here = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="sync", changes=SHORT)
+        assert np.array_equal(workers.reset(seed=0)[0], here.reset(seed=0)[0])
+        assert np.array_equal(workers.step([[1.0], [0.0]])[0], here.step([[1.0], [0.0]])[0])
+    finally:
+        workers.close()
+
+
+def test_gymnasium_s_benchmarks_run():
+    from gymnasium.utils import performance
+
+    environment = gymnasium.make("smc_mujoco:Duffing-v0", changes=SHORT)
+    assert performance.benchmark_step(environment, target_duration=0.05, seed=0) > 0.0
+    assert performance.benchmark_init(lambda: PlantEnv("duffing"), target_duration=0.05, seed=0) > 0.0
+    if hasattr(performance, "benchmark_vector_step"):
+        many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=3, changes=SHORT)
+        assert performance.benchmark_vector_step(many, target_duration=0.05, seed=0) > 0.0
+
+
+@pytest.mark.skipif(bool(gl.missing()), reason=str(gl.missing()))
+def test_it_is_seen():
+    single = gymnasium.make("smc_mujoco:Duffing-v0", render_mode="rgb_array")
+    single.reset(seed=0)
+    assert single.render().std() > 5.0
+    assert copy.deepcopy(single.unwrapped).render().std() > 5.0  # with a renderer of its own
+    single.close()
+
+
+# how gymnasium finds them
+
+
+def fresh(code, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env=os.environ | environment,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize("order", ["import gymnasium", "import smc_mujoco, gymnasium", "import gymnasium, smc_mujoco"])
+def test_an_id_is_found_whichever_package_is_imported_first(order):
+    code = f"{order}; print(gymnasium.make('smc_mujoco:Duffing-v0').reset(seed=0)[0].shape)"
+    assert fresh(f"import gymnasium, importlib.util; {code}" if "smc" not in order else code) == ["(2,)"]
+
+
+def test_asking_whether_gymnasium_is_there_neither_imports_it_nor_forgets_the_plants():
+    code = """
+import importlib.util, sys
+import smc_mujoco
+print(importlib.util.find_spec("gymnasium") is not None, "gymnasium" in sys.modules)
+import gymnasium
+print("smc/CartPole-v0" in gymnasium.registry, any("smc_mujoco" in type(f).__module__ for f in sys.meta_path))
+"""
+    assert fresh(code) == ["True", "False", "True", "False"]
+
+
+def test_every_plant_has_an_id_and_gymnasium_keeps_its_own():
+    ids = {name for name, spec in gymnasium.registry.items() if "smc_mujoco" in str(spec.entry_point)}
+    assert {f"smc/{registration.camel(plant)}-v0" for plant in smc.plants()} <= ids
+    assert {"Duffing-v0", "VanDerPol-v0", "PendulumNetwork-v0", "OverheadCrane-v0"} <= ids
+    assert not {"CartPole-v0", "InvertedPendulum-v0"} & ids
+    assert "gymnasium" in gymnasium.spec("CartPole-v0").entry_point
+
+
+# errors
+
+
+def begun(copies):
+    many = BatchEnv("duffing", copies)
+    many.reset(seed=0)
+    return many
+
+
+def over():
+    one = BatchEnv("duffing", 1, max_episode_steps=1, autoreset_mode="Disabled")
+    one.reset(seed=0)
+    one.step([[0.0]])
+    return one
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="MUJOCO_GL chooses the renderer only there")
+def test_where_nothing_renders_a_picture_is_a_sentence():
+    code = """
+from smc_mujoco.envs.gymnasium_env import PlantEnv
+one = PlantEnv("duffing", render_mode="rgb_array")
+one.reset(seed=0)
+try:
+    one.render()
+except ValueError as error:
+    print(type(error).__name__, "MUJOCO_GL" in str(error))
+"""
+    assert fresh(code, MUJOCO_GL="disabled") == ["ScenarioError", "True"]
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: PlantEnv("duffing", render_mode="human"), "render_mode is 'human'"),
+        (lambda: PlantEnv("duffing").reset(options={"x1": 0.0}), "choose from v0, x0"),
+        (lambda: PlantEnv("duffing").reset(options={"x0": [0.0, 1.0]}), "x0 has 2 values for 1 channels"),
+        (lambda: PlantEnv("duffing").step([0.0, 0.0]), r"of shape \(1,\)"),
+        (lambda: PlantEnv("duffing").step([np.nan]), "action is \\[nan\\]"),
+        (lambda: PlantEnv("duffing").step([-np.inf]), "action is \\[-inf\\]: give finite numbers"),
+        (lambda: PlantEnv("duffing").step("left"), "action is 'left'"),
+        (lambda: PlantEnv("duffing").reset(options=3), "options is 3: give a mapping"),
+        (lambda: begun(2).step([[0.0], [np.inf]]), r"action is \[inf\] for copy 1: give finite numbers"),
+        (lambda: begun(2).step([0.0, 0.0]), r"of shape \(2, 1\)"),
+        (lambda: begun(2).reset(options={"reset_mask": [True, False]}), "reset_mask is .* give an array of 2 bools"),
+        (lambda: begun(2).reset(options={"reset_mask": np.zeros(2, bool)}), "one of them True"),
+        (lambda: BatchEnv("duffing", 1).reset(options={"reset_mask": np.ones(1, bool)}), "call reset without it"),
+        (lambda: BatchEnv("duffing", 2, autoreset_mode="never"), "autoreset_mode is 'never': choose from 'NextStep'"),
+        (lambda: BatchEnv("duffing", 2, render_mode="rgb_array"), "copies are not drawn"),
+        (lambda: BatchEnv("duffing", 2, max_episode_steps=0), "max_episode_steps is 0"),
+        (lambda: BatchEnv("duffing", 2).reset(seed=1.5), "seed is 1.5: give a whole number"),
+        (lambda: over().step([[0.0]]), "episode of copy 0 is over: reset it"),
+        (lambda: BatchEnv("duffing", 0), "num_envs is 0"),
+        (lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]), "call reset first"),
+        (lambda: BatchEnv("duffing", 2).reset(seed=[1]), "seed has 1 values for 2 copies"),
+        (lambda: BatchEnv("duffing", 2).reset(seed="a"), "seed is 'a'"),
+        (lambda: smc.agent("classical", BatchEnv("duffing", 2)), "give one of smc_mujoco.envs.dm_control_env"),
+        (lambda: smc.agent("clasical", PlantEnv("duffing")), "did you mean 'classical'"),
+        (lambda: smc.agent("classical", PlantEnv("duffing"))(np.zeros(1)), "what the environment returned"),
+    ],
+)
+def test_bad_input_is_one_sentence(make, words):
+    with pytest.raises(smc.ScenarioError, match=words) as raised:
+        make()
+    assert "\n" not in str(raised.value)

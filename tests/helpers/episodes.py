@@ -1,0 +1,68 @@
+"""Episodes of environments, and the runs that they are to be: what the tests of agents share."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.envs import tasks
+from smc_mujoco.envs.core import FIELDS, setting
+
+EVERY = [(plant, task) for plant in smc.plants() for task in tasks.tasks(plant)]
+SHORT = {"duration": 0.05}
+LAW = smc.law("observer_free", lam=6.0, k1=3.076)
+
+
+def start(plant, task):
+    """A start within the task's own, as x0."""
+    return setting(plant, task).draw(np.random.default_rng(7))[0]
+
+
+def dm_control_suite() -> ModuleType:
+    """The module dm_control_env; where dm_control is missing, or does not fit this MuJoCo, what asks is skipped."""
+    try:
+        from smc_mujoco.envs import dm_control_env
+
+        dm_control_env.load("duffing")
+    except ImportError as error:
+        pytest.skip(str(error), allow_module_level=True)
+    return dm_control_env
+
+
+def driven_by_dm(environment, act):
+    """x, v, u of every sample of an episode."""
+    limit = environment.task.setting.scenario.u_max
+    timestep, states = environment.reset(), []
+    while True:
+        u = act(timestep)
+        states.append([*timestep.observation["position"], *timestep.observation["velocity"], *(u * limit)])
+        if timestep.last():
+            return np.array(states)
+        timestep = environment.step(u)
+
+
+def driven_by_gym(environment, act):
+    """The same of a gymnasium environment."""
+    n, limit = environment.setting.scenario.plant.n, environment.setting.scenario.u_max
+    observation, _ = environment.reset(seed=0)
+    states, over = [], False
+    while True:
+        u = act(observation)
+        states.append([*observation[: 2 * n], *(u * limit)])
+        if over:
+            return np.array(states)
+        observation, _, terminated, truncated, _ = environment.step(u)
+        over = terminated or truncated
+
+
+def columns(trace):
+    """x, v, u of every sample of a run."""
+    return np.hstack((trace.x, trace.v, trace.u[:, : trace.scenario.plant.driven]))
+
+
+def run_of(found, law, fields=None):
+    """The scenario of a setting under a law."""
+    own = {name: getattr(found.scenario, name) for name in (*FIELDS, "plant")}
+    own |= {"x0": found.low}  # the tests fix it
+    return smc.Scenario(**own, law=law, **(fields or {}))

@@ -1,0 +1,1121 @@
+"""Models that nobody here wrote become plants: they move as in MuJoCo, laws get f and g, mistakes get a sentence."""
+
+import dataclasses
+import gc
+import importlib.util
+import math
+import pickle
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from helpers.episodes import dm_control_suite, driven_by_dm, run_of
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import linearisation
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.control import design
+from smc_mujoco.control.c import build
+from smc_mujoco.envs import core, tasks
+from smc_mujoco.mechanisms.custom import channels as own_channels
+from smc_mujoco.mechanisms.custom import mjcf
+from smc_mujoco.mechanisms.custom.nominal_model import Believed, prepared
+from smc_mujoco.mechanisms.custom.plant_from import OwnModel
+from smc_mujoco.simulation import consistency
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import reference as plain
+from smc_mujoco.studies import run_key
+from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.scene import slug
+
+TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
+ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")
+LINKS = """
+<mujoco>
+  <default><geom type="capsule" size="0.03" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body name="upper" pos="0 0 1"><joint name="shoulder" axis="0 1 0"/><geom fromto="0 0 0 0 0 -.5" mass="1"/>
+      <body name="lower" pos="0 0 -.5"><joint name="elbow" axis="0.6 0.8 0"/><geom fromto="0 0 0 .1 0 -.4" mass="1"/>
+      </body>
+    </body>
+    {bodies}
+  </worldbody>
+  {rest}
+</mujoco>
+"""
+MOTORS = '<motor name="a" joint="shoulder" gear="-4" ctrlrange="-1 2"/><motor name="b" joint="elbow"/>'
+ACTUATED = f"<actuator>{MOTORS}</actuator>"
+MORE_KEYS = """
+  <actuator><motor joint="shoulder"/></actuator>
+  <keyframe><key name="home" qpos="0.2 -0.5" ctrl="1"/><key ctrl="1"/></keyframe>
+"""
+BALL = '<body name="ball"><joint name="ball" type="ball"/><geom size=".1 .1" mass="1"/></body>'
+
+
+def installed(package: str, path: str) -> Path:
+    """A file of an installed package, which is not imported."""
+    if (found := importlib.util.find_spec(package)) is None or not found.submodule_search_locations:
+        pytest.skip(f"{package} is not installed")
+    return Path(found.submodule_search_locations[0]) / path
+
+
+def suite(name: str) -> Path:
+    return installed("dm_control", f"suite/{name}.xml")
+
+
+def gym(name: str) -> Path:
+    return installed("gymnasium", f"envs/mujoco/assets/{name}.xml")
+
+
+def cartpole() -> smc.Plant:
+    return smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1")})
+
+
+def acrobot() -> smc.Plant:
+    return smc.plant_from(suite("acrobot"), {"elbow": smc.Channel(partner="shoulder")})
+
+
+def both_links() -> smc.Plant:
+    return smc.plant_from(suite("acrobot"), {j: smc.Channel(motor=True) for j in ("shoulder", "elbow")})
+
+
+def reacher() -> smc.Plant:
+    return smc.plant_from(gym("reacher"), ["joint0", "joint1"])
+
+
+def pusher() -> smc.Plant:
+    path = gym("pusher_v5")
+    raw = mujoco.MjModel.from_xml_path(str(path))
+    names = [name for i in range(raw.njnt) if (name := raw.joint(i).name).startswith("r_")]
+    return smc.plant_from(path, dict.fromkeys(names, smc.Channel(motor=True)))
+
+
+def test_every_channel_has_the_unit_of_its_joint():
+    assert (cartpole().units, cartpole().network) == (("m", "rad"), False)
+    assert (acrobot().units, acrobot().unit) == (("rad", "rad"), "rad")
+    assert both_links().network
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """A function that writes an arm and makes a plant of it."""
+
+    def make(channels=("shoulder", "elbow"), rest=ACTUATED, bodies="", **given) -> smc.Plant:
+        path = tmp_path / "arm.xml"
+        path.write_text(LINKS.format(rest=rest, bodies=bodies))
+        return smc.plant_from(path, channels, **given)
+
+    return make
+
+
+def joints_of(plant: smc.Plant, raw: mujoco.MjModel) -> list:
+    """The plant's channels in the model as its file has it."""
+    assert isinstance(plant.build, OwnModel)
+    names = [d.joint for d in plant.build.drives] + [d.partner for d in plant.build.drives if d.partner]
+    return [raw.joint(name) for name in names]
+
+
+def read(plant: smc.Plant) -> mujoco.MjModel:
+    """The model as its file has it."""
+    assert isinstance(plant.build, OwnModel)
+    return mujoco.MjModel.from_xml_path(plant.build.source.path)
+
+
+# it moves as in MuJoCo
+
+FOREIGN = {"cartpole": cartpole, "acrobot": acrobot, "reacher": reacher}
+CTRL = {"cartpole": 0.3, "acrobot": 0.4, "reacher": 0.002}  # of each motor of the file
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
+    plant = FOREIGN[name]()
+    raw = read(plant)
+    data = mujoco.MjData(raw)
+    raw.opt.timestep, raw.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+    raw.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
+
+    @smc.law_function(gains={"u": 0.0})
+    def constant(y, gains, memory):
+        return gains.u, 0.0
+
+    u = CTRL[name] * raw.actuator_gear[0, 0]
+    scenario = smc.Scenario(
+        plant=plant, law=constant(u=u), duration=1.0, u_max=100.0, x0=0.3, integrator="RK4", physics_step=1e-3
+    )
+    trace = smc.run(scenario)
+    joints = joints_of(plant, raw)
+    places = [j.qposadr[0] for j in joints]
+    data.qpos[places], data.ctrl[:] = 0.3, CTRL[name]
+    energies, built = [], plant.load()  # our model's energy at our state, the file's at its own
+    built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
+    for k in range(scenario.samples + 1):
+        np.testing.assert_allclose(trace.x[k], data.qpos[places], atol=1e-11)
+        np.testing.assert_allclose(trace.v[k], data.qvel[[j.dofadr[0] for j in joints]], atol=1e-10)
+        ours = mujoco.MjData(built)
+        ours.qpos[:], ours.qvel[:] = data.qpos, data.qvel
+        ours.qpos[places], ours.qvel[[j.dofadr[0] for j in joints]] = trace.x[k], trace.v[k]
+        mujoco.mj_forward(built, ours)
+        mujoco.mj_forward(raw, data)
+        energies.append((ours.energy.sum(), data.energy.sum()))
+        mujoco.mj_step(raw, data)
+    np.testing.assert_allclose(*np.array(energies).T, atol=1e-10)
+    assert np.ptp(trace.x) > 0.01
+
+
+@pytest.mark.parametrize("name", [*FOREIGN, "pusher"])
+def test_f_and_g_are_the_accelerations_of_the_file(name):
+    plant = (FOREIGN | {"pusher": pusher})[name]()
+    raw = read(plant)
+    raw.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
+    data, values, rng = mujoco.MjData(raw), plant.values({}), np.random.default_rng(0)
+    joints = joints_of(plant, raw)
+    dofs = [j.dofadr[0] for j in joints]
+    for _ in range(20):
+        x, v, u = rng.uniform(-1, 1, (3, plant.n))
+        u[plant.driven :] = 0.0
+        data.qpos[[j.qposadr[0] for j in joints]], data.qvel[dofs] = x, v
+        data.qfrc_applied[:] = 0.0
+        data.qfrc_applied[dofs] = u
+        mujoco.mj_forward(raw, data)
+        for i in range(plant.n):
+            f, g = plant.nominal(x, v, i, values, u)
+            np.testing.assert_allclose(f + g * u[i % plant.driven], data.qacc[dofs[i]], rtol=1e-8, atol=1e-8)
+
+
+# laws get f and g
+
+TRACKING = {
+    "cartpole": (cartpole, 10.0, (0.0, 0.1)),
+    "acrobot": (acrobot, 2.0, (0.0, math.pi)),
+    "both links": (both_links, 1e4, (0.0, 0.0)),
+    "reacher": (reacher, 200.0, (0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", TRACKING)
+def test_computed_torque_tracks_within_a_thousandth(name):
+    make, u_max, x0 = TRACKING[name]
+    plant, rate = make(), 0.2
+    scenario = smc.Scenario(
+        plant=plant,
+        law=TORQUE,
+        model="nominal",
+        reference=smc.Sine(amplitude=0.1, omega=2.0),
+        u_max=u_max,
+        duration=4.0,
+        x0=x0,
+        v0=[rate] * plant.driven + [0.0] * plant.free,
+    )
+    trace = smc.run(scenario)
+    error = np.abs(trace.x - trace.r)[:, : plant.driven].max()
+    assert error < 1e-3
+    blind = smc.run(dataclasses.replace(scenario, model="none"))
+    assert np.abs(blind.x - blind.r)[:, : plant.driven].max() > 10 * error
+
+
+def test_seven_coupled_joints_settle_as_the_error_equation_says():
+    """e'' + 20 e' + 100 e = 0: critically damped, e = (1 + 10 t) e0 exp(-10 t)."""
+    plant = pusher()
+    reference, e0 = smc.Constant(-0.3), 0.1
+    trace = smc.run(
+        smc.Scenario(plant=plant, law=TORQUE, model="nominal", reference=reference, u_max=1e3, duration=1.0, x0=-0.2)
+    )
+    wanted = e0 * (1 + 10 * trace.t) * np.exp(-10 * trace.t)
+    assert np.abs(trace.x + 0.3 - wanted[:, None]).max() < 1e-3
+    assert np.abs(trace.x[-1] + 0.3).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "fields", [{}, {"disturbance": smc.Sine(amplitude=1.0, omega=3.0), "friction": smc.Coulomb(0.1)}]
+)
+def test_the_plain_loop_gives_the_same_bits(arm, fields):
+    law = smc.law("super_twisting")
+    scenario = smc.Scenario(plant=arm(), law=law, model="nominal", duration=0.2, x0=(0.4, -0.3), u_max=20.0, **fields)
+    fast, slow = smc.run(scenario), plain.run(scenario)
+    assert fast.failure is None
+    assert [name for name in ARRAYS if not np.array_equal(getattr(fast, name), getattr(slow, name))] == []
+
+
+def test_threads_change_nothing(arm):
+    base = smc.Scenario(plant=arm(), law=TORQUE, model="nominal", duration=0.2, u_max=20.0)
+    many = [dataclasses.replace(base, x0=(0.1 * i, -0.1 * i), mismatch={"mass": 1.0 + 0.1 * i}) for i in range(6)]
+    for one, two, alone in zip(smc.run(many, threads=1), smc.run(many, threads=4), map(smc.run, many), strict=True):
+        np.testing.assert_array_equal(one.x, two.x)
+        np.testing.assert_array_equal(one.x, alone.x)
+
+
+def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
+    plant = arm()
+    base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    many = [dataclasses.replace(base, x0=(0.1 * i, 0.2), v0=0.5) for i in range(7)]
+    first, _, _, again = smc.run(base), smc.run(many), smc.run(many), smc.run(base)
+    np.testing.assert_array_equal(again.x, first.x)
+    gc.collect()
+    assert isinstance(plant.nominal, Believed)
+    assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
+
+
+def test_what_the_nominal_model_of_a_run_gone_astray_worked_on_does_as_well(arm):
+    plant = arm(bodies=BALL)
+    good = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    bad = dataclasses.replace(good, law=smc.law("computed_torque", kp=1e9, kd=1e9), u_max=math.inf)
+    first, astray, again = smc.run(good), smc.run(bad), smc.run(good)
+    assert astray.failure is not None
+    np.testing.assert_array_equal(again.x, first.x)
+    gc.collect()
+    assert isinstance(plant.nominal, Believed)
+    assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == 1
+
+
+def test_no_room_for_what_a_nominal_model_works_on_is_said_once(arm, monkeypatch):
+    nominal, parameters = (plant := arm()).nominal, frozen(plant.parameters)
+    assert isinstance(nominal, Believed)
+    spare = prepared(nominal, parameters)[3]
+
+    def full(model):
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(mujoco, "MjData", full)
+    with pytest.raises(MemoryError, match="no room"):
+        nominal.native(parameters)
+    gc.collect()  # where a destructor that raises would be heard
+    assert spare == []
+
+
+def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
+    """A constant d in every channel is what the same u does."""
+    plant = arm(rest='<option gravity="0 0 0"/>' + ACTUATED)
+
+    @smc.law_function
+    def one(y, gains, memory):
+        return 1.0, 0.0
+
+    pushed = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, disturbance=smc.Constant(1.0)))
+    driven = smc.run(smc.Scenario(plant=plant, law=one(), duration=0.3))
+    np.testing.assert_allclose(pushed.x, driven.x, atol=1e-12)
+    np.testing.assert_array_equal(pushed.d, 1.0)
+
+
+def test_a_mismatch_is_in_the_true_model_alone(arm):
+    plant = arm()
+    base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=2.0, u_max=50.0, reference=smc.Constant(0.3))
+    right, wrong = smc.run([base, dataclasses.replace(base, mismatch={"mass": 1.3})])
+    assert np.abs(right.x[-1] - 0.3).max() < 1e-5
+    assert np.abs(wrong.x[-1] - 0.3).max() > 1e-3
+    assert plant.parameters["m"] == pytest.approx(2.0)
+
+
+# what is made of the file
+
+
+def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
+    plant = arm()
+    assert isinstance(plant.build, OwnModel)
+    assert plant.limits == (4.0, math.inf)  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
+
+    @smc.law_function
+    def much(y, gains, memory):
+        return 30.0, y.limit
+
+    scenario = smc.Scenario(plant=plant, law=much(), duration=0.1, u_max=50.0)
+    assert scenario.limits == (4.0, 50.0)
+    for trace in smc.run(scenario), plain.run(scenario):
+        for told in trace.u, trace.applied, trace.force[1:]:
+            np.testing.assert_array_equal(told, [[4.0, 30.0]] * len(told))
+        np.testing.assert_array_equal(trace.s, [[4.0, 50.0]] * len(trace.s))  # as the law was told
+        assert smc.score(trace)["max_u"] == 30.0
+    weaker = smc.run(dataclasses.replace(scenario, u_max=3.0))
+    np.testing.assert_array_equal(weaker.u, 3.0)
+
+
+LIMITS = {
+    "ctrlrange": ('<motor joint="elbow" gear="3" ctrlrange="-2 2"/>', "", 6.0),
+    "forcerange": ('<motor joint="elbow" gear="-3" forcerange="-1 2"/>', "", 3.0),
+    "both": ('<motor joint="elbow" gear="3" ctrlrange="-2 2" forcerange="-.5 .5"/>', "", 1.5),
+    "the joint's": ('<motor joint="elbow" ctrlrange="-9 9"/>', 'actuatorfrcrange="-2 1"', 1.0),
+    "no clamp": ('<motor joint="elbow" ctrlrange="-2 2"/>', "", math.inf),
+    "ideal": ('<position joint="elbow" forcerange="-1 1"/>', "", math.inf),
+    "ideal, of the joint": ('<position joint="elbow"/>', 'actuatorfrcrange="-2 2"', 2.0),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
+    motor, joint, limit = LIMITS[name]
+    flag = '<option><flag clampctrl="disable"/></option>' if name == "no clamp" else ""
+    arm(["shoulder"])
+    text = LINKS.format(rest=f"<actuator>{motor}</actuator>{flag}", bodies="").replace(
+        'axis="0.6 0.8 0"', f'axis="0.6 0.8 0" {joint}'
+    )
+    (tmp_path / "arm.xml").write_text(text)
+    plant = smc.plant_from(tmp_path / "arm.xml", {"elbow": smc.Channel(motor=name.startswith("ideal"))})
+    assert plant.limits == ((limit,) if limit < math.inf else ())
+    assert smc.Scenario(plant=plant, law="none").limits == (limit if limit < math.inf else 6.0,)
+    raw = read(plant)
+    data = mujoco.MjData(raw)
+    if not name.startswith("ideal"):  # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
+        forces = []
+        for data.ctrl[0] in (-100.0, 100.0):
+            mujoco.mj_forward(raw, data)
+            forces.append(abs(data.qfrc_actuator[raw.joint("elbow").dofadr[0]]))
+        assert min(forces) == min(limit, 100.0)
+
+
+def test_u_max_is_what_the_strongest_limited_motor_gives_unless_it_is_said(arm):
+    both = arm(rest=ACTUATED.replace('joint="elbow"', 'joint="elbow" ctrlrange="-9 9"'))
+    scenario = smc.Scenario(plant=both, law="none")
+    assert (scenario.u_max, scenario.limits) == (9.0, (4.0, 9.0))
+    assert smc.Scenario(plant=both, law="none", u_max=5.0).limits == (4.0, 5.0)
+    elsewhere = dataclasses.replace(scenario, plant=smc.plant("duffing"), v0=0.0)
+    assert (elsewhere.u_max, elsewhere.limits) == (6.0, (6.0,))
+    assert smc.Scenario(plant=arm(["elbow"]), law="none").u_max == 6.0
+
+
+def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
+    """PID against a load: its integrator stays where u is at the bound, however large u_max is."""
+    rest = '<option gravity="0 0 0"/><actuator><motor joint="elbow" ctrlrange="-1 1"/></actuator>'
+    plant = arm(["elbow"], rest)
+    law = smc.law("pid", kp=4.0, ki=4.0, kd=2.0, tt=0.1)
+    load = smc.Pulse(amplitude=-2.0, time=0.0, width=2.0)
+    base = smc.Scenario(plant=plant, law=law, duration=8.0, disturbance=load)
+    told, large = smc.run([base, dataclasses.replace(base, u_max=100.0)])
+    np.testing.assert_array_equal(told.x, large.x)
+    assert np.abs(large.u).max() == 1.0
+
+
+def test_an_environment_clips_actions_at_the_motors_limits_and_starts_in_the_keyframe(arm):
+    rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
+    found = core.setting(arm(["shoulder"], rest, keyframe="home"), changes={"u_max": 50.0})
+    np.testing.assert_array_equal(found.command([-3.0]), [-4.0])
+    qpos, qvel = np.empty(2), np.empty(2)
+    found.place(qpos, qvel, np.array([0.1]), np.array([0.0]))
+    np.testing.assert_array_equal(qpos, [0.1, -0.5])
+
+
+def test_what_is_no_channel_stays_as_the_model_has_it(arm):
+    servo = '<actuator><motor name="b" joint="elbow"/><position joint="shoulder" kp="500" dampratio="1"/></actuator>'
+    plant = arm(["elbow"], servo, keyframe=None)
+    assert plant.n == 1
+    assert "'shoulder'" in plant.unmodelled
+    held = smc.run(smc.Scenario(plant=plant, law="none", duration=2.0, x0=0.3))
+    loose = smc.run(smc.Scenario(plant=arm(["elbow"]), law="none", duration=2.0, x0=0.3))
+    assert np.abs(held.x - loose.x).max() > 0.05
+
+
+def test_a_keyframe_is_where_runs_start(arm):
+    rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
+    assert arm(rest=rest, keyframe="home").x0 == (0.2, -0.5)
+    assert arm({"elbow": smc.Channel(x0=1.0), "shoulder": None}, rest, keyframe="home").x0 == (1.0, 0.2)
+    trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest, keyframe="home"), law="none", duration=0.1))
+    assert trace.x[0, 0] == -0.5
+    moving = rest.replace('-0.5"', '-0.5" qvel="1 1"').replace(
+        "</keyframe>", '<key name="other" qpos="9 9"/></keyframe>'
+    )
+    driven_otherwise = arm({"elbow": smc.Channel(motor=True)}, MORE_KEYS, keyframe="home")
+    assert smc.run(smc.Scenario(plant=driven_otherwise, law="none", duration=0.1)).failure is None
+    for part in (None, smc.Backlash(0.02)):  # which adds joints
+        scenario = smc.Scenario(plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part)
+        qpos, qvel = assembly.start(model := assembly.model([scenario]), scenario)
+        assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [0.2, -0.5]
+        assert not qvel.any()
+    with pytest.raises(smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"):
+        arm(rest=rest, keyframe="hme")
+
+
+@pytest.mark.parametrize("part", [smc.Lag(0.01), smc.Backlash(0.02), smc.DCMotor(), smc.RateLimit(100.0)])
+def test_parts_fit_an_own_model(arm, part):
+    trace = smc.run(smc.Scenario(plant=arm(), law="super_twisting", actuator=part, duration=0.2, x0=(0.3, 0.2)))
+    assert trace.failure is None
+
+
+def test_includes_and_their_contents_count(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "motors.xml").write_text(f"<mujoco>{ACTUATED}</mujoco>")
+    (tmp_path / "arm.xml").write_text(LINKS.format(rest='<include file="parts/motors.xml"/>', bodies=""))
+    plant = smc.plant_from(tmp_path / "arm.xml", ["elbow"])
+    (tmp_path / "parts" / "motors.xml").write_text(f"<mujoco>{ACTUATED}<!-- other --></mujoco>")
+    with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
+        smc.run(smc.Scenario(plant=plant, law="none", duration=0.01))
+
+
+def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
+    """An attached model has its own meshdir, and a compiler that is included sets that of the whole."""
+    corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
+    faces = [
+        "f 1 2 3",
+        "f 2 3 4",
+        "f 5 6 7",
+        "f 6 7 8",
+        "f 1 2 5",
+        "f 2 5 6",
+        "f 3 4 7",
+        "f 4 7 8",
+        "f 1 3 5",
+        "f 2 4 6",
+    ]
+    body = (
+        '<asset><mesh name="c" file="c.obj"/></asset><worldbody><body name="b"><joint name="j"/>'
+        '<geom type="mesh" mesh="c" mass="1"/></body></worldbody>'
+    )
+    (tmp_path / "sub" / "assets").mkdir(parents=True)
+    (tmp_path / "sub" / "assets" / "c.obj").write_text("\n".join([*corners, *faces]))
+    (tmp_path / "sub" / "child.xml").write_text(f'<mujoco><compiler meshdir="assets"/>{body}</mujoco>')
+    (tmp_path / "attaching.xml").write_text(
+        '<mujoco><asset><model name="m" file="sub/child.xml"/></asset>'
+        '<worldbody><attach model="m" body="b" prefix="left/"/></worldbody></mujoco>'
+    )
+    (tmp_path / "compiler.xml").write_text('<mujoco><compiler meshdir="sub/assets"/></mujoco>')
+    (tmp_path / "including.xml").write_text(f'<mujoco><include file="compiler.xml"/>{body}</mujoco>')
+    motor = smc.Channel(motor=True)
+    plants = {"attaching": {"left/j": motor}, "including": {"j": motor}}
+    built = [smc.plant_from(tmp_path / f"{name}.xml", joints) for name, joints in plants.items()]
+    with (tmp_path / "sub" / "assets" / "c.obj").open("a") as mesh:
+        mesh.write("\n# another")
+    for plant in built:
+        with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
+            plant.spec()
+
+
+def test_the_file_s_own_sensors_are_no_channels(arm):
+    sensors = '<sensor><jointpos joint="elbow"/><jointvel joint="elbow" delay="0.01" nsample="20"/></sensor>'
+    plant = arm(["shoulder"], ACTUATED + sensors)
+    scenario = smc.Scenario(plant=plant, law="classical", duration=0.1, x0=0.3)
+    trace, plainly = smc.run(scenario), smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"])))
+    assert trace.x.shape == (101, 1)
+    np.testing.assert_array_equal(trace.x, plainly.x)
+
+
+@pytest.mark.parametrize("name", ["passive:x", "elbow", "shoulder", "ä b/c"])
+def test_what_a_motor_is_called_does_not_matter(arm, name):
+    plant = arm(rest=f'<actuator><motor name="{name}" joint="shoulder"/><motor joint="elbow"/></actuator>')
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=(0.3, -0.3)))
+    assert trace.failure is None
+    assert trace.u[0, 0] < 0.0 < trace.u[0, 1]
+
+
+def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
+    plant = arm({"elbow": smc.Channel(motor=True)}, ACTUATED + '<option actuatorgroupdisable="0 1 2 3 4 5"/>')
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=0.3))
+    np.testing.assert_array_equal(trace.force[1:, 0], trace.u[:-1, 0])
+
+
+def test_twice_the_mass_is_twice_all_masses_and_inertias_and_no_armature(arm):
+    plant = arm(rest='<default><joint armature="0.1"/></default>' + ACTUATED)
+    raw = read(plant)
+    raw.body_mass[:] *= 2.0
+    raw.body_inertia[:] *= 2.0
+    data = mujoco.MjData(raw)
+    mujoco.mj_setConst(raw, data)
+    raw.opt.timestep, raw.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+    base = smc.Scenario(plant=plant, law="none", duration=0.5, x0=(0.3, -0.3))
+    heavy, light = smc.run([dataclasses.replace(base, mismatch={"mass": 2.0}), base])
+    mujoco.mj_resetData(raw, data)
+    data.qpos[:] = 0.3, -0.3
+    for _ in range(500):
+        mujoco.mj_step(raw, data)
+    np.testing.assert_allclose(heavy.x[-1], data.qpos, atol=1e-12)
+    assert np.abs(heavy.x[-1] - light.x[-1]).max() > 1e-3
+
+
+def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
+    environment = dm_control_suite().load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
+    law = smc.law("observer_free", lam=60.0, k1=3.0)
+    trace = smc.run(run_of(environment.task.setting, law))
+    states = driven_by_dm(environment, smc.agent(law, environment))
+    assert np.abs(states[:, :4] - np.hstack((trace.x, trace.v))).max() < 1e-9
+    assert np.abs(trace.u).max(axis=0).tolist() == [4.0, 30.0]
+
+
+def test_copies_in_one_batch_touch_the_floor_as_the_single_environment_does(tmp_path):
+    pytest.importorskip("gymnasium")
+    from smc_mujoco.envs import gymnasium_env as gym
+    from smc_mujoco.envs import vector_env
+
+    (tmp_path / "falls.xml").write_text("""
+      <mujoco><worldbody><geom type="plane" size="2 2 .1"/><body pos="0 0 .6"><joint name="j" axis="0 1 0"/>
+        <geom type="capsule" size=".03" fromto="0 0 0 .7 0 0" mass="1"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    plant = smc.plant_from(tmp_path / "falls.xml", {"j": smc.Channel(x0=0.1)})
+    single, many = gym.PlantEnv(plant, changes={"x0": 0.1}), vector_env.BatchEnv(plant, 2, changes={"x0": 0.1})
+    single.reset(seed=0)
+    many.reset(seed=0)
+    alone, both = np.empty(2), np.empty((2, 2))
+    for _ in range(1000):
+        alone, *_ = single.step(np.zeros(1))
+        both, *_ = many.step(np.zeros((2, 1)))
+    np.testing.assert_allclose(both, [alone, alone], atol=1e-12)
+    assert abs(alone[1]) < 0.01 < alone[0] < 1.0  # it lies
+
+
+# joints without an actuator
+
+
+def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
+    plant = smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1", partner_x0=0.3)})
+    assert plant.x0 == (0.0, 0.3)
+    scenario = smc.Scenario(plant=plant, law="hierarchical")
+    assert (scenario.model, scenario.u_max) == ("nominal", 10.0)
+    trace = smc.run(scenario)
+    assert np.abs(trace.x[-1]).max() < 1e-5
+    assert "hierarchical" in smc.laws(plant)
+    assert "hierarchical" not in smc.laws(acrobot_alone())
+
+
+def acrobot_alone() -> smc.Plant:
+    return smc.plant_from(suite("acrobot"), {"elbow": None})
+
+
+def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
+    for law in ("hierarchical", "swing_up"):
+        with pytest.raises(smc.ScenarioError, match=rf"law '{law}' is for .* alone, not for arm") as caught:
+            smc.Scenario(plant=arm(), law=law)
+        assert ("give each channel a partner" in str(caught.value)) == (law == "hierarchical")
+    with pytest.raises(
+        smc.ScenarioError, match="acrobot's channel 1 has no actuator, and lqr does not see such a joint"
+    ):
+        design.lqr(acrobot())
+    for of in (design.lqr, linearisation.linear):
+        with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
+            of(arm(["elbow"]))
+
+
+# starts
+
+
+LEAST, MOST = math.radians(-30.0), math.radians(60.0)  # of the elbow
+REFUSED = r"x0 of joint 'elbow' of arm is 1.2, outside its range from -0.523599 to 1.0472: give another x0"
+ELBOW = {"elbow": smc.Channel(partner="shoulder", partner_x0=3.0)}
+
+
+@pytest.fixture
+def bounded(arm, tmp_path):
+    """A function that writes an arm whose elbow has a range, and makes a plant of it."""
+
+    def make(channels=("elbow",), more="", keyframe=None) -> smc.Plant:
+        arm(rest=ACTUATED + more)
+        path = tmp_path / "arm.xml"
+        path.write_text(path.read_text().replace('name="elbow"', 'name="elbow" range="-30 60"'))
+        return smc.plant_from(path, channels, keyframe=keyframe)
+
+    return make
+
+
+def test_a_start_outside_a_joint_s_range_is_refused(bounded):
+    scenario = smc.Scenario(plant=bounded(ELBOW), law="none", x0=(1.0, 3.0))  # the shoulder has no limits
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        dataclasses.replace(scenario, x0=(1.2, 3.0))
+    with pytest.raises(smc.ScenarioError, match=r"x0 of joint 'elbow' of arm is -0.6,"):
+        dataclasses.replace(scenario, x0=-0.6)
+    other = bounded({"shoulder": smc.Channel(partner="elbow")})
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        smc.Scenario(plant=other, law="none", x0=(0.0, 1.2))
+    free = bounded({"elbow": smc.Channel(x0=1.2)}, '<option><flag limit="disable"/></option>')
+    assert smc.Scenario(plant=free, law="none").x0 == (1.2,)
+
+
+def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
+    plant = bounded()
+    for x0 in (MOST + 5e-4, LEAST - 5e-4):
+        assert smc.Scenario(plant=plant, law="none", x0=x0).x0 == (x0,)
+    for x0 in (MOST + 2e-3, LEAST - 2e-3):
+        with pytest.raises(smc.ScenarioError, match="outside its range"):
+            smc.Scenario(plant=plant, law="none", x0=x0)
+
+
+def test_a_start_that_is_asked_for_is_refused_with_the_plant_and_the_model_s_own_with_the_run(bounded):
+    key = '<keyframe><key name="home" qpos="0.2 1.2"/><key name="in" qpos="9 0.1"/></keyframe>'
+    for asked in ({"elbow": {"x0": 1.2}}, {"shoulder": {"partner": "elbow", "partner_x0": 1.2}}):
+        with pytest.raises(smc.ScenarioError, match=REFUSED):
+            bounded(asked)
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        bounded(more=key, keyframe="home")
+    assert bounded(more=key, keyframe="in").x0 == (0.1,)
+    assert bounded({"elbow": {"x0": 1.0}}, key, "home").x0 == (1.0,)
+    own = bounded(more='<default><joint ref="80"/></default>')
+    assert own.x0 == pytest.approx((math.radians(80.0),))
+    with pytest.raises(smc.ScenarioError, match="outside its range"):
+        smc.Scenario(plant=own, law="none")
+    scenario = smc.Scenario(plant=own, law="none", x0=0.0)
+    assert scenario.x0 == (0.0,)
+    assert run_key.condition(scenario) == "nominal"
+
+
+def test_environments_start_where_runs_may(bounded):
+    plant = bounded({"shoulder": smc.Channel(x0=2.0), "elbow": smc.Channel(x0=0.8)})
+    starts = {"regulate": (2.0, 0.8), "track": (2.0, 0.8), "synchronise": (2.0, MOST)}
+    assert list(starts) == tasks.tasks(plant)
+    for task, highest in starts.items():
+        found = core.setting(plant, task)
+        assert found.low.tolist() == [-2.0, LEAST]
+        assert found.high.tolist() == list(highest)
+        for random in map(np.random.default_rng, range(20)):
+            smc.Scenario(plant=plant, law="none", x0=found.draw(random)[0])
+    found, random = core.setting(plant), np.random.default_rng(0)
+    with pytest.raises(smc.ScenarioError, match=REFUSED):
+        found.draw(random, {"x0": (0.0, 1.2)})
+    assert found.draw(random, {"x0": (9.0, 1.0)})[0].tolist() == [9.0, 1.0]
+
+
+# swing-ups
+
+POLE = """
+<mujoco model="pole"><worldbody>
+  <body><joint name="slide" type="slide" axis="1 0 0"/><geom size=".1" mass="1" contype="0"/>
+    <body><joint name="pole" axis="0 1 0" {range}/><geom size=".1" pos="0 0 1" mass="2" contype="0"/></body></body>
+</worldbody>
+<actuator><motor name="s" joint="slide" gear="20" ctrlrange="-1 1"/><motor joint="pole"/></actuator></mujoco>"""
+HANGING = {"": True, 'range="-190 190"': True, 'range="-180 180"': True, 'range="-170 170"': False}
+
+
+@pytest.mark.parametrize("joint", HANGING)
+def test_what_cannot_hang_is_not_asked_to_swing_up(tmp_path, joint):
+    (tmp_path / "pole.xml").write_text(POLE.format(range=joint))
+    plant = smc.plant_from(tmp_path / "pole.xml", {"slide": smc.Channel(partner="pole")})
+    assert ("swing_up" in tasks.tasks(plant)) == HANGING[joint]
+    if HANGING[joint]:
+        found = core.setting(plant, "swing_up")
+        x = found.draw(np.random.default_rng(0))[0]
+        assert abs(smc.Scenario(plant=plant, law="none", x0=x).x0[1] - math.pi) <= 0.1
+        assert found.scenario.u_max == 20.0
+
+
+def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of_its_own(tmp_path):
+    (tmp_path / "pole.xml").write_text(POLE.format(range=""))
+    for order in (("slide", "pole"), ("pole", "slide")):
+        assert tasks.tasks(smc.plant_from(tmp_path / "pole.xml", order)) == ["regulate", "track"]
+    body = '<body pos="0 {y} 0"><joint name="{name}" axis="{axis}"/><geom size=".01" pos="0 0 1" mass="{mass}"/></body>'
+    three = [("light", "0 1 0", 1.0), ("heavy", "0 1 0", 2.0), ("upright", "0 0 1", 1.0)]
+    bodies = [body.format(y=y, name=name, axis=axis, mass=mass) for y, (name, axis, mass) in enumerate(three)]
+    (tmp_path / "three.xml").write_text(f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>")
+    for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
+        plant = smc.plant_from(tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True)))
+        scenario = core.setting(plant, "swing_up").scenario
+        assert scenario.u_max == pytest.approx(0.5 * 2.0 * 9.81)
+
+
+# what was recorded
+
+
+def test_a_recorded_run_is_read_whatever_would_be_refused_today(bounded, tmp_path, monkeypatch):
+    """As versions wrote them that looked at neither ranges nor the names of a mass."""
+    with monkeypatch.context() as older:
+        for module in (consistency, own_channels):
+            older.setattr(module, "within", lambda *a: None)
+        older.setattr(consistency, "check_names", lambda s: None)
+        for name, fields in {"start": {"x0": 1.2}, "names": {"mismatch": {"m": 1.1, "mass": 1.2}}}.items():
+            smc.run(smc.Scenario(plant=bounded(), law="none", duration=0.05, **fields)).save(tmp_path / name)
+        smc.run(smc.Scenario(plant=bounded({"elbow": {"x0": 1.2}}), law="none", duration=0.05)).save(tmp_path / "own")
+    for name, words in {"start": REFUSED, "own": REFUSED, "names": "which are the same parameter of arm"}.items():
+        trace = smc.load(tmp_path / f"{name}.npz")
+        assert trace.x.shape == (51, 1)
+        with pytest.raises(smc.ScenarioError, match=words):
+            dataclasses.replace(trace.scenario, law="classical")
+
+
+def test_conditions_of_a_model_with_motors_have_the_paper_s_names(arm):
+    plant = arm(["shoulder"])
+    assert plant.limits
+    for name in ("nominal", "noise", "delay_5ms"):
+        fields = scenarios.fields(name, plant)
+        assert run_key.condition(smc.Scenario(plant=plant, law="classical", **fields)) == name
+    assert run_key.condition(smc.Scenario(plant=plant, law="classical", u_max=6.0)) == "u_max=6.0"
+
+
+# errors
+
+SERVO = '<actuator><position name="p" joint="shoulder"/></actuator>'
+TWO = f'<actuator>{MOTORS}<motor name="c" joint="elbow"/></actuator>'
+TENDON = (
+    '<tendon><fixed name="t"><joint joint="elbow" coef="1"/></fixed></tendon><actuator><motor tendon="t"/></actuator>'
+)
+WRONG = {
+    "no joint": ({"channels": ["elbwo"]}, "unknown joint of arm.xml 'elbwo': did you mean 'elbow'"),
+    "ball": ({"channels": ["ball"], "bodies": BALL}, "joint 'ball' of arm.xml is a ball joint: give one that is"),
+    "none": ({"rest": ""}, "no actuator of arm.xml drives joint 'shoulder' alone: give smc.Channel"),
+    "tendon": ({"channels": ["elbow"], "rest": TENDON}, "no actuator of arm.xml drives joint 'elbow' alone"),
+    "several": ({"rest": TWO}, "joint 'elbow' of arm.xml has the actuators b, c: name one"),
+    "servo": ({"channels": ["shoulder"], "rest": SERVO}, "actuator 'p' of joint 'shoulder' is a servo.*motor=True"),
+    "wrong actuator": ({"channels": {"elbow": {"actuator": "a"}}}, "'a' of arm.xml does not drive joint 'elbow'"),
+    "unknown actuator": ({"channels": {"elbow": {"actuator": "z"}}}, "unknown actuator of arm.xml 'z'"),
+    "unknown field": ({"channels": {"elbow": {"gear": 2}}}, "unknown field of a Channel 'gear'"),
+    "twice": ({"channels": ["elbow", "elbow"]}, "joint 'elbow' is two channels or partners: name it once"),
+    "empty": ({"channels": []}, "channels is empty"),
+    "text": ({"channels": "elbow"}, "channels is 'elbow': give joints' names"),
+    "number": ({"channels": {"elbow": 3}}, "channel 'elbow' is 3: give smc.Channel"),
+    "partner's x0": ({"channels": {"elbow": {"partner_x0": 1.0}}}, "channel 'elbow' has a partner_x0 and no partner"),
+    "set": ({"channels": {"elbow", "shoulder"}}, "channels is .*: give joints' names in order"),
+    "motor": ({"channels": {"elbow": {"motor": "no"}}}, "motor of channel 'elbow' is 'no': give True or False"),
+    "both": (
+        {"channels": {"elbow": {"motor": True, "actuator": "b"}}},
+        "channel 'elbow' has motor=True and actuator 'b': give one of the two",
+    ),
+    "one way": (
+        {"channels": ["elbow"], "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>'},
+        "actuator 'm' gives joint 'elbow' of arm.xml 0 to 2, and a law pushes both ways: give smc.Channel",
+    ),
+    "off": (
+        {"rest": ACTUATED + '<option actuatorgroupdisable="0"/>'},
+        "actuator 'a' of joint 'shoulder' is in a group that actuatorgroupdisable turns off",
+    ),
+    "rotor": (
+        {
+            "channels": {"rotor:a": smc.Channel(motor=True)},
+            "bodies": '<body><joint name="rotor:a"/><geom size=".1 .1" mass="1"/></body>',
+        },
+        "arm.xml has a joint 'rotor:a', and names that begin with 'rotor:' are smc_mujoco's own: give it another",
+    ),
+    "no keyframe": ({"keyframe": "home"}, "unknown keyframe of arm.xml 'home': none has a name there, so give it one"),
+    "no actuator": (
+        {"channels": {"elbow": {"actuator": "b"}}, "rest": ""},
+        "unknown actuator of arm.xml 'b': none has a name there",
+    ),
+    "x0": ({"channels": {"elbow": {"x0": "a"}}}, "x0 of channel 'elbow' is 'a': give a number"),
+    "name": ({"name": "duffing"}, "name is 'duffing': give one that is none of smc.plants"),
+    "flag": (
+        {"rest": f'{ACTUATED}<option><flag actuation="disable"/></option>'},
+        'arm.xml has <flag actuation="disable"/>',
+    ),
+    "broken": (
+        {"rest": "<actuator>\n<mtor/></actuator>"},
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized element in <mtor>, line 12\): mend the file$",
+    ),
+    "unclosed": (
+        {"rest": "<actuator>\n<motor></actuator>"},
+        r"MuJoCo cannot read \S*arm.xml \(mismatched element <motor>, line 12\): mend the file$",
+    ),
+    "attribute": (
+        {"rest": '<actuator>\n<motor joint="elbow" gaer="1"/></actuator>'},
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized attribute: 'gaer' in <motor>, line 12\): mend the file$",
+    ),
+    "target": (
+        {"rest": '<actuator><motor joint="elbwo"/></actuator>'},
+        r"arm.xml \(unknown transmission target 'elbwo' for actuator id = 0, line 11\): mend the file$",
+    ),
+    "compile": ({"bodies": "<body><joint/></body>"}, "MuJoCo cannot read .*mass and inertia of moving bodies"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_mistake_is_one_sentence(arm, name):
+    given, message = WRONG[name]
+    with pytest.raises(smc.ScenarioError, match=message) as caught:
+        arm(**given)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<foo/>", r"unrecognized element in <foo> in a file that it includes"),
+        ("<foo>", r"mismatched element <foo> in a file that it includes, line 3"),
+    ],
+)
+def test_a_broken_file_that_is_included_is_no_line_of_the_file_that_includes_it(arm, tmp_path, text, words):
+    (tmp_path / "part.xml").write_text(f"<mujoco>\n\n{text}</mujoco>")
+    with pytest.raises(smc.ScenarioError, match=rf"MuJoCo cannot read \S*arm.xml \({words}\): mend the file$"):
+        arm(rest='<include file="part.xml"/>')
+
+
+def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
+    with pytest.raises(smc.ScenarioError, match=r"no model at .*arm.xml: give the path of an MJCF file"):
+        smc.plant_from(tmp_path / "arm.xml", ["elbow"])
+    for path in ("a\0.xml", "a" * 5000, tmp_path):
+        with pytest.raises(smc.ScenarioError, match=r"no model at .*: give the path of an MJCF file"):
+            smc.plant_from(path, ["elbow"])
+    (tmp_path / "bare.xml").write_text("<mujoco/>")
+    with pytest.raises(
+        smc.ScenarioError, match=r"unknown joint of bare.xml 'elbow': none has a name there, so give it"
+    ):
+        smc.plant_from(tmp_path / "bare.xml", ["elbow"])
+    with pytest.raises(smc.ScenarioError, match=r"path is 3: give the path"):
+        smc.plant_from(3, ["elbow"])  # pyright: ignore[reportArgumentType]
+
+
+def test_a_law_gets_no_model_that_there_is_not(arm):
+    plant = arm(["elbow"])
+    with pytest.raises(smc.ScenarioError, match=r"arm has no nominal model: joint 'shoulder' moves with its channels"):
+        smc.Scenario(plant=plant, law=TORQUE, model="nominal")
+    assert smc.run(smc.Scenario(plant=plant, law=TORQUE, duration=0.1)).failure is None
+    tied = '<equality><joint joint1="elbow" joint2="shoulder"/></equality>' + ACTUATED
+    assert "equality" in arm(rest=tied).unmodelled
+    across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
+    assert "a ball joint moves with its channels, and can be none" in arm(rest=across, bodies=BALL).unmodelled
+    slide = '<body><joint type="slide"/><geom size=".1 .1" mass="1"/></body>'
+    assert "a joint without a name moves with" in arm(rest=across, bodies=slide).unmodelled
+    bare = slide.replace("<joint", '<joint name="slide"')
+    assert "there are 1, of driven ones 2," in arm(rest=across, bodies=bare).unmodelled
+    assert "make it a channel, or give a law" in plant.unmodelled
+    assert "make it a partner with smc.Channel(partner='shoulder')" in acrobot_alone().unmodelled
+    wound = '<dcmotor joint="elbow" motorconst="1 1" resistance="1" inductance="0.1 0"/></actuator>'
+    channels = {"shoulder": None, "elbow": smc.Channel(actuator="b")}
+    assert "dcmotor" in arm(channels, rest=ACTUATED.replace("</actuator>", wound)).unmodelled
+
+
+@pytest.mark.parametrize("partner", [None, "hinge", "hinge2"])
+def test_what_no_channels_or_partners_can_mend_is_not_advised(partner):
+    """Two poles on one cart, of which one could be a partner."""
+    plant = smc.plant_from(gym("inverted_double_pendulum"), {"slider": smc.Channel(partner=partner)})
+    assert "there are 2, of driven ones 1, which take one partner each or none: give a law without" in plant.unmodelled
+
+
+def test_a_force_on_a_body_is_refused(arm):
+    with pytest.raises(
+        smc.ScenarioError, match=r"pushes a body, and those of arm, a model of yours, act on its joints"
+    ):
+        smc.Scenario(plant=arm(), law="none", disturbance=smc.Gust(amplitude=1.0, time=0.1, width=0.1))
+
+
+# names
+
+
+@pytest.mark.parametrize("name", ["../../../x", "/x", "..", ".x", "Ä/" * 50])
+def test_a_study_writes_nothing_beside_its_folder_whatever_names_are(arm, tmp_path, name):
+    def law(y, gains, memory):
+        return 0.0, 0.0
+
+    law.__name__ = name
+    scenario = smc.Scenario(plant=arm(name=name), law=smc.law_function(law)(), duration=0.01)
+    outer = tmp_path / "a" / "b" / "c" / "d"
+    smc.study([scenario], outer / "out", traces="all")
+    (file,) = (outer / "out" / "traces").iterdir()
+    assert smc.load(file).scenario.plant.name == name
+    assert not file.name.startswith(".")
+    assert {path.name for path in tmp_path.iterdir()} == {"a", "arm.xml"}
+    assert [path.name for path in outer.iterdir()] == ["out"]
+
+
+def test_names_that_no_table_can_show_are_refused_where_they_are_given(arm):
+    def law(y, gains, memory):
+        return 0.0, 0.0
+
+    run = smc.Scenario(plant="duffing", law="none", duration=0.01)
+    for name, words in {"a" * 400: "400 characters: give at most 100", "a\nb": "printable", "": "printable"}.items():
+        law.__name__ = name
+        given = {
+            "name": lambda name=name: arm(name=name),
+            "name of the law": lambda: smc.law_function(law),
+            "a condition of scene 'x'": lambda name=name: smc.Scene(title="x", conditions={name: {"a": run}}),
+            "a label of condition 'a'": lambda name=name: smc.Scene(title="x", conditions={"a": {name: run}}),
+        }
+        for what, give in given.items():
+            with pytest.raises(smc.ScenarioError, match=rf"^{what}.* is .*{words}"):
+                give()
+
+
+@pytest.mark.parametrize("name", ["a" * 400, "ä" * 61, "\ud800", "..", "a/b\\c:d"])
+def test_part_of_a_file_name_is_short_and_no_path(name):
+    part = slug(name)
+    assert 0 < len(part.encode()) <= 60
+    assert Path(part).name == part
+    assert not part.startswith(".")
+    assert len({slug(name), slug(name + "a"), slug(name + "b")}) == 3
+
+
+# models that harm
+
+HARM = {  # what the model has, and words of the sentence
+    "attaches itself": (
+        '<asset><model name="m" file="arm.xml"/></asset>'
+        '<worldbody><attach model="m" body="upper" prefix="x"/></worldbody>',
+        "arm.xml ends MuJoCo with SIG.*attaches itself: mend the model",
+    ),
+    "slow": (
+        '<size nkey="2000000000"/>',
+        "arm.xml takes MuJoCo more than (3 s to compile|4 GiB of memory): make it sm",
+    ),
+    "large": (
+        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+        "arm.xml .*more than 4 GiB of memory: m",
+    ),
+    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
+    "nan": (
+        '<default><joint damping="nan"/></default>',
+        r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): mend the file",
+    ),
+    "mass": (
+        '<default><geom density="1e300"/></default>'
+        '<worldbody><body name="b"><joint/><geom size=".1 .1"/></body></worldbody>',
+        r"body_inertia of arm.xml is \S*e.29\d at body 'b': give finite numbers of at most 1e.15 in its MJCF",
+    ),
+    "stiffness": ('<default><joint stiffness="1e20"/></default>', "jnt_stiffness of arm.xml is 1e.20 at joint 'shoul"),
+    "text": (
+        '<custom><text name="smc:direct" data="x"/></custom>',
+        "arm.xml has a text 'smc:direct', and names that b",
+    ),
+    "body": ('<worldbody><body name="rotor:elbow"/></worldbody>', "a body 'rotor:elbow', and names that begin with"),
+    "tendon": (
+        '<tendon><fixed name="play:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
+        "arm.xml has a tendon 'play:elbow', and names that begin with 'play:' are smc_mujoco's own: give it another",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    rest, words = HARM[name]
+    with pytest.raises(smc.ScenarioError, match=words) as caught:
+        arm(rest=ACTUATED + rest, timeout=3.0 if name == "slow" else 20.0)
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["arm.xml"]  # and no log of MuJoCo's
+
+
+def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
+    ran, timed = [], build.timed
+    monkeypatch.setattr(build, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k))
+    body = f'<body name="{ran!r}tried"/>'
+    first = arm(bodies=body)
+    assert (arm(bodies=body), len(ran)) == (first, 1)
+    arm(bodies=BALL + body)
+    assert len(ran) == 2
+
+
+def test_a_plugin_that_this_process_alone_may_have_is_left_to_it(arm, tmp_path):
+    rest = ACTUATED + '<extension><plugin plugin="no.such"/></extension>'
+    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): mend the file"):
+        arm(rest=rest)
+    path = tmp_path / "arm.xml"
+    mjcf.tried(mjcf.source(path), 20.0)  # says nothing of it
+
+
+def test_numbers_that_may_be_infinite_are_ranges_alone(arm):
+    rest = '<actuator><motor joint="shoulder" ctrlrange="-inf inf" ctrllimited="true"/></actuator>'
+    assert arm(["shoulder"], rest).limits == ()
+
+
+def test_names_that_refer_to_motors_and_sensors_do_no_harm(arm):
+    named = '<motor name="passive:elbow" joint="shoulder"/><motor joint="shoulder"/><motor name="1" joint="shoulder"/>'
+    rest = f"""<actuator>{named}<motor name="b" joint="elbow"/></actuator>
+      <sensor><jointpos name="x:elbow" joint="shoulder"/></sensor>
+      <custom><tuple name="t"><element objtype="actuator" objname="b"/><element objtype="sensor" objname="x:elbow"/>
+      </tuple></custom>"""
+    parts = {"friction": smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.05), "actuator": smc.Backlash(0.01)}
+    trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest), law="none", duration=0.05, **parts))
+    assert trace.failure is None
+
+
+# models that are no files
+
+CORNERS = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
+FACES = [f"f {a}" for a in ("1 2 3", "2 3 4", "5 6 7", "6 7 8", "1 2 5", "2 5 6", "3 4 7", "4 7 8", "1 3 5", "2 4 6")]
+MESHED = """
+<mujoco model="meshed">
+  <compiler meshdir="meshes"/>
+  <asset><mesh name="c" file="c.obj"/></asset>
+  <worldbody>
+    <body name="b" pos="0.33333333333333331 0 1">
+      <joint name="j" axis="0 1 0" damping="0.12345678901234567"/><geom type="mesh" mesh="c" density="432.10987654321"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="m" joint="j" gear="7.1234567890123"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def meshed(tmp_path):
+    """The file of a model with a mesh, and the mesh's content."""
+    (tmp_path / "meshes").mkdir()
+    content = "\n".join([*CORNERS, *FACES]).encode()
+    (tmp_path / "meshes" / "c.obj").write_bytes(content)
+    (tmp_path / "meshed.xml").write_text(MESHED)
+    return tmp_path / "meshed.xml", content
+
+
+def of_pymjcf(path, content):
+    return pytest.importorskip("dm_control.mjcf").from_path(str(path)), None
+
+
+FORMS = {  # of one model
+    "text": lambda path, content: (MESHED, {"c.obj": content}),
+    "spec": lambda path, content: (mujoco.MjSpec.from_file(str(path)), None),
+    "spec with assets": lambda path, content: (mujoco.MjSpec.from_string(MESHED, assets={"c.obj": content}), None),
+    "pymjcf": of_pymjcf,
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run(meshed, tmp_path, form):
+    path, content = meshed
+    model, assets = FORMS[form](path, content)
+    channels = {"j": smc.Channel(x0=0.3)}
+    plant, from_file = smc.plant_from(model, channels, assets=assets), smc.plant_from(path, channels)
+    assert plant.name == "meshed"
+    assert pickle.loads(pickle.dumps(plant)) == plant
+    fields = {"law": "super_twisting", "duration": 0.2, "actuator": smc.Backlash(0.01), "model": "nominal"}
+    scenario = smc.Scenario(plant=plant, **fields)
+    trace, same = smc.run(scenario), smc.run(smc.Scenario(plant=from_file, **fields))
+    np.testing.assert_allclose(trace.x, same.x, atol=1e-9)
+    assert np.ptp(trace.x) > 0.01
+    path.unlink()
+    (path.parent / "meshes" / "c.obj").unlink()
+    again = smc.load(trace.save(tmp_path / "run.npz"))
+    assert again.scenario == trace.scenario
+    assert run_key.key(again.scenario) == run_key.key(scenario)
+    np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
+    other = MESHED.replace("7.1234567890123", "7.1234567890124")
+    changed = smc.plant_from(other, channels, assets={"c.obj": content})
+    assert run_key.key(dataclasses.replace(scenario, plant=changed)) != run_key.key(scenario)
+
+
+def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
+    spec = mujoco.MjSpec.from_file(str(meshed[0]))
+    plant = smc.plant_from(spec, ["j"])
+    spec.joint("j").damping = [9.0, 0.0, 0.0]
+    assert plant.load().dof_damping[0] == 0.12345678901234567
+    assert plant.limits == smc.plant_from(meshed[0], ["j"]).limits
+    assert smc.plant_from(spec, ["j"]).load().dof_damping[0] == 9.0
+    assert "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()  # for others MuJoCo writes as it did
+
+
+def test_a_text_with_includes_is_read_with_them(tmp_path):
+    text = LINKS.format(rest='<include file="motors.xml"/>', bodies="")
+    plant = smc.plant_from(text, ["elbow"], assets={"motors.xml": f"<mujoco>{ACTUATED}</mujoco>".encode()})
+    assert (plant.name, plant.driven) == ("model", 1)
+    assert smc.run(smc.Scenario(plant=plant, law="none", duration=0.01)).failure is None
+
+
+LOST = {
+    "no file": ((MESHED, None), r"the model names the file 'c.obj', and its text lies in no folder: give assets="),
+    "no bytes": ((MESHED, {"c.obj": "text"}), r"assets is {'c.obj': 'text'}: give names of files with their contents"),
+    "assets of a file": (("arm.xml", {}), "assets is {}, and the model is no text: leave them out"),
+    "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): mend the file"),
+    "unnamed": (("<mujoco/>", None), "unknown joint of model.xml 'j': none has a name there"),
+    "empty spec": ((mujoco.MjSpec(), None), "unknown joint of .*xml 'j': none has a name there"),
+    "number": ((3, None), r"path is 3: give the path of an MJCF file \(.xml\), its text, an MjSpec or a mjcf.Root"),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_what_a_model_lacks_that_is_no_file_is_one_sentence(name):
+    (model, assets), words = LOST[name]
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.plant_from(model, ["j"], assets=assets)
+
+
+# kept
+
+
+def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
+    trace = smc.run(smc.Scenario(plant=arm({"elbow": smc.Channel(motor=True)}, name="mine"), law="none", duration=0.1))
+    path = trace.save(tmp_path / "a.npz")
+    again = smc.load(path)
+    assert again.scenario == trace.scenario
+    assert run_key.key(again.scenario) == run_key.key(trace.scenario)
+    np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
+    arm(bodies=BALL)
+    words = r"the scenario of \S*a.npz cannot be brought back, its model \S*arm.xml"
+    with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file that .* than in the run: put that one back$"):
+        smc.load(path)
+    (tmp_path / "arm.xml").unlink()
+    with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back$"):
+        smc.load(path)
+
+
+def test_a_plant_of_one_s_own_goes_to_another_process(arm):
+    plant = arm()
+    again = pickle.loads(pickle.dumps(plant))
+    assert again == plant
+    assert hash(again) == hash(plant)

@@ -1,0 +1,370 @@
+"""Contacts obey Coulomb and Newton: friction stops a block where it must, blows keep the speed they should."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.contact import Contact, damping_ratio
+from smc_mujoco.mechanisms.plant import array, catalogue, plant, write
+from smc_mujoco.simulation import callback
+
+with callback.uninstalled():  # this import compiles a model
+    from mujoco.batch import Batch
+
+STEP = 2.5e-4  # s
+G = 9.81  # m/s^2
+OFFERED = [(name, kind) for name, p in sorted(catalogue().items()) for kind in p.contacts]
+EVERY = pytest.mark.parametrize(("name", "kind"), OFFERED, ids=["-".join(pair) for pair in OFFERED])
+BUILDS = [(*pair, build) for pair in OFFERED for build in ("equation", *catalogue()[pair[0]].mechanisms)]
+STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need places of their own
+CARTS = pytest.mark.parametrize("name", ["duffing", "van_der_pol"])
+# Where a mechanism that nothing else moves meets its obstacle, and the way it goes there.
+MEETS = {
+    ("duffing", "floor"): (1.7, 1),
+    ("duffing", "stops"): (-1.7, -1),
+    ("duffing", "peg"): (0.5, -1),
+    ("van_der_pol", "floor"): (2.2, 1),
+    ("van_der_pol", "stops"): (-2.2, -1),
+    ("van_der_pol", "peg"): (0.5, -1),
+    ("inverted_pendulum", "floor"): (2.44, 1),
+    ("inverted_pendulum", "stops"): (1.0, 1),
+    ("inverted_pendulum", "wall"): (0.7, 1),
+    ("inverted_pendulum", "peg"): (0.2, -1),
+}
+# The same where a second joint takes part in the blow; their blows: tests/mechanisms/test_underactuated.py.
+ALSO = {("cart_pole", "stops"): (-1.7, -1), ("overhead_crane", "stops"): (-1.7, -1)}
+HITS = pytest.mark.parametrize(("name", "kind"), MEETS, ids=["-".join(pair) for pair in MEETS])
+
+
+def idle(name):
+    """The plant without its own forces."""
+    p = catalogue()[name]
+    zero = {key: 0.0 for key in p.parameters if key not in ("m", "l", "M")}
+    return plant(name, n=2, **zero) if p.n > 1 else plant(name, **zero)
+
+
+def undamped(name):
+    p = catalogue()[name]
+    return plant(name, **{key: 0.0 for key in ("b", "delta", "mu") if key in p.parameters})
+
+
+def built(p, contact, mechanism="equation"):
+    spec, fields = p.spec(), p.fields
+    if mechanism != "equation":
+        p.mechanisms[mechanism].edit(spec)
+        fields = p.mechanisms[mechanism].fields
+    contact.check(p)
+    contact.edit_on(p, spec)
+    spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model = spec.compile()
+    write(model, fields(model, p.values({})))
+    write(model, contact.fields(model))
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    return model, data
+
+
+def steps(model, data, seconds):
+    """A loop over the steps of so many seconds."""
+    for _ in range(round(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        yield
+
+
+# sliding
+
+
+@CARTS
+@pytest.mark.parametrize("friction", [0.05, 0.1, 0.3, 0.6])
+@pytest.mark.parametrize("mass", [0.5, 2.0])
+def test_a_sliding_block_stops_after_v0_squared_over_2_mu_g(name, friction, mass):
+    p = plant(name, **{**idle(name).parameters, "M": mass})
+    model, data = built(p, Contact("floor", friction=friction))
+    speed = math.sqrt(2 * friction * G * 1.5)
+    data.qpos[0], data.qvel[0] = -1.0, speed
+    for _ in steps(model, data, speed / (friction * G) + 0.2):
+        pass
+    assert data.qpos[0] + 1.0 == pytest.approx(1.5, rel=0.01)
+    assert abs(data.qvel[0]) < 1e-5
+
+
+@CARTS
+def test_a_stuck_block_does_not_creep(name):
+    model, data = built(idle(name), Contact("floor"))
+    data.ctrl[0] = 0.95 * 0.1 * G
+    for _ in steps(model, data, 0.2):
+        pass
+    start = data.qpos[0]
+    for _ in steps(model, data, 1.0):
+        assert abs(data.qvel[0]) < 1e-5
+    assert abs(data.qpos[0] - start) < 1e-6
+
+
+@CARTS
+def test_a_block_breaks_away_at_mu_m_g(name):
+    model, data = built(idle(name), Contact("floor", friction=0.2))
+    for _ in steps(model, data, 8.0):
+        data.ctrl[0] = 0.5 * data.time
+        if data.qvel[0] > 1e-4:
+            break
+    assert data.ctrl[0] == pytest.approx(0.2 * G, rel=0.01)
+
+
+@CARTS
+@pytest.mark.parametrize("mechanism", ["equation", "springs"])
+def test_a_block_lies_still_on_its_bed_from_the_start(name, mechanism):
+    p = plant(name)
+    model, data = built(p, Contact("floor", friction=1.0), mechanism)
+    lift = model.joint("lift").qposadr[0]
+    data.qpos[0] = 0.3
+    for _ in steps(model, data, 1.0):
+        assert data.ncon == 4
+        assert abs(data.qpos[lift]) < 1e-6
+        assert abs(data.qvel).max() < 1e-5
+    assert data.qpos[0] == pytest.approx(0.3, abs=1e-6)
+
+
+@CARTS
+@pytest.mark.parametrize("friction", [0.05, 0.2, 0.5])
+def test_a_sliding_block_never_leaves_its_bed_and_feels_one_force(name, friction):
+    model, data = built(idle(name), Contact("floor", friction=friction))
+    data.qpos[0], data.qvel[0] = -1.0, 2.0
+    for _ in steps(model, data, 0.7 * 2.0 / (friction * G) if friction > 0.1 else 1.0):
+        assert data.ncon == 4
+        if data.time > 0.03:  # the start at speed has died away
+            assert data.qfrc_constraint[0] == pytest.approx(-friction * G, rel=0.04)
+
+
+# blows
+
+
+@HITS
+@pytest.mark.parametrize("restitution", [0.1, 0.2, 0.5, 0.8, 0.95])
+def test_a_blow_keeps_the_share_of_speed_it_should(name, kind, restitution):
+    place, way = MEETS[name, kind]
+    for speed, ahead in ((0.3, 0.0101), (1.0, 0.01004), (2.0, 0.01021), (3.0, 0.01037)):
+        model, data = built(idle(name), contact := Contact(kind, restitution=restitution))
+        if kind == "floor" and len(data.qpos) > 1:
+            write(model, Contact(kind, friction=0.0, restitution=restitution).fields(model))
+        data.qpos[0], data.qvel[0] = place - way * ahead, way * speed
+        for _ in steps(model, data, 1.0):
+            if way * data.qvel[0] < 0.0 and way * (data.qpos[0] - place) < -1e-3:
+                break
+        assert -way * data.qvel[0] == pytest.approx(restitution * speed, rel=0.05), contact
+
+
+@pytest.mark.parametrize("name", ["pendulum_network", "inverted_pendulum_network"])
+@pytest.mark.parametrize(("restitution", "within"), [(0.1, 0.13), (0.2, 0.1), (0.5, 0.05), (0.8, 0.05), (0.95, 0.05)])
+def test_two_bobs_part_with_their_share_of_speed(name, restitution, within):
+    """Their blows are short, so that they cannot slip through each other: few steps for a strong dashpot."""
+    for speed, ahead in ((0.3, 0.01), (1.0, 0.0103), (1.0, 0.0107), (3.0, 0.0103), (3.0, 0.0107)):
+        model, data = built(idle(name), Contact("bobs", restitution=restitution))
+        data.qpos[0], data.qvel[0] = -ahead, speed
+        for _ in steps(model, data, 1.0):
+            if data.qvel[1] > data.qvel[0] and data.ncon == 0:
+                break
+        assert data.qvel[1] - data.qvel[0] == pytest.approx(restitution * speed, rel=within)
+        assert data.qvel.sum() == pytest.approx(speed, rel=1e-2)  # the momentum, straight on
+
+
+@HITS
+def test_two_metres_a_second_go_a_centimetre_deep_at_most(name, kind):
+    place, way = MEETS[name, kind]
+    reach = 1.0 if catalogue()[name].unit == "m" else 0.5 if kind != "peg" else 0.3
+    model, data = built(idle(name), Contact(kind))
+    data.qpos[0], data.qvel[0] = place - way * 0.02, way * 2.0 / reach
+    deepest = max(way * (data.qpos[0] - place) * reach for _ in steps(model, data, 0.1))
+    assert deepest < 0.0105
+
+
+@HITS
+def test_what_leans_on_an_obstacle_stands_still_and_hardly_sinks_in(name, kind):
+    place, way = MEETS[name, kind]
+    model, data = built(idle(name), Contact(kind))
+    data.qpos[0], data.ctrl[0] = place - way * 0.001, way * 3.0
+    for _ in steps(model, data, 3.0):
+        pass
+    for _ in steps(model, data, 0.5):
+        assert abs(data.qvel[0]) < 1e-6
+    assert abs(data.qpos[0] - place) < 1e-4
+
+
+def test_the_damping_ratio_gives_the_restitution_of_a_spring_and_dashpot_that_never_pull():
+    """Schwager and Poeschel's case released at zero force, integrated here."""
+    for e in (0.05, 0.135335283, 0.3, 0.7, 0.95):
+        zeta, h = damping_ratio(e), 1e-4
+        x, v = 0.0, 1.0
+        while x + 2 * zeta * v > 0.0:
+            half = v - h / 2 * (x + 2 * zeta * v)
+            x, v = x + h * half, v - h * (x + h / 2 * v + 2 * zeta * half)
+        assert -v == pytest.approx(e, rel=1e-3)
+
+
+def cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def tangled(model, data):
+    """Whether the rods of two neighbours cross in the plane."""
+    n = model.nv
+    pivots = np.array([data.body(f"p{i}/pendulum").xpos[[0, 2]] for i in range(n)])
+    rods = np.array([data.geom(f"p{i}/bob").xpos[[0, 2]] for i in range(n)]) - pivots
+    for a, b, way in zip(rods, rods[1:], np.diff(pivots, axis=0), strict=False):
+        across = cross(a, b)
+        if across and 0.0 < cross(way, b) / across < 1.0 and 0.0 < cross(way, a) / across < 1.0:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("restitution", [0.2, 0.95])
+def test_a_chain_that_falls_does_not_tangle(restitution):
+    model, data = built(plant("inverted_pendulum_network"), Contact("bobs", restitution=restitution))
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        mujoco.mj_resetData(model, data)
+        data.qpos[0], data.qvel[:] = -0.3, rng.uniform(-3.0, 3.0, model.nv)
+        for k, _ in enumerate(steps(model, data, 3.0)):
+            assert k % 40 or not tangled(model, data)
+
+
+@pytest.mark.parametrize("name", ["pendulum_network", "inverted_pendulum_network"])
+def test_bobs_that_start_on_each_others_sides_start_inside(name):
+    model, data = built(plant(name), Contact("bobs"))
+    data.qpos[:] = plant(name).x0
+    mujoco.mj_forward(model, data)
+    assert tangled(model, data)
+    assert min(contact.dist for contact in data.contact) < -0.01
+
+
+# energy
+
+
+@pytest.mark.parametrize(("name", "kind", "mechanism"), BUILDS, ids=["-".join(build) for build in BUILDS])
+@pytest.mark.parametrize("restitution", [None, 0.98])
+def test_a_passive_run_never_gains_energy(name, kind, mechanism, restitution):
+    p = undamped(name)
+    model, data = built(p, Contact(kind, restitution=restitution), mechanism)
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    rng = np.random.default_rng(5)
+    for _ in range(2):
+        mujoco.mj_resetData(model, data)
+        data.qpos[0] = {"m": 1.2, "rad": 0.5}[p.unit] if p.n == 1 else -0.6 * rng.uniform(0.4, 1.0)
+        data.qvel[: p.n] = rng.uniform(-2.0, 2.0, p.n) * (1.0 if p.n == 1 else 0.2)
+        mujoco.mj_forward(model, data)
+        start, lowest = data.energy.sum(), data.energy[0]
+        for _ in steps(model, data, 4.0):
+            lowest = min(lowest, data.energy[0])
+            assert data.energy.sum() - start <= 1e-3 * (start - lowest)
+
+
+# numbers and names
+
+
+@EVERY
+def test_every_number_of_a_contact_is_its_simulations_own(name, kind):
+    """Three contacts in a batch run as each of them alone, to the last bit."""
+    p = catalogue()[name]
+    takes = [key for key in ("friction", "restitution") if fits(p, kind, key)]
+    assert takes
+    contacts = [Contact(kind, **dict.fromkeys(takes, value)) for value in (0.1, 0.3, 0.7)]
+    assert len({contact.structure() for contact in contacts}) == 1
+    model, _ = built(p, contacts[0])
+    batch = Batch(model, 3, 2)
+    batch.reset(stage=0)
+    start = np.zeros(model.nq)
+    start[0], push = -0.4, 5.0  # of bobs
+    if kind != "bobs":
+        place, way = (MEETS | ALSO)[name, kind]
+        start[0], push = place - 0.1 * way, 3.0 * way
+    batch.bind("qpos")[:], batch.bind("qvel")[:, 0] = start, push
+    for i, contact in enumerate(contacts):
+        for field, at, value, adds in contact.fields(model):
+            assert not adds
+            batch.expand(field)[i][at] = value
+    batch.set_const(np.arange(3, dtype=np.int32))
+    batch.step(nstep=3000)
+    ends = []
+    for i, contact in enumerate(contacts):
+        model, data = built(p, contact)
+        data.qpos[:], data.qvel[0] = start, push
+        mujoco.mj_step(model, data, 3000)
+        np.testing.assert_array_equal(batch.bind("qpos")[i], data.qpos)
+        ends.append(tuple(data.qpos))
+    assert len(set(ends)) == 3
+
+
+def fits(p, kind, key):
+    try:
+        Contact(kind, **{key: 0.5}).check(p)
+    except ScenarioError:
+        return False
+    return True
+
+
+@EVERY
+def test_a_contact_without_numbers_keeps_the_plants_own(name, kind):
+    p = catalogue()[name]
+    model, _ = built(p, Contact(kind))
+    assert list(Contact(kind).fields(model)) == []
+    rubs = any(model.pair(i).name.startswith("rub:") for i in range(model.npair))
+    assert (model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC) == rubs
+    assert (model.opt.impratio >= 100.0) == rubs
+    assert model.npair > 0
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+    kinds = {"geom": model.ngeom, "body": model.nbody, "joint": model.njnt, "pair": model.npair, "site": model.nsite}
+    for sort, count in kinds.items():
+        assert all(getattr(model, sort)(i).name for i in range(count)), sort
+    assert np.count_nonzero(model.body_mass) == p.n
+    assert np.all(model.geom_matid >= 0)
+
+
+@pytest.mark.parametrize(("name", "kind"), STUDIES, ids=["-".join(pair) for pair in STUDIES])
+def test_the_study_starts_free_of_the_obstacles(name, kind):
+    model, data = built(catalogue()[name], Contact(kind))
+    data.qpos[0] = catalogue()[name].x0[0]
+    mujoco.mj_forward(model, data)
+    assert all(contact.dist > -2e-4 for contact in data.contact)  # the block in its soft bed
+
+
+@pytest.mark.parametrize("name", sorted(catalogue()))
+def test_no_contact_changes_nothing(name):
+    p = catalogue()[name]
+    spec = p.spec()
+    before = spec.to_xml()
+    Contact("none").check(p)
+    Contact("none").edit_on(p, spec)
+    assert spec.to_xml() == before
+    assert list(Contact("none").fields(p.load())) == []
+
+
+def test_what_a_part_writes_is_an_array_of_the_model():
+    p = plant("duffing")
+    model, _ = built(p, Contact("floor", friction=0.2, restitution=0.4))
+    assert {field.name for field in Contact("floor", friction=0.2, restitution=0.4).fields(model)} == {
+        "pair_friction",
+        "pair_solref",
+    }
+    assert np.all(array(model, "pair_friction")[model.pair_dim > 1, :2] == 0.2)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Contact("floor", friction=-0.1), "Contact's friction is -0.1: give at least 0"),
+        (lambda: Contact("stops", restitution=1.2), "Contact's restitution is 1.2: give at most 0.98"),
+        (lambda: Contact("stops", restitution=math.nan), "finite number"),
+        (lambda: Contact(3), "give the name of a kind"),
+        (lambda: Contact("flor").check(plant("duffing")), "did you mean 'floor'?"),
+        (lambda: Contact("lava").check(plant("duffing")), "choose from floor, none, peg, stops"),
+        (lambda: Contact("floor").check(plant("pendulum_network")), "choose from bobs, none"),
+        (lambda: Contact("stops", friction=0.2).check(plant("duffing")), "'stops' of duffing has no friction"),
+        (lambda: Contact("none", restitution=0.2).check(plant("duffing")), "'none' of duffing has no restitution"),
+    ],
+)
+def test_a_bad_contact_is_refused_in_one_sentence(make, words):
+    with pytest.raises(ScenarioError, match=words.replace("?", r"\?").replace(".", r"\.")):
+        make()

@@ -1,0 +1,335 @@
+"""Actuators deliver what their equations say: lag, rate limit, DC motor; and play that is play."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit
+from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
+from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
+from smc_mujoco.mechanisms.plant import array, plant, plants, write
+
+H = 2.5e-4  # s
+IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
+NAMES = pytest.mark.parametrize("name", [name for name in plants() if not plant(name).underactuated])
+MOTOR = DCMotor()
+
+
+def build(p, *parts, h=H, integrator=IMPLICIT):
+    """The plant's model with the parts in it."""
+    spec = p.spec()
+    for part in parts:
+        part.edit(spec)
+    model = spec.compile()
+    model.opt.timestep, model.opt.integrator = h, integrator
+    for part in parts:
+        write(model, part.fields(model))
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def bare(*parts, name="duffing", h=H):
+    """The plant's inertia, 1 kg or 0.125 kg m^2, with nothing on it but the parts."""
+    model = build(plant(name), *parts, h=h)
+    for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly", "dof_damping"):
+        array(model, field)[:] = 0.0
+    return model
+
+
+def home(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    return data
+
+
+def driven(model, command, seconds, data=None):
+    """Rows (t, position, speed, force, ...activations) at the ends of steps under ctrl = command(t)."""
+    data = mujoco.MjData(model) if data is None else data
+    rows = []
+    for _ in range(round(seconds / model.opt.timestep)):
+        data.ctrl[:] = command(data.time)
+        mujoco.mj_step(model, data)
+        rows.append((data.time, data.qpos[0], data.qvel[0], data.actuator_force[0], *data.act))
+    return np.array(rows)
+
+
+def locked(part):
+    model = bare(part)
+    model.dof_armature[0] = 1e12
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def sine(t):
+    return 2.0 * math.sin(5.0 * t)
+
+
+@pytest.mark.parametrize("tau", [1e-4, 1e-3, 0.01, 0.5])
+def test_a_lag_is_first_order(tau):
+    t, _, _, force = driven(bare(Lag(tau)), lambda t: 2.0, 0.1)[:, :4].T
+    assert force == pytest.approx(2.0 * (1.0 - np.exp(-t / tau)), abs=1e-12)
+
+
+@NAMES
+@pytest.mark.parametrize("integrator", [IMPLICIT, RK4])
+def test_no_lag_is_the_plants_own_actuator_to_the_bit(name, integrator):
+    lagged, own = (build(plant(name), *parts, integrator=integrator) for parts in ([Lag(0.0)], []))
+    assert (driven(lagged, sine, 0.5, home(lagged))[:, :4] == driven(own, sine, 0.5, home(own))[:, :4]).all()
+    assert Lag(0.0).structure() != Lag(0.01).structure() == Lag(0.02).structure()
+
+
+def test_a_shorter_lag_comes_nearer_to_none():
+    own = driven(bare(), sine, 0.5)[-1, 1]
+    errors = [abs(driven(bare(Lag(tau)), sine, 0.5)[-1, 1] - own) for tau in (1e-2, 1e-3, 1e-4)]
+    assert errors[0] > 5 * errors[1] > 25 * errors[2]
+
+
+def test_a_limited_rate_is_exactly_the_rate_and_starts_at_zero():
+    t, _, _, force = driven(bare(RateLimit(10.0)), lambda t: 1.0 if t < 0.3 - H / 2 else -1.0, 0.6).T[:4]
+    assert force == pytest.approx(
+        np.where(t < 0.3 + H / 2, np.minimum(10 * t, 1), np.maximum(4 - 10 * t, -1)), abs=1e-11
+    )
+
+
+@pytest.mark.parametrize(("rate", "integrator"), [(10.0, IMPLICIT), (math.inf, IMPLICIT), (1e5, RK4), (math.inf, RK4)])
+def test_a_slower_command_passes_a_rate_limit_unchanged(rate, integrator):
+    limited = driven(build(plant("inverted_pendulum"), RateLimit(rate), integrator=integrator), sine, 1.0)
+    own = driven(build(plant("inverted_pendulum"), integrator=integrator), sine, 1.0)
+    assert limited[:, :4] == pytest.approx(own[:, :4], rel=1e-9, abs=1e-12)
+
+
+def test_an_infinite_rate_follows_a_jump():
+    force = driven(bare(RateLimit(math.inf)), lambda t: 5.0 if t > 0.1 else -5.0, 0.2)[:, 3]
+    assert set(force) == {-5.0, 5.0}
+
+
+def test_a_locked_rotors_current_rises_in_l_over_r_to_the_asked_torque():
+    motor = DCMotor(inductance=5e-3)  # L/R = 16.7 ms
+    t, _, speed, torque, current = driven(locked(motor), lambda t: 4.0 * motor.scale, 0.1).T
+    rise = 1.0 - np.exp(-t * motor.resistance / motor.inductance)
+    assert current == pytest.approx(4.0 / motor.constant * rise, rel=1e-2)
+    assert torque == pytest.approx(4.0 * rise, rel=1e-2)
+    assert torque[-1] == pytest.approx(4.0, rel=1e-2)
+    assert np.abs(speed).max() < 1e-10
+
+
+def test_a_locked_rotors_torque_comes_at_once_without_inductance():
+    motor = DCMotor(inductance=0.0)
+    assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(4.0, rel=1e-9)
+
+
+def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
+    motor = DCMotor(inductance=0.0)
+    inertia, volts = 1.0 + motor.gear**2 * motor.rotor_inertia, 6.0
+    t, _, speed, torque = driven(bare(motor), lambda t: volts, 8.0).T
+    time_constant = motor.resistance * inertia / motor.constant**2
+    left = np.exp(-t / time_constant)
+    assert speed == pytest.approx(volts / motor.constant * (1.0 - left), rel=1e-2)
+    early = t < 3 * time_constant
+    assert torque[early] == pytest.approx(motor.constant * volts / motor.resistance * left[early], rel=1e-2)
+
+
+def test_a_free_rotor_with_inductance_is_the_second_order_system_of_its_equations():
+    motor = DCMotor(inductance=20e-3)
+    inertia, volts = 1.0 + motor.gear**2 * motor.rotor_inertia, 6.0
+    t, _, speed, torque, current = driven(bare(motor), lambda t: volts, 3.0).T
+    system = np.array(
+        [
+            [-motor.resistance / motor.inductance, -motor.constant / motor.inductance],
+            [motor.constant / inertia, 0.0],
+        ]
+    )
+    rates, modes = np.linalg.eig(system)
+    rest = np.array([0.0, volts / motor.constant])
+    exact = rest[:, None] + ((modes * np.linalg.solve(modes, -rest)) @ np.exp(np.outer(rates, t))).real
+    assert np.abs(current - exact[0]).max() < 0.01 * np.abs(exact[0]).max()
+    assert np.abs(speed - exact[1]).max() < 0.01 * exact[1].max()
+    assert torque == pytest.approx(motor.constant * current, rel=1e-12)
+
+
+def test_the_defaults_are_the_datasheets_motor():
+    stall_current, no_load_speed = 24.0 / MOTOR.resistance, 24.0 / MOTOR.torque_constant
+    assert stall_current == pytest.approx(80.2, rel=0.01)  # A
+    assert no_load_speed == pytest.approx(7580 * 2 * math.pi / 60, rel=0.01)  # rad/s
+    mechanical = MOTOR.resistance * MOTOR.rotor_inertia / MOTOR.torque_constant**2
+    assert mechanical == pytest.approx(4.67e-3, rel=0.01)  # s
+    assert min(MOTOR.constant * MOTOR.current, MOTOR.voltage / MOTOR.scale) > 1.5 * 6.0  # N m, the laws' usual limit
+
+
+@pytest.mark.parametrize("inductance", [0.0, MOTOR.inductance])
+def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
+    by_current = DCMotor(inductance=inductance)
+    by_voltage = DCMotor(inductance=inductance, voltage=6.0)
+    for motor, most in ((by_current, 30.0 * by_current.constant), (by_voltage, 6.0 / by_voltage.scale)):
+        torque = driven(locked(motor), lambda t, motor=motor: 100.0 * motor.scale, 0.05)[:, 3]
+        assert torque.max() == pytest.approx(most, rel=1e-6)
+        assert torque[-1] == pytest.approx(most, rel=1e-6)
+    boundless = DCMotor(inductance=inductance, voltage=math.inf, current=math.inf)
+    torque = driven(locked(boundless), lambda t: 100.0 * boundless.scale, 0.05)[:, 3]
+    assert torque[-1] == pytest.approx(100.0, rel=1e-6)
+
+
+def test_cogging_is_a_sine_of_the_rotors_angle():
+    motor = DCMotor(cogging=5e-3, poles=14.0)
+    model = locked(motor)
+    data = mujoco.MjData(model)
+    for x in np.linspace(-0.1, 0.1, 41):
+        data.qpos[0] = x
+        mujoco.mj_forward(model, data)
+        expected = motor.gear * 5e-3 * math.sin(14.0 * motor.gear * x)
+        assert data.actuator_force[0] == pytest.approx(expected, abs=1e-12)
+
+
+@NAMES
+def test_the_rotors_inertia_is_reflected_to_the_joint(name):
+    with_motor, own = build(plant(name), MOTOR), build(plant(name))
+    reflected = MOTOR.gear**2 * MOTOR.rotor_inertia
+    assert with_motor.dof_armature == pytest.approx(own.dof_armature + reflected, rel=1e-12)
+    assert with_motor.dof_M0 == pytest.approx(own.dof_M0 + reflected, rel=1e-9)  # mj_setConst saw it
+
+
+def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
+    own = driven(bare(), sine, 1.0)
+    errors = []
+    for constant in (1e-1, 1e-2, 1e-3):
+        motor = DCMotor(0.3, 0.0, constant, 1.0, 0.0, voltage=math.inf, current=math.inf)
+        rows = driven(bare(motor), lambda t, motor=motor: motor.scale * sine(t), 1.0)
+        errors.append(np.abs(rows[:, 1] - own[:, 1]).max())
+    assert errors[1] / errors[0] == pytest.approx(1e-2, rel=0.1)  # back-EMF: (gear k)^2 / R
+    assert errors[2] / errors[1] == pytest.approx(1e-2, rel=0.1)
+    assert errors[2] < 1e-5
+
+
+@NAMES
+def test_play_of_no_width_is_a_rigid_rotor(name):
+    with_rotor, rigid = build(plant(name), Backlash(0.0, 2e-3, 0.05)), build(plant(name))
+    dofs = dof_ids(rigid)
+    rigid.dof_armature[dofs] += 2e-3
+    rigid.dof_damping[dofs] += 0.05
+    mujoco.mj_setConst(rigid, mujoco.MjData(rigid))
+    a, b = home(with_rotor), home(rigid)
+    deviation = np.abs(driven(with_rotor, sine, 2.0, a)[:, 1] - driven(rigid, sine, 2.0, b)[:, 1]).max()
+    at_twice_the_step = home(rigid)
+    rigid.opt.timestep = 2 * H
+    driven(rigid, sine, 2.0, at_twice_the_step)
+    assert deviation < 0.1 * abs(at_twice_the_step.qpos[0] - b.qpos[0])  # a tenth of the step's own error
+    assert a.qpos[: rigid.nq] == pytest.approx(b.qpos, abs=1e-4)
+
+
+@NAMES
+def test_the_joint_is_free_within_the_play_and_driven_beyond(name):
+    model = build(plant(name), Backlash(0.02))
+    data, own = home(model), home(build(plant(name)))
+    n = own.qpos.size
+    assert data.qpos[n:] == pytest.approx(own.qpos)  # the rotor starts in the middle
+    idle = build(plant(name))
+    while np.abs(data.qpos[n:] - data.qpos[:n]).max() < 0.0099:
+        data.ctrl[:] = 0.1
+        mujoco.mj_step(model, data)
+        mujoco.mj_step(idle, own)
+        assert data.qpos[:n] == pytest.approx(own.qpos, abs=1e-9)
+    for k in range(8000):
+        data.ctrl[:] = 3.0 if k // 400 % 2 else -3.0
+        mujoco.mj_step(model, data)
+        speed = np.abs(np.diff(data.qvel.reshape(2, n), axis=0)).max()
+        assert np.abs(data.qpos[n:] - data.qpos[:n]).max() < 0.01 + 2e-5 + 2 * H * max(speed, 10.0)
+
+
+@pytest.mark.parametrize("speed", [0.5, 5.0, 50.0])
+@pytest.mark.parametrize("inertia", [1e-3, 0.1])
+def test_flanks_meet_without_bounce_and_without_gain(speed, inertia):
+    model = bare(Backlash(0.02, inertia), name="inverted_pendulum")
+    data = mujoco.MjData(model)
+    data.qvel[1] = speed
+    momentum, energies = inertia * speed, [0.5 * inertia * speed**2]
+    for _ in range(4000):
+        mujoco.mj_step(model, data)
+        energies.append(0.5 * 0.125 * data.qvel[0] ** 2 + 0.5 * inertia * data.qvel[1] ** 2)
+    assert 0.125 * data.qvel[0] + inertia * data.qvel[1] == pytest.approx(momentum, rel=1e-5)
+    assert abs(data.qvel[1] - data.qvel[0]) < 0.01 * speed  # restitution
+    assert np.diff(energies).max() <= 1e-12 * energies[0]
+
+
+@NAMES
+@pytest.mark.parametrize("order", [1, -1])
+def test_play_comes_after_any_drive(name, order):
+    for drive in (Lag(0.01), RateLimit(20.0), MOTOR):
+        parts = (LuGre(0.05, 0.08, 0.01), *(drive, Backlash(0.02, 1e-3))[::order])
+        model = build(plant(name), *parts)
+        n = len(drive_ids(model))
+        assert [model.joint(model.actuator_trnid[i, 0]).name[:6] for i in drive_ids(model)] == ["rotor:"] * n
+        own = MOTOR.gear**2 * MOTOR.rotor_inertia if drive is MOTOR else 0.0
+        assert model.dof_armature[n:] == pytest.approx(1e-3 + own)
+        assert (model.dof_armature[:n] == 0.0).all()
+        data = home(model)
+        rows = driven(model, lambda t, drive=drive: drive.scale * sine(t), 0.5, data)
+        assert np.isfinite(rows).all()
+        assert not data.warning.number.any()
+        assert np.abs(data.qpos[n:] - data.qpos[:n]).max() < 0.0105
+
+
+SWEEPS = {
+    "Lag": [Lag(1e-3), Lag(0.01), Lag(0.5)],
+    "RateLimit": [RateLimit(1.0), RateLimit(30.0), RateLimit(math.inf)],
+    "DCMotor": [
+        MOTOR,
+        DCMotor(0.5, 2e-3, 0.05, 5.0, 2e-5, 3e-3, 7.0, 12.0, 5.0),
+        DCMotor(2.0, 5e-3, 0.2, 1.0, 1e-4, 0.1, 3.0, math.inf, math.inf),
+    ],
+    "DCMotor without inductance": [DCMotor(0.3, 0.0), DCMotor(1.0, 0.0, gear=3.0), DCMotor(0.3, 0.0, voltage=2.0)],
+    "Backlash": [Backlash(0.0), Backlash(0.02, 2e-3, 0.01), Backlash(0.1, 5e-3, 0.1)],
+}
+
+
+@pytest.mark.parametrize("name", ["inverted_pendulum", "duffing", "pendulum_network"])
+@pytest.mark.parametrize("parts", SWEEPS.values(), ids=SWEEPS)
+def test_every_number_is_per_simulation(name, parts):
+    models = [build(plant(name), part) for part in parts]
+    assert len({part.structure() for part in parts}) == 1
+    batch = Batch(models[0], nsim=len(parts), nthread=1)
+    for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
+        batch.expand(field)[:] = [array(model, field) for model in models]
+    batch.set_const()
+    qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
+    singles = [mujoco.MjData(model) for model in models]
+    for k in range(600):
+        ctrl[:] = 3.0 * math.sin(0.02 * k)
+        batch.step()
+        for model, data in zip(models, singles, strict=True):
+            data.ctrl[:] = 3.0 * math.sin(0.02 * k)
+            mujoco.mj_step(model, data)
+    assert (qpos == [data.qpos for data in singles]).all()
+    assert len({row.tobytes() for row in np.asarray(qpos)}) == len(parts)
+
+
+def test_only_a_motor_takes_anything_but_newton_metres():
+    assert [part.scale for part in (Lag(0.1), RateLimit(1.0), Backlash(0.1))] == [1.0, 1.0, 1.0]
+    assert MOTOR.scale == pytest.approx(0.299 / (0.0302 * 12.25))
+    assert build(plant("duffing"), Viscous(0.1), Backlash(0.1)).dof_damping == pytest.approx([0.3, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Lag(-0.1), "Lag's tau is -0.1: give at least 0"),
+        (lambda: Lag(math.inf), "Lag's tau is inf: give a finite number"),
+        (lambda: RateLimit(0.0), "RateLimit's rate is 0: give a number greater than 0"),
+        (lambda: RateLimit(math.nan), "RateLimit's rate is nan: give a finite number"),
+        (lambda: DCMotor(resistance=0.0), "DCMotor's resistance is 0: give a number greater than 0"),
+        (lambda: DCMotor(inductance=-1e-3), "DCMotor's inductance is -0.001: give at least 0"),
+        (lambda: DCMotor(gear="12:1"), "DCMotor's gear is '12:1': give a number"),
+        (lambda: DCMotor(current=-1.0), "DCMotor's current is -1: give a number greater than 0"),
+        (lambda: Backlash(-0.02), "Backlash's gap is -0.02: give at least 0"),
+        (lambda: Backlash(0.02, 0.0), "Backlash's rotor_inertia is 0: give at least 1e-09"),
+        (lambda: Backlash(0.02, rotor_damping=-1.0), "Backlash's rotor_damping is -1: give at least 0"),
+    ],
+)
+def test_bad_numbers_are_one_sentence(make, says):
+    with pytest.raises(ScenarioError) as error:
+        make()
+    assert str(error.value) == says

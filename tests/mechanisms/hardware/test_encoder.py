@@ -1,0 +1,476 @@
+"""The encoder reads what its formula says: to the count, to the physics step, and by the odds of its losses.
+
+What the controller reads is seen through laws that do nothing and return it as their s. The plant is a Duffing
+oscillator that swings across both wells, so that a reading of another instant is another number.
+"""
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.trace import ARRAYS
+
+
+@smc.law_function
+def position(y, gains, memory):
+    """Does nothing, and shows the position it reads."""
+    return 0.0, y.x
+
+
+@smc.law_function
+def speed(y, gains, memory):
+    """Does nothing, and shows the velocity it is given."""
+    return 0.0, y.v
+
+
+def scenario(sensor, **changes):
+    fields = {"plant": "duffing", "law": position(), "duration": 1.0, "v0": 0.7}
+    return smc.Scenario(**(fields | {"sensor": sensor} | changes))
+
+
+def read(sensor, **changes):
+    """The trace, the positions and the velocities that a law read."""
+    traces = smc.run([scenario(sensor, law=law(), **changes) for law in (position, speed)])
+    assert [trace.failure for trace in traces] == [None, None]
+    return traces[0], *(trace.s for trace in traces)
+
+
+def same(a, b, names=ARRAYS):
+    for name in names:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+
+
+PERFECT = smc.Encoder(counts=math.inf)
+
+
+# quantisation and bias
+
+
+@pytest.mark.parametrize("counts", [2, 3, 100, 4096, 2**32])
+@pytest.mark.parametrize(
+    ("plant", "turn"), [("duffing", 1.0), ("van_der_pol", 1.0), ("inverted_pendulum", 2 * math.pi)]
+)
+def test_a_reading_is_the_nearest_count(plant, turn, counts):
+    trace, x, _ = read(smc.Encoder(counts=counts), plant=plant)
+    q = turn / counts
+    np.testing.assert_array_equal(x, q * np.floor(trace.x / q + 0.5))
+    assert np.abs(x - trace.x).max() <= q / 2 * (1 + 1e-9)
+
+
+def test_a_coarse_encoder_reads_a_grid_that_holds_zero():
+    _, x, _ = read(smc.Encoder(counts=8), duration=5.0)
+    assert set(np.unique(x * 8)) <= set(range(-20, 21))
+    assert 0.0 in x
+    assert len(np.unique(x)) > 10
+
+
+def test_without_counts_a_reading_is_the_position_itself():
+    trace, x, _ = read(PERFECT)
+    np.testing.assert_array_equal(x, trace.x)
+
+
+def test_a_bias_is_added_before_the_rounding():
+    trace, x, _ = read(smc.Encoder(counts=10, bias=0.04))
+    np.testing.assert_array_equal(x, 0.1 * np.floor((trace.x + 0.04) / 0.1 + 0.5))
+    trace, x, _ = read(smc.Encoder(counts=math.inf, bias=-0.3))
+    np.testing.assert_array_equal(x, trace.x - 0.3)
+
+
+def test_a_bias_moves_where_the_law_settles():
+    gains = smc.paper.GAINS["inverted_pendulum"]["observer_free"]
+    common = {"plant": "inverted_pendulum", "law": smc.law("observer_free", **gains), "duration": 5.0}
+    unbiased, biased = smc.run(
+        [smc.Scenario(**common, sensor=smc.Encoder(math.inf, bias=bias)) for bias in (0.0, 0.01)]
+    )
+    assert abs(unbiased.x[-1, 0]) < 1e-4
+    x = biased.x[-1, 0]
+    weight = 0.5 * 9.81 * 0.5 * math.sin(x)
+    assert weight == pytest.approx(gains["lam"] * math.tanh(gains["k1"] * (x + 0.01)), abs=1e-4)
+    assert x < -0.01
+
+
+def test_noise_comes_before_the_rounding():
+    """Noise of more than a count dithers: the mean of the error then is far below a count."""
+    noise = smc.Noise(position=0.2)
+    trace, x, _ = read(smc.Encoder(counts=5), noise=noise, duration=10.0, seed=5)
+    assert set(np.unique(np.round(x * 5, 9)) % 1) == {0.0}
+    error = (x - trace.x)[:, 0]
+    assert error.std() == pytest.approx(math.hypot(0.2, 0.2 / math.sqrt(12)), rel=0.03)
+    assert abs(error.mean()) < 4 * error.std() / 100
+    _, exact, _ = read(PERFECT, noise=noise, duration=10.0, seed=5)
+    np.testing.assert_allclose(x, np.round(exact * 5) / 5, atol=1e-9)
+
+
+# the velocity
+
+
+def test_an_encoder_measures_no_velocity():
+    assert scenario(PERFECT).velocity.name == "filtered_difference"
+    assert scenario(None).velocity.name == "measured"
+
+
+def test_the_velocity_is_the_filtered_difference_of_the_readings():
+    _, x, v = read(smc.Encoder(counts=200))
+    tau, dt = 5e-3, 1e-3
+    a, estimate = tau / (tau + dt), 0.0
+    expected = [0.0]
+    for before, now in zip(x[:-1, 0], x[1:, 0], strict=True):
+        estimate = a * estimate + (1 - a) * (now - before) / dt
+        expected.append(estimate)
+    np.testing.assert_allclose(v[:, 0], expected, rtol=1e-12, atol=1e-12)
+
+
+def test_a_tachometer_beside_the_encoder_is_not_rounded():
+    trace, _, v = read(smc.Encoder(counts=10, bias=0.3), velocity="measured")
+    np.testing.assert_array_equal(v, trace.v)
+
+
+def test_replacing_the_sensor_replaces_the_velocity_that_was_left_out():
+    with_encoder, without = scenario(PERFECT), scenario(None)
+    assert dataclasses.replace(with_encoder, sensor=None) == without
+    assert dataclasses.replace(without, sensor=PERFECT) == with_encoder
+    assert dataclasses.replace(with_encoder, duration=2.0).velocity.name == "filtered_difference"
+
+
+def test_replacing_the_sensor_keeps_a_velocity_that_was_asked_for():
+    lagged = smc.estimator("filtered_difference", tau=0.02)
+    for velocity in (lagged, "measured", "filtered_difference"):
+        asked = scenario(None, velocity=velocity)
+        assert dataclasses.replace(asked, sensor=PERFECT).velocity == asked.velocity
+        asked = scenario(PERFECT, velocity=velocity)
+        assert dataclasses.replace(asked, sensor=None).velocity == asked.velocity
+
+
+# loss
+
+
+@pytest.mark.parametrize("rate", [0.05, 0.5, 0.9])
+def test_readings_get_lost_at_their_rate(rate):
+    """A binomial count, within four standard deviations; runs of losses are geometric."""
+    trace, x, _ = read(smc.Encoder(math.inf, dropout=rate), duration=20.0, velocity="measured", seed=11)
+    lost = (x != trace.x)[1:, 0]
+    n = len(lost)
+    assert abs(lost.mean() - rate) < 4 * math.sqrt(rate * (1 - rate) / n)
+    again = lost[1:][lost[:-1]]  # after a loss, the next is as likely as ever
+    assert abs(again.mean() - rate) < 4 * math.sqrt(rate * (1 - rate) / len(again))
+
+
+def test_a_lost_reading_leaves_the_one_before_in_place():
+    trace, x, v = read(smc.Encoder(math.inf, dropout=0.6), velocity="measured", seed=3)
+    lost = x != trace.x
+    assert not lost[0, 0]
+    np.testing.assert_array_equal(x[1:][lost[1:]], x[:-1][lost[1:]])
+    np.testing.assert_array_equal(v[1:][lost[1:]], v[:-1][lost[1:]])  # the tachometer's with it
+    np.testing.assert_array_equal(v[~lost], trace.v[~lost])
+
+
+def test_what_gets_lost_is_held_with_its_noise_and_rounding():
+    _, x, _ = read(smc.Encoder(50, dropout=0.5, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
+    _, all_of_them, _ = read(smc.Encoder(50, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
+    arrived = x == all_of_them
+    held = x[1:] == x[:-1]
+    assert (arrived[1:] | held).all()
+    assert 0.4 < (~arrived).mean() < 0.55
+
+
+def test_when_every_reading_gets_lost_the_first_stays():
+    trace, x, v = read(smc.Encoder(math.inf, dropout=1.0), velocity="measured")
+    np.testing.assert_array_equal(x, trace.x[0, 0])
+    np.testing.assert_array_equal(v, 0.7)
+
+
+def test_channels_lose_their_readings_on_their_own():
+    plant = smc.plant("pendulum_network", n=4)
+    trace, x, _ = read(smc.Encoder(math.inf, dropout=0.5), plant=plant, duration=4.0, v0=0.1)
+    lost = (x != trace.x)[1:]
+    correlation = np.corrcoef(lost.T)
+    assert np.abs(correlation - np.eye(4)).max() < 4 / math.sqrt(len(lost))
+
+
+def test_seeds_lose_other_readings_and_one_seed_the_same():
+    runs = [read(smc.Encoder(math.inf, dropout=0.5), seed=seed)[1] for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert (runs[0] != runs[2]).mean() > 0.3
+
+
+def test_losses_are_independent_of_the_noise():
+    sensor = smc.Encoder(math.inf, dropout=0.5)
+    noisy = {"noise": smc.Noise(position=0.1), "duration": 10.0}
+    trace, x, _ = read(sensor, **noisy)
+    _, full, _ = read(PERFECT, **noisy)
+    arrived, z = (x == full)[1:, 0], (full - trace.x)[1:, 0]
+    assert abs(np.corrcoef(arrived, np.abs(z))[0, 1]) < 4 / math.sqrt(len(z))
+    assert abs(np.corrcoef(arrived, z)[0, 1]) < 4 / math.sqrt(len(z))
+
+
+# period and delay
+
+
+def expected(sensor, changes, name):
+    """What a late sensor reads at the samples, from a run whose trace holds every physics step."""
+    late = scenario(sensor, **changes)
+    steps = dataclasses.replace(late, sensor=None, velocity="measured", control_period=late.physics_step)
+    fine = getattr(smc.run(steps), name)
+    h = late.physics_step
+    delay = round(sensor.delay / h)
+    found = []
+    for k in range(late.samples + 1):
+        step = k * late.steps - delay
+        if sensor.period:
+            each = round(sensor.period / h)
+            step = step // each * each
+        found.append(fine[max(step, 0)])
+    return np.array(found)
+
+
+TIMES = [
+    {"delay": 2.5e-4},
+    {"delay": 1e-3},
+    {"delay": 7.5e-4},
+    {"delay": 0.0335},
+    {"period": 5e-3},
+    {"period": 2.5e-3},
+    {"period": 7.5e-4},
+    {"period": 2.5e-4},
+    {"period": 0.1},
+    {"period": 5e-3, "delay": 2e-3},
+    {"period": 5e-3, "delay": 5e-3},
+    {"period": 3e-3, "delay": 0.01175},
+    {"period": 0.0125, "delay": 2.5e-4},
+]
+LATE = pytest.mark.parametrize("times", TIMES, ids=lambda t: " ".join(f"{k} {1e3 * v:g} ms" for k, v in t.items()))
+SOLVERS = pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+
+
+@LATE
+@SOLVERS
+def test_late_readings_are_those_of_their_instants(times, integrator):
+    sensor = smc.Encoder(math.inf, **times)
+    changes = {"physics_step": 2.5e-4, "integrator": integrator, "velocity": "measured", "duration": 0.3}
+    _, x, v = read(sensor, **changes)
+    np.testing.assert_array_equal(x, expected(sensor, changes, "x"))
+    np.testing.assert_array_equal(v, expected(sensor, changes, "v"))
+
+
+@pytest.mark.parametrize("times", [{"delay": 0.003}, {"period": 0.007}, {"period": 0.003, "delay": 0.001}])
+@pytest.mark.parametrize("step", [1e-3, 1e-3 / 3])
+def test_ten_seconds_do_not_shift_the_instants(times, step):
+    """1e-3 / 3 is no binary number, and its sum over 30 000 steps is not 10."""
+    sensor = smc.Encoder(math.inf, **times)
+    changes = {"physics_step": step, "velocity": "measured", "duration": 10.0}
+    _, x, _ = read(sensor, **changes)
+    np.testing.assert_array_equal(x, expected(sensor, changes, "x"))
+
+
+def test_before_the_first_arrives_the_initial_state_is_read():
+    _, x, v = read(smc.Encoder(math.inf, delay=0.02), x0=-1.2, v0=3.0, velocity="measured")
+    np.testing.assert_array_equal(x[:21], -1.2)
+    np.testing.assert_array_equal(v[:21], 3.0)
+    assert x[21, 0] != -1.2
+
+
+def test_a_late_encoder_shows_no_speed_at_the_start_that_is_not_there():
+    """From 0 to x0 in one reading would be a thousand metres a second."""
+    _, _, v = read(smc.Encoder(math.inf, delay=0.01), v0=0.0)
+    assert np.abs(v).max() < 5.0
+    assert not v[:11].any()
+
+
+def test_readings_are_held_between_periods_with_their_noise_and_losses():
+    """One draw a reading, not a sample."""
+    sensor = smc.Encoder(math.inf, period=0.01, dropout=0.3)
+    trace, x, _ = read(sensor, noise=smc.Noise(position=0.1), duration=5.0)
+    blocks = x[:-1, 0].reshape(-1, 10)
+    assert (blocks == blocks[:, :1]).all()
+    changed = np.diff(blocks[:, 0]) != 0
+    assert abs((~changed).mean() - 0.3) < 4 * math.sqrt(0.21 / len(changed))
+    error = (blocks[:, 0] - trace.x[:-1, 0].reshape(-1, 10)[:, 0])[1:][changed]
+    assert error.std() == pytest.approx(0.1, rel=0.15)
+
+
+def test_noise_of_readings_that_are_no_multiple_of_the_control_period_is_drawn_once_a_reading():
+    """Readings every 2.5 ms at samples every 1 ms: the number that held at the sample tells when it is drawn anew."""
+    sensor = smc.Encoder(math.inf, period=2.5e-3)
+    changes = {"physics_step": 2.5e-4, "integrator": "implicitfast", "velocity": "measured", "duration": 0.5}
+    _, x, _ = read(sensor, noise=smc.Noise(position=0.5), **changes)
+    error = x[:, 0] - expected(sensor, changes, "x")[:, 0]
+    k = np.arange(len(error))
+    reading = np.floor(k * 1e-3 / 2.5e-3 + 1e-9).astype(int)
+    jumps = np.abs(np.diff(error)) > 1e-9
+    np.testing.assert_array_equal(jumps, np.diff(reading) > 0)
+    assert len(np.unique(error.round(5))) == reading[-1] + 1
+
+
+@pytest.mark.parametrize("delay", [0.0, 2e-3, 2.5e-3])
+def test_late_noise_changes_with_the_reading(delay):
+    """A reading taken at t arrives at t + delay with one noise, until the next arrives."""
+    sensor = smc.Encoder(math.inf, period=5e-3, delay=delay)
+    changes = {"physics_step": 2.5e-4, "integrator": "implicitfast", "velocity": "measured", "duration": 0.5}
+    _, x, _ = read(sensor, noise=smc.Noise(position=0.5), **changes)
+    error = x[:, 0] - expected(sensor, changes, "x")[:, 0]
+    t = np.arange(len(error)) * 1e-3
+    reading = np.maximum(np.floor((t - delay) / 5e-3 + 1e-9), 0)
+    np.testing.assert_array_equal(np.abs(np.diff(error)) > 1e-9, np.diff(reading) > 0)
+
+
+def test_an_encoder_that_reads_once_a_sample_is_one_without_a_period():
+    noise = smc.Noise(position=0.1)
+    plainly, period = (read(smc.Encoder(100, dropout=0.2, period=p), noise=noise)[0] for p in (None, 1e-3))
+    same(plainly, period)
+
+
+def test_no_delay_is_no_delay():
+    same(read(smc.Encoder(100))[0], read(smc.Encoder(100, delay=0.0))[0])
+
+
+# all of it, both loops, networks
+
+
+def random_encoder(rng, step):
+    return smc.Encoder(
+        counts=float(rng.choice([2, 100, 4096, math.inf])),
+        bias=float(rng.choice([0.0, 0.01, -0.3])),
+        dropout=float(rng.choice([0.0, 0.2, 1.0])),
+        period=rng.choice([None, *(step * np.array([1, 3, 4, 20, 37]))]),
+        delay=float(step * rng.choice([0, 0, 1, 3, 4, 50])),
+    )
+
+
+def scattered(number):
+    rng = np.random.default_rng(number)
+    integrator = str(rng.choice(["RK4", "implicitfast", "Euler"]))
+    step = 1e-3 if integrator == "RK4" else 2.5e-4
+    name = str(rng.choice(smc.plants()))
+    plant = smc.plant(name, n=3) if smc.plant(name).network else smc.plant(name)
+    return smc.Scenario(
+        plant=plant,
+        law=smc.law(str(rng.choice(["observer_free", "super_twisting"]))),
+        duration=0.15,
+        control_period=float(rng.choice([1, 2, 5])) * 1e-3,
+        physics_step=step,
+        integrator=integrator,
+        v0=float(rng.normal()),
+        noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
+        input_delay=step * int(rng.integers(0, 9)),
+        velocity=[None, "measured", "filtered_difference"][rng.integers(3)],
+        friction=[None, smc.Viscous(0.1), smc.Coulomb(0.1)][rng.integers(3)],
+        seed=number,
+        sensor=random_encoder(rng, step),
+    )
+
+
+def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
+    scenarios = [scattered(number) for number in range(40)]
+    for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        same(trace, reference.run(s))
+        same(trace, smc.run(s, threads=1))
+
+
+def test_encoders_that_differ_in_numbers_share_one_batch_whatever_the_longest_delay():
+    sensors = [smc.Encoder(counts, delay=delay) for counts, delay in ((100, 1e-3), (math.inf, 0.5), (4096, 0.02))]
+    together = smc.run([scenario(sensor) for sensor in sensors], threads=1)
+    for sensor, trace in zip(sensors, together, strict=True):
+        same(trace, smc.run(scenario(sensor)))
+
+
+@SOLVERS
+def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
+    changes = {"integrator": integrator, "velocity": "measured", "law": "observer_free", "noise": smc.Noise(0.1, 0.1)}
+    for plant in smc.plants():
+        with_encoder, without = (smc.run(scenario(s, plant=plant, **changes)) for s in (PERFECT, None))
+        same(with_encoder, without)
+
+
+def test_an_ideal_plant_with_an_encoder_stays_ideal():
+    seen = scenario(smc.Encoder(4096, delay=2e-3))
+    assert (seen.integrator, seen.physics_step, seen.realistic) == ("RK4", 1e-3, False)
+
+
+def test_every_channel_of_a_network_has_its_encoder():
+    plant = smc.plant("pendulum_network", n=3)
+    sensor = smc.Encoder(100, delay=5e-3)
+    trace, x, _ = read(sensor, plant=plant, v0=(0.5, -0.5, 1.0))
+    q = 2 * math.pi / 100
+    held = np.vstack([trace.x[:1].repeat(5, axis=0), trace.x[:-5]])
+    np.testing.assert_array_equal(x, q * np.floor(held / q + 0.5))
+
+
+# bad values
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "says"),
+    [
+        ("counts", 1, "counts is 1: give a whole number"),
+        ("counts", 0, "counts is 0"),
+        ("counts", -4096, "counts is -4096"),
+        ("counts", 10.5, "counts is 10.5"),
+        ("counts", math.nan, "counts is nan"),
+        ("counts", -math.inf, "counts is -inf"),
+        ("counts", "4096", "counts is '4096'"),
+        ("counts", None, "counts is None"),
+        ("counts", True, "counts is True"),
+        ("bias", math.nan, "bias is nan: give a finite number"),
+        ("bias", math.inf, "bias is inf"),
+        ("bias", "0", "bias is '0': give a number"),
+        ("dropout", 1.1, "dropout is 1.1: give at most 1"),
+        ("dropout", -0.1, "dropout is -0.1: give at least 0"),
+        ("dropout", math.nan, "dropout is nan"),
+        ("period", 0.0, "period is 0: give a number greater than 0"),
+        ("period", -1e-3, "period is -0.001"),
+        ("period", math.inf, "period is inf"),
+        ("period", "1 ms", "period is '1 ms'"),
+        ("delay", -1e-3, "delay is -0.001: give at least 0"),
+        ("delay", math.nan, "delay is nan"),
+        ("delay", None, "delay is None: give a number"),
+    ],
+)
+def test_bad_numbers_are_refused_in_one_sentence(field, value, says):
+    with pytest.raises(smc.ScenarioError) as caught:
+        smc.Encoder(**{field: value})
+    message = str(caught.value)
+    assert f"Encoder's {says}" in message
+    assert "\n" not in message
+    assert "give" in message
+
+
+@pytest.mark.parametrize("field", ["period", "delay"])
+def test_times_that_are_no_whole_number_of_steps_are_refused(field):
+    with pytest.raises(
+        smc.ScenarioError, match=rf"Encoder's {field} 0.0015 s .*: give a physics_step that divides it$"
+    ):
+        scenario(smc.Encoder(**{field: 0.0015}))
+    scenario(smc.Encoder(**{field: 0.0015}), physics_step=5e-4)
+
+
+def test_a_delay_beyond_the_run_leaves_the_initial_state():
+    _, x, _ = read(smc.Encoder(math.inf, delay=2.0))
+    assert (x == 1.5).all()
+
+
+@pytest.mark.parametrize("times", [{"delay": 1e9}, {"delay": 1e6, "period": 1e-3}])
+def test_a_delay_that_no_buffer_holds_is_refused_in_one_sentence(times):
+    with pytest.raises(smc.ScenarioError, match=r"^Encoder's delay .* give"):
+        smc.run(scenario(smc.Encoder(math.inf, **times), duration=0.01))
+
+
+def test_an_encoder_may_read_once():
+    _, x, _ = read(smc.Encoder(math.inf, period=1e9), duration=0.1)
+    assert (x == 1.5).all()
+
+
+@pytest.mark.parametrize("value", [4096, "encoder", smc.Noise(0.1), [smc.Encoder()], smc.Encoder])
+def test_only_an_encoder_is_a_sensor(value):
+    with pytest.raises(smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"):
+        scenario(value)
+
+
+def test_encoders_are_values():
+    assert smc.Encoder(counts=4096.0) == smc.Encoder() == pickle.loads(pickle.dumps(smc.Encoder()))
+    assert len({smc.Encoder(), smc.Encoder(delay=0), smc.Encoder(dropout=0.1)}) == 2

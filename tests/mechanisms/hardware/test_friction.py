@@ -1,0 +1,239 @@
+"""Frictions are what they say: they hold below their level, let go above it, and dissipate what the formulas say."""
+
+import dataclasses
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
+from smc_mujoco.mechanisms.hardware.part import drive_ids
+from smc_mujoco.mechanisms.plant import array, plant, write
+
+IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
+INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
+PLANTS = pytest.mark.parametrize("name", sorted(INERTIA))
+STEPS = pytest.mark.parametrize(("h", "integrator"), [(2.5e-4, IMPLICIT), (1e-3, RK4)], ids=["implicitfast", "RK4"])
+BRISTLES = pytest.mark.parametrize("h", [2.5e-4, 1e-3])
+LUGRE = LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
+ALL = [Viscous(0.1), Coulomb(0.05), LUGRE]
+EACH = pytest.mark.parametrize("part", ALL, ids=lambda part: type(part).__name__)
+
+
+def build(p, *parts, h=2.5e-4, integrator=IMPLICIT):
+    """The plant's model with the parts in it."""
+    spec = p.spec()
+    for part in parts:
+        part.edit(spec)
+    model = spec.compile()
+    model.opt.timestep, model.opt.integrator = h, integrator
+    for part in parts:
+        write(model, part.fields(model))
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
+    """The plant's inertia with nothing on it but the parts: no weight, spring or damping of its own."""
+    model = build(plant(name), *parts, h=h, integrator=integrator)
+    model.dof_damping[:] -= build(plant(name)).dof_damping
+    for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly"):
+        array(model, field)[:] = 0.0
+    return model
+
+
+def held(model, level, ramp, seconds):
+    """The state after a force that rises to `level` within `ramp` seconds and stays."""
+    data = mujoco.MjData(model)
+    while data.time < seconds:
+        data.ctrl[:] = level * min(1.0, data.time / ramp)
+        mujoco.mj_step(model, data)
+    return data
+
+
+def coasting(model, v0, seconds):
+    """(position, speed) after every step from a start at v0, (k, 2)."""
+    data = mujoco.MjData(model)
+    data.qvel[0] = v0
+    states = [(0.0, v0)]
+    while data.time < seconds:
+        mujoco.mj_step(model, data)
+        states.append((data.qpos[0], data.qvel[0]))
+    return np.array(states)
+
+
+@PLANTS
+@STEPS
+@pytest.mark.parametrize("level", [0.05, 1.0])
+def test_a_joint_stuck_by_coulomb_friction_does_not_creep(name, h, integrator, level):
+    model = bare(name, Coulomb(level), h=h, integrator=integrator)
+    for share in (0.5, -0.9, 0.99):
+        data = held(model, share * level, 1e-9, 0.5)
+        creep = 1e-4 * h * abs(share) * level / INERTIA[name]
+        assert abs(data.qvel[0]) == pytest.approx(creep, rel=0.02)
+        assert abs(data.qvel[0]) < 1e-4  # of 1 rad/s or 1 m/s
+
+
+@PLANTS
+@STEPS
+def test_coulomb_friction_lets_go_just_above_its_level(name, h, integrator):
+    model = bare(name, Coulomb(1.0), h=h, integrator=integrator)
+    data = held(model, 1.01, 1e-9, 0.5)
+    assert data.qvel[0] == pytest.approx(0.01 / INERTIA[name] * 0.5, rel=0.01)
+
+
+@PLANTS
+@STEPS
+@pytest.mark.parametrize("level", [0.05, 1.0])
+def test_a_block_slides_v0_squared_over_twice_its_deceleration(name, h, integrator, level):
+    deceleration = level / INERTIA[name]
+    states = coasting(bare(name, Coulomb(level), h=h, integrator=integrator), 1.0, 1.1 / deceleration)
+    assert states[-1, 0] == pytest.approx(1.0 / (2 * deceleration), rel=0.01)
+    sliding = states[: int(0.9 / deceleration / h), 1]
+    assert -np.diff(sliding) == pytest.approx(deceleration * h, rel=0.01)
+
+
+@PLANTS
+@STEPS
+def test_no_coulomb_friction_is_no_friction_to_the_bit(name, h, integrator):
+    with_zero, without = (build(plant(name), *parts, h=h, integrator=integrator) for parts in ([Coulomb(0.0)], []))
+    assert (coasting(with_zero, 1.0, 1.0) == coasting(without, 1.0, 1.0)).all()
+
+
+@PLANTS
+def test_viscous_friction_decays_as_exp_minus_b_t_over_inertia(name):
+    states = coasting(bare(name, Viscous(0.1)), 1.0, 1.0)
+    assert states[-1, 1] == pytest.approx(math.exp(-0.1 / INERTIA[name]), rel=1e-3)
+
+
+@PLANTS
+def test_viscous_friction_adds_to_the_plants_damping(name):
+    own = build(plant(name)).dof_damping[0]
+    assert build(plant(name), Viscous(0.1)).dof_damping[0] == own + 0.1
+
+
+@PLANTS
+@BRISTLES
+def test_a_joint_stuck_by_lugre_stands(name, h):
+    data = held(bare(name, LUGRE, h=h), 0.9 * LUGRE.static, 1.0, 10.0)
+    assert abs(data.qvel[0]) < 1e-6
+    assert abs(data.qpos[0]) < 10 * LUGRE.static / LUGRE.stiffness
+
+
+@PLANTS
+@BRISTLES
+@pytest.mark.parametrize("part", [LUGRE, LuGre(0.5, 0.8, 0.05), LuGre(0.05, 0.05, 0.01)])
+def test_lugre_breaks_away_at_its_static_level(name, h, part):
+    model = bare(name, part, h=h)
+    data, friction = mujoco.MjData(model), model.actuator(f"passive:{model.joint(0).name}").id
+    most, speed = 0.0, 0.0
+    while data.time < 21.0:  # a ramp of static / 20 a second
+        data.ctrl[0] = part.static * data.time / 20.0
+        mujoco.mj_step(model, data)
+        most, speed = max(most, -data.actuator_force[friction]), data.qvel[0]
+    assert most == pytest.approx(part.static, rel=0.02)
+    assert speed > 10 * part.static / 20.0 / part.stiffness  # it slides, far faster than bristles bend
+
+
+@PLANTS
+@pytest.mark.parametrize("v0", [3.0, -3.0])
+def test_lugre_slides_at_its_coulomb_level(name, v0):
+    h = 2.5e-4
+    v = np.abs(coasting(bare(name, LUGRE, h=h), v0, 0.3)[:, 1])
+    deceleration = LUGRE.coulomb / INERTIA[name]
+    assert (v[200] - v[-1]) / (h * (len(v) - 201)) == pytest.approx(deceleration, rel=0.01)
+
+
+@pytest.mark.parametrize("v", [-2.0, -0.02, 0.003, 0.0, 0.01, 1.0])
+def test_lugre_is_the_formula_of_its_docstring(v):
+    model = bare("duffing", LUGRE)
+    data = mujoco.MjData(model)
+    data.qvel[0], data.act[0] = v, 4e-5
+    mujoco.mj_forward(model, data)
+    g = LUGRE.coulomb + (LUGRE.static - LUGRE.coulomb) * math.exp(-((v / LUGRE.stribeck) ** 2))
+    rate = v - LUGRE.stiffness * abs(v) / g * 4e-5
+    damping = 0.2 * math.sqrt(LUGRE.stiffness * 1.0)  # of the cart of 1 kg
+    assert data.qfrc_actuator[0] == pytest.approx(-(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9)
+
+
+@EACH
+def test_friction_never_adds_energy(part):
+    for name, inertia in INERTIA.items():
+        v = coasting(bare(name, part), 1.0, 4.0)[:, 1]
+        energy = 0.5 * inertia * v**2
+        lent = (
+            0.5 * LUGRE.static**2 / LUGRE.stiffness if isinstance(part, LuGre) else 1e-20
+        )  # J, what bristles can hold
+        assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + lent)
+
+
+@pytest.mark.parametrize("name", ["inverted_pendulum", "pendulum_network"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [Viscous(0.0), Viscous(0.1), Viscous(2.0)],
+        [Coulomb(0.0), Coulomb(0.05), Coulomb(1.0)],
+        [LUGRE, LuGre(0.2, 0.5, 0.1, 300.0, 2.0), LuGre(1.0, 1.0, 1e-3, 2e3, 5.0)],
+    ],
+    ids=lambda parts: type(parts[0]).__name__,
+)
+def test_every_number_is_per_simulation(name, parts):
+    models = [build(plant(name), part) for part in parts]
+    assert len({part.structure() for part in parts}) == 1
+    batch = Batch(models[0], nsim=len(parts), nthread=1)
+    for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
+        batch.expand(field)[:] = [array(model, field) for model in models]
+    batch.set_const()
+    qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
+    singles = [mujoco.MjData(model) for model in models]
+    for k in range(400):
+        ctrl[:] = math.sin(0.02 * k)
+        batch.step()
+        for model, data in zip(models, singles, strict=True):
+            data.ctrl[:] = math.sin(0.02 * k)
+            mujoco.mj_step(model, data)
+    assert (qpos == [data.qpos for data in singles]).all()
+    assert len({row.tobytes() for row in np.asarray(qpos)}) == len(parts)
+
+
+@EACH
+def test_friction_is_on_every_joint_of_a_network(part):
+    model = build(plant("pendulum_network", n=4), part)
+    data = mujoco.MjData(model)
+    model.opt.gravity[:], model.tendon_stiffness[:] = 0.0, 0.0
+    data.qvel[:] = 1.0
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    own = build(plant("pendulum_network", n=4)).dof_damping[0]
+    assert (data.qvel < math.exp(-own / 0.125 * 0.25)).all()
+    assert data.qvel == pytest.approx(data.qvel[0])
+    assert list(drive_ids(model)) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Viscous(-0.1), "Viscous's b is -0.1: give at least 0"),
+        (lambda: Coulomb(-1), "Coulomb's level is -1: give at least 0"),
+        (lambda: Coulomb("much"), "Coulomb's level is 'much': give a number"),
+        (lambda: Coulomb(math.nan), "Coulomb's level is nan: give a finite number"),
+        (lambda: LuGre(0.2, 0.1, 0.01), "LuGre's static 0.1 is less than its coulomb 0.2: give static >= coulomb"),
+        (lambda: LuGre(0.0, 0.1, 0.01), "LuGre's coulomb is 0: give a number greater than 0"),
+        (lambda: LuGre(0.1, 0.1, 0.0), "LuGre's stribeck is 0: give a number greater than 0"),
+        (lambda: LuGre(0.1, 0.1, 0.01, 0.0), "LuGre's stiffness is 0: give a number greater than 0"),
+        (lambda: LuGre(0.1, 0.1, 0.01, damping=-1.0), "LuGre's damping is -1: give at least 0"),
+    ],
+)
+def test_bad_numbers_are_one_sentence(make, says):
+    with pytest.raises(ScenarioError) as error:
+        make()
+    assert str(error.value) == says
+
+
+def test_numbers_are_kept_as_floats():
+    made = LuGre(1, 2, np.float32(0.5), damping=4)
+    assert dataclasses.astuple(made) == (1.0, 2.0, 0.5, 1000.0, 4.0)
+    assert all(type(value) is float for value in dataclasses.astuple(made))

@@ -1,0 +1,213 @@
+"""Two drives in series do what their equations say, and the same in the compiled callback and in the plain loop."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import margin_kinds
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.tandem import tandem
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.state import LOGGED
+
+H = 5e-4  # s
+MOTOR = smc.DCMotor(inductance=5e-3)  # L/R = 16.7 ms
+
+
+@smc.law_function(gains={"u": 1.0, "omega": 0.0})
+def asking(y, gains, memory):
+    """u, or u cos(omega t)."""
+    return gains.u * math.cos(gains.omega * y.t), y.e
+
+
+def scenario(*actuator, **fields):
+    """A block of 1 kg, here under a constant command."""
+    return smc.Scenario(
+        **{"plant": "duffing", "law": asking(), "duration": 0.1, "physics_step": H, "control_period": H}
+        | {"actuator": actuator}
+        | fields
+    )
+
+
+def risen(t, first, second):
+    """The output of two lags from rest under 1."""
+    if first == second:
+        return 1.0 - (1.0 + t / first) * np.exp(-t / first)
+    return 1.0 - (first * np.exp(-t / first) - second * np.exp(-t / second)) / (first - second)
+
+
+@pytest.mark.parametrize("step", [1e-3, 2.5e-4])
+@pytest.mark.parametrize(("first", "second"), [(0.02, 0.005), (0.005, 0.02), (0.01, 0.01), (1e-5, 0.01), (0.01, 1e-5)])
+def test_two_lags_are_exact_at_the_end_of_every_step(first, second, step):
+    """For a held u there is no error of the step: what is left is rounding."""
+    trace = smc.run(scenario(smc.Lag(first), smc.Lag(second), physics_step=step, control_period=step))
+    np.testing.assert_allclose(trace.force[:, 0], risen(trace.t, first, second), rtol=0.0, atol=1e-14)
+    np.testing.assert_array_equal(trace.applied, 1.0)
+
+
+def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
+    equal, nearly = (tandem((smc.Lag(0.01), smc.Lag(tau)), H) for tau in (0.01, 0.01 * (1.0 + 1e-13)))
+    assert equal == pytest.approx(nearly, rel=1e-12)
+
+
+def test_a_lag_of_none_leaves_the_other_alone():
+    one, before, after = smc.run(
+        [scenario(smc.Lag(0.01)), scenario(smc.Lag(0.0), smc.Lag(0.01)), scenario(smc.Lag(0.01), smc.Lag(0.0))]
+    )
+    assert before.force == pytest.approx(one.force, abs=1e-12)
+    assert after.force == pytest.approx(one.force, abs=1e-12)
+
+
+def test_a_motors_winding_counts_as_its_lag():
+    """A joint that hardly moves: the torque is that of two lags, mu and L/R."""
+    trace = smc.run(scenario(smc.Lag(0.01), MOTOR, mismatch={"mass": 1e9}, x0=0.0))
+    assert trace.force[:, 0] == pytest.approx(risen(trace.t, 0.01, MOTOR.delay), abs=1e-8)
+
+
+def test_a_rate_limit_follows_the_lag():
+    trace = smc.run(scenario(smc.Lag(0.01), smc.RateLimit(20.0)))
+    lagged = 1.0 - np.exp(-trace.t / 0.01)
+    follows = lagged <= 20.0 * trace.t + 1e-12  # the lag is steeper at first, and flatter in the end
+    meets = np.argmax(follows & (trace.t > 0.0))
+    assert trace.force[:meets, 0] == pytest.approx(20.0 * trace.t[:meets], abs=1e-11)
+    assert trace.force[meets:, 0] == pytest.approx(lagged[meets:], abs=1e-11)
+
+
+def moved(s, u):
+    """x of the scenario's Duffing block behind its Lag and its DCMotor, by SciPy, under the commands of its samples."""
+    lag, motor = s.actuator
+    inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
+    p = s.plant.values({})
+
+    def rates(t, z, u):
+        x, v, a, i = z
+        f, _ = s.plant.nominal(np.array([x]), np.array([v]), 0, p)  # of 1 kg
+        volts = motor.scale * a - motor.resistance * i - motor.constant * v
+        return v, (f + motor.constant * i) / inertia, (u - a) / lag.tau, volts / motor.inductance
+
+    z, x = [s.x0[0], 0.0, 0.0, 0.0], [s.x0[0]]
+    for held in u[:-1, 0]:
+        z = solve_ivp(rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-8, atol=1e-11).y[:, -1]
+        x.append(z[0])
+    return np.array(x)
+
+
+def test_a_lag_and_a_motor_move_the_block_as_scipy_says():
+    """To first order in the step, as behind one drive: implicitfast moves the block by its speed at a step's end."""
+    law = asking(u=3.0, omega=5.0)
+    base = scenario(smc.Lag(0.02), MOTOR, law=law, x0=0.3, duration=0.3, control_period=2e-3)
+    traces = smc.run([dataclasses.replace(base, physics_step=step) for step in (1e-3, 2.5e-4)])
+    exact = moved(base, traces[0].u)
+    errors = [np.abs(trace.x[:, 0] - exact).max() for trace in traces]
+    assert np.ptp(exact) > 0.05
+    assert errors[1] < 2.5e-4 * np.abs(traces[1].v).max()
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@smc.law_function(gains={"M": 2.0})
+def relay(y, gains, memory):
+    """Switches by the sign of v."""
+    return (-gains.M if y.v > 0.0 else gains.M), y.v
+
+
+def test_a_relay_behind_two_lags_swings_as_its_describing_function_says():
+    """s' = u / (mu p + 1)^2, u = -M sign s, turns by half a turn where mu omega = 1: A = 4 M/pi / (2 omega) there."""
+    mu, M = 0.05, 2.0
+    free = smc.plant("duffing", alpha=1e-9, beta=1e-9, delta=1e-9)
+    s = scenario(smc.Lag(mu), smc.Lag(mu), plant=free, law=relay(M=M), duration=6.0, x0=0.0, v0=0.1)
+    trace = smc.run(s)
+    late = trace.t > 3.0
+    t, v = trace.t[late], trace.v[late, 0]
+    rises = t[1:][(v[:-1] <= 0.0) & (v[1:] > 0.0)]
+    omega = 2.0 * math.pi * (len(rises) - 1) / (rises[-1] - rises[0])
+    assert omega == pytest.approx(1.0 / mu, rel=0.05)
+    assert np.ptp(v) / 2.0 == pytest.approx(2.0 * M * mu / math.pi, rel=0.05)
+
+
+HARD = [
+    {"actuator": (smc.Lag(0.01), smc.Lag(0.03))},
+    {"actuator": (smc.Lag(0.01), smc.Lag(0.03)), "input_delay": 3.5e-3, "u_max": 0.5},
+    {"actuator": (smc.Lag(0.01), smc.DCMotor()), "input_delay": 2e-3},
+    {"actuator": (smc.Lag(0.01), smc.DCMotor(), smc.Backlash(0.02)), "friction": smc.Coulomb(0.05)},
+    {"actuator": (smc.Backlash(0.02), smc.Lag(0.01), smc.RateLimit(20.0))},
+    {"actuator": (smc.Lag(0.0), smc.Lag(0.0)), "integrator": "Euler"},
+    {"actuator": smc.Lag(0.03)},
+    {},
+]
+
+
+def hard():
+    """Drives in series under noise, delays and bounds, in company of others."""
+    common = {"duration": 0.1, "control_period": 2e-3, "physics_step": 5e-4, "noise": smc.Noise(0.01, 0.05), "seed": 3}
+    common |= {"disturbance": smc.OrnsteinUhlenbeck(0.2, tau=0.1), "integrator": "implicitfast"}
+    plants = {"duffing": "classical", "pendulum_network": "super_twisting", "cart_pole": "cart_pole"}
+    laws = {name: law if law in smc.laws(name) else smc.laws(name)[0] for name, law in plants.items()}
+    return [smc.Scenario(plant=name, law=law, **common | fields) for name, law in laws.items() for fields in HARD]
+
+
+def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
+    scenarios = hard()
+    alone = [smc.run(s) for s in scenarios]
+    for threads in (1, 2):
+        for one, trace in zip(alone, smc.run(scenarios, threads=threads), strict=True):
+            assert trace.failure is None
+            for name in LOGGED:
+                np.testing.assert_array_equal(getattr(trace, name), getattr(one, name), err_msg=f"{name} of {one!r}")
+    for s, trace in zip(scenarios, alone, strict=True):
+        other = reference.run(s)
+        for name in LOGGED:
+            if s.plant.name == "cart_pole":  # its nominal model compiles to other roundings
+                np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9)
+            else:
+                np.testing.assert_array_equal(getattr(trace, name), getattr(other, name), err_msg=f"{name} of {s!r}")
+
+
+def test_u_is_bounded_and_delayed_before_the_drives():
+    late = smc.run(scenario(smc.Lag(0.01), smc.DCMotor(), law=asking(u=3.0), u_max=2.0, input_delay=4 * H))
+    assert (late.u == 2.0).all()
+    assert late.applied[:, 0].tolist() == [0.0] * 4 + [2.0] * (len(late.t) - 4)
+    lags = smc.run(scenario(smc.Lag(0.01), smc.Lag(0.02), law=asking(u=3.0), u_max=2.0, input_delay=4 * H))
+    assert (lags.force[:5] == 0.0).all()
+    assert lags.force[4:, 0] == pytest.approx(2.0 * risen(lags.t[:-4], 0.01, 0.02), abs=1e-12)
+
+
+def test_the_users_order_is_kept_and_a_backlash_is_last(tmp_path):
+    s = scenario(smc.Backlash(0.02), smc.Lag(0.03), smc.Lag(0.01), law="classical")
+    assert s.actuator == (smc.Lag(0.03), smc.Lag(0.01), smc.Backlash(0.02))
+    assert s != dataclasses.replace(s, actuator=(smc.Lag(0.01), smc.Lag(0.03), smc.Backlash(0.02)))
+    trace = smc.run(s)
+    trace.save(tmp_path / "two.npz")
+    again = smc.load(tmp_path / "two.npz")
+    assert again.scenario == s
+    np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
+
+
+def test_theory_of_delays_knows_no_drive():
+    law = smc.law("observer_free", lam=6.0, k1=3.076)
+    assert margin_kinds.SPECS["delay"].expected(scenario(law=law)) is not None
+    assert margin_kinds.SPECS["delay"].expected(scenario(smc.Lag(0.01), smc.Lag(0.01), law=law)) is None
+
+
+@pytest.mark.parametrize(
+    ("actuator", "says"),
+    [
+        (
+            (smc.Lag(0.1), smc.Lag(0.2), smc.Lag(0.3)),
+            "actuator has 3 drives, (Lag(tau=0.1), Lag(tau=0.2), Lag(tau=0.3)): give one, or two in series",
+        ),
+        (
+            (smc.RateLimit(2.0), smc.Lag(0.2)),
+            "actuator has RateLimit(rate=2.0) before Lag(tau=0.2), and of two drives in series the first is a Lag: "
+            "give one drive, or (smc.Lag(0.01), another)",
+        ),
+        ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice, "),
+    ],
+)
+def test_what_cannot_stand_in_series_is_one_sentence(actuator, says):
+    with pytest.raises(ScenarioError) as error:
+        scenario(*actuator)
+    assert str(error.value).startswith(says)

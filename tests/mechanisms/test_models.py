@@ -1,0 +1,234 @@
+"""Each model is its equation and nothing else: held against `nominal` at random states, for every plant."""
+
+from collections import namedtuple
+
+import mujoco
+import numba
+import numpy as np
+import pytest
+
+from smc_mujoco.mechanisms.plant import catalogue, model_path, plant, write
+
+NAMES = sorted(catalogue())
+SIZES = {1: [1], 2: [2]}  # largest n -> which are tested
+SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 3, 5, 40, 100])]
+CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
+DRIVEN = [
+    (name, n) for name, n in SIZED if not catalogue()[name].free
+]  # the others: tests/mechanisms/test_underactuated.py
+EVERY_JOINT_DRIVEN = pytest.mark.parametrize(("name", "n"), DRIVEN, ids=[f"{name}-{n}" for name, n in DRIVEN])
+PLANTS = pytest.mark.parametrize("name", NAMES)
+
+
+def sized(name, n):
+    return plant(name, n=n) if n > 1 else plant(name)
+
+
+def believed(p):
+    """The nominal parameters as `nominal` takes them."""
+    return namedtuple("Parameters", p.parameters)(**p.parameters)
+
+
+def changed(name, n, rng):
+    """The plant with every parameter moved by up to 40%."""
+    base = sized(name, n)
+    return plant(name, n=n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in base.parameters.items()})
+
+
+def expected(p, x, v, u):
+    """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
+    parameters = believed(p)
+    terms = [p.nominal(x, v, i, parameters) for i in range(p.n)]
+    forces = [u[i if i < p.driven else i - p.driven] for i in range(p.n)]  # that of the joint it moves with
+    acc = np.array([f + g * force for (f, g), force in zip(terms, forces, strict=True)])
+    size = max(max(abs(f), abs(g * force)) for (f, g), force in zip(terms, forces, strict=True))
+    return acc, size
+
+
+def acceleration(model, data, x, v, u):
+    data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u[: model.nu]
+    mujoco.mj_forward(model, data)
+    return data.qacc.copy()
+
+
+def worst_error(p, model, rng, trials=20):
+    """The largest |qacc - (f + g u)| over random states, relative to the largest term."""
+    data = mujoco.MjData(model)
+    worst = 0.0
+    for _ in range(trials):
+        x, v, u = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n), rng.uniform(-6, 6, p.n)
+        acc, size = expected(p, x, v, u)
+        worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
+    return worst
+
+
+@PLANTS
+def test_nominal_compiles_to_the_same_numbers(name):
+    p = catalogue()[name]
+    parameters = believed(p)
+    compiled = numba.njit(p.nominal)
+    rng = np.random.default_rng(0)
+    x, v = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n)
+    for i in range(p.n):
+        np.testing.assert_allclose(compiled(x, v, i, parameters), p.nominal(x, v, i, parameters), rtol=1e-14)
+
+
+@CASES
+def test_the_model_obeys_its_equation(name, n):
+    rng = np.random.default_rng(1)
+    p = sized(name, n)
+    assert worst_error(p, p.load(), rng) < 1e-9
+
+
+@CASES
+def test_the_model_obeys_its_equation_with_changed_parameters(name, n):
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        p = changed(name, n, rng)
+        assert worst_error(p, p.load(), rng) < 1e-9
+
+
+@CASES
+def test_fields_alone_carry_a_parameter_change(name, n):
+    """A jump writes fields into a running simulation: nothing else may need refreshing."""
+    rng = np.random.default_rng(3)
+    base, p = sized(name, n), changed(name, n, rng)
+    model = base.load()
+    write(model, p.fields(model, p.values({})))
+    assert worst_error(p, model, rng) < 1e-9
+
+
+@CASES
+def test_every_parameter_is_felt_by_the_model(name, n):
+    """Without this, a parameter missing from `fields` and from `nominal` alike would pass."""
+    rng = np.random.default_rng(4)
+    p = sized(name, n)
+    x, v, u = rng.uniform(1.1, 2, n), rng.uniform(1, 3, n), rng.uniform(1, 6, n)
+    before = p.load()
+    for key in p.parameters:
+        after = plant(name, **({"n": n} if n > 1 else {}), **{key: 1.25 * p.parameters[key] or 0.1}).load()
+        a, b = (acceleration(m, mujoco.MjData(m), x, v, u) for m in (before, after))
+        assert np.all(np.abs(a - b) > 1e-6), key
+
+
+@CASES
+def test_default_fields_change_nothing_of_the_compiled_file(name, n):
+    p = sized(name, n)
+    model = p.spec().compile()
+    for field, index, value, _ in p.fields(model, p.values({})):
+        owner = model.opt if field.startswith("opt.") else model
+        compiled = getattr(owner, field.removeprefix("opt."))
+        assert np.all(compiled[index] == np.asarray(value)), field
+
+
+@CASES
+def test_nothing_moves_but_the_equation(name, n):
+    p = sized(name, n)
+    model = p.load()
+    assert model.nv == model.nq == n
+    assert model.nu == p.driven
+    assert not model.dof_armature.any()
+    assert not model.dof_frictionloss.any()
+    assert not model.tendon_frictionloss.any()
+    assert not model.tendon_armature.any()
+    assert not model.jnt_limited.any()
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    assert model.opt.timestep == 1e-3
+    assert not model.actuator_ctrllimited.any()
+    assert np.all(model.actuator_gear[:, 0] == 1.0)
+
+
+@EVERY_JOINT_DRIVEN
+def test_all_mass_sits_at_the_points_of_the_equation(name, n):
+    p = sized(name, n)
+    model = p.load()
+    moving = model.dof_bodyid
+    assert np.all(model.body_mass[moving] == p.parameters[p.mass])
+    assert model.body_mass.sum() == pytest.approx(n * p.parameters[p.mass], rel=1e-15)
+    inertia = 1.0 / p.nominal(np.zeros(n), np.zeros(n), 0, believed(p))[1]
+    assert model.body_inertia[moving].max() < 1e-9 * inertia
+
+
+@CASES
+def test_everything_the_contract_names_is_there(name, n):
+    p = sized(name, n)
+    model = p.load()
+    prefixes = [f"p{i}/" for i in range(n)] if p.network else [""]
+    for i, prefix in enumerate(prefixes):
+        assert model.actuator(i).name == f"{prefix}u"
+        assert model.sensor(2 * i).name == f"{prefix}x"
+        assert model.sensor(2 * i + 1).name == f"{prefix}v"
+    body, joint = ("pendulum", "hinge") if p.unit == "rad" else ("cart", "slide")
+    for i, prefix in enumerate(prefixes):
+        assert model.dof_bodyid[i] == model.body(prefix + body).id
+        assert model.actuator_trnid[i, 0] == model.joint(prefix + joint).id == i
+    for kind in ("body", "machine"), ("camera", "look"), ("material", "accent"), ("geom", "floor"):
+        assert getattr(model, kind[0])(kind[1]).id >= 0
+    counts = {"geom": model.ngeom, "body": model.nbody, "site": model.nsite, "tendon": model.ntendon}
+    for kind, count in counts.items():
+        assert all(getattr(model, kind)(i).name for i in range(count)), kind
+    np.testing.assert_array_equal(model.key("home").qpos, p.x0)
+    assert model.nkey == 1
+
+
+@PLANTS
+def test_machines_attach_side_by_side_with_their_own_accent(name):
+    p = catalogue()[name]
+    scene = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
+    scene.copy_during_attach = True
+    scene.option = p.spec().option
+    for i, law in enumerate(("a", "b", "c")):
+        frame = scene.worldbody.add_frame(pos=np.multiply(i, p.lane))
+        frame.attach_body(p.spec().body("machine"), f"{law}/", "")
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    assert model.nq == 3 * p.n
+    data.qpos[:] = np.tile(p.x0, 3)
+    mujoco.mj_forward(model, data)
+    used = {model.mat(i).name for i in model.geom_matid if i >= 0}
+    assert {"a/accent", "b/accent", "c/accent"} <= used
+    left, right = data.body("a/machine").xpos, data.body("b/machine").xpos
+    np.testing.assert_allclose(right - left, p.lane)
+
+
+def energy_drift(p, h, seconds=2.0):
+    """Largest change of the energy of the undamped, unforced plant, J."""
+    model = p.load()
+    model.opt.timestep = h
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    start, drift = data.energy.sum(), 0.0
+    for _ in range(round(seconds / h)):
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        drift = max(drift, abs(data.energy.sum() - start))
+    return drift
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if "pendulum" in n or n == "duffing"])
+def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
+    damping = {"delta": 0.0} if name == "duffing" else {"b": 0.0}
+    p = plant(name, **damping)
+    coarse, fine = energy_drift(p, 0.02), energy_drift(p, 0.01)
+    assert coarse < 1e-2
+    assert coarse / fine >= 16
+
+
+def test_pymjcf_reads_every_file():
+    mjcf = pytest.importorskip("dm_control.mjcf")
+    files = sorted(model_path("").rglob("*.xml"))
+    assert len(files) >= 7
+    for file in files:
+        made = mujoco.MjModel.from_xml_path(str(file))
+        written = mjcf.from_path(str(file))
+        again = mjcf.Physics.from_mjcf_model(written).model
+        for count in ("nq", "nbody", "ngeom", "nsite", "nmat", "ntendon", "nsensor", "nkey"):
+            assert getattr(again, count) == getattr(made, count), f"{count} of {file.name}"
+        np.testing.assert_array_equal(again.body_mass, made.body_mass)
+        np.testing.assert_array_equal(again.geom_pos, made.geom_pos)

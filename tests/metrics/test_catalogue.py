@@ -1,0 +1,745 @@
+"""Every metric on signals with known values, against python-control, and under invariances."""
+
+import dataclasses
+import inspect
+import math
+from types import SimpleNamespace
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.metrics import catalogue as m
+from smc_mujoco.metrics.conventions import scale
+
+SYNC = {"mean_settling_time", "spread_settling_time", "spread_bound"}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Run:
+    """A trace's fields, without a simulator."""
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    u: np.ndarray
+    applied: np.ndarray
+    s: np.ndarray
+    d: np.ndarray
+    r: np.ndarray
+    force: np.ndarray
+    reaction: np.ndarray
+    scenario: SimpleNamespace
+    diverged_at: float | None = None
+    failure: str | None = None
+
+
+def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):
+    """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n).
+
+    Without units all channels are in m; `free` if the second half of them has no actuators.
+    """
+    t = np.asarray(t, float)
+    columns = [np.asarray(a, float) for a in (x, r, u, s, v, reaction)]
+    columns = [a[:, None] if a.ndim == 1 else a for a in columns]
+    n = max(a.shape[1] if a.ndim else 1 for a in columns)
+    x, r, u, s, v, reaction = (np.broadcast_to(a, (t.size, n)) for a in columns)
+    zero = np.zeros((t.size, n))
+    units = units or ("m",) * n
+    mixed = dataclasses.replace(plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free)
+    scenario = SimpleNamespace(plant=mixed, law=SimpleNamespace(name="classical"))
+    more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
+    return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, **more)
+
+
+def clock(duration, h):
+    return np.arange(round(duration / h) + 1) * h
+
+
+def second_order(zeta, omega, t):
+    """Unit step response of omega^2 / (p^2 + 2 zeta omega p + omega^2)."""
+    system = control.tf([omega**2], [1, 2 * zeta * omega, omega**2])
+    return control.step_response(system, t).y[0, 0]
+
+
+# Settling, rise, overshoot, peak
+
+
+def test_exponential_settles_at_ln_50_time_constants():
+    tau, h = 0.3, 1e-3
+    t = clock(5, h)
+    exact = tau * math.log(50)
+    assert exact <= m.settling_time(run(t, 0.7 * np.exp(-t / tau))) < exact + h
+
+
+def test_settling_counts_the_last_exit_not_the_first_entry():
+    t = np.arange(6.0)
+    assert m.settling_time(run(t, [1, 0, 0, 0.5, 0, 0])) == 4.0
+    assert m.settling_time(run(t + 7, [1, 0, 0, 0.5, 0, 0])) == 4.0  # since t[0]
+
+
+def test_settling_band_is_two_percent_of_the_scale_and_closed():
+    t = np.arange(3.0)
+    assert m.settling_time(run(t, [100.0, 2.0, -2.0])) == 1.0
+    assert m.settling_time(run(t, [100.0, 2.01, -2.0])) == 2.0
+
+
+def test_settling_is_inf_if_the_last_sample_is_outside():
+    t = np.arange(4.0)
+    assert m.settling_time(run(t, [1, 0, 0, 0.03])) == math.inf
+    assert m.settling_time(run(t, 1.0)) == math.inf
+
+
+def test_settling_is_zero_if_never_outside():
+    t = clock(1, 0.1)
+    assert m.settling_time(run(t)) == 0.0
+    assert m.settling_time(run(t, 1.0 + 0.001 * np.sin(t), r=1.0 + 0.001 * np.sin(t))) == 0.0
+
+
+def test_settling_waits_for_the_slowest_channel_in_the_band_of_the_largest():
+    t = np.arange(5.0)
+    x = np.array([[10, 10, 0, 0, 0], [1, 1, 1, 0.1, 0]]).T  # band 0.2: the second is inside from t = 3
+    assert m.settling_time(run(t, x)) == 3.0
+
+
+def test_scale_falls_back_to_the_range_of_r_and_then_to_one():
+    t = np.arange(5.0)
+    step = np.array([9, 9, 13, 13, 13.0])
+    assert m.settling_time(run(t, [9, 9, 9, 12.93, 13], r=step)) == 3.0  # band 0.08
+    assert m.settling_time(run(t, [9, 9, 9, 12.91, 13], r=step)) == 4.0
+    assert m.settling_time(run(t, [0, 0.03, 0.02, 0, 0])) == 2.0  # band 0.02
+
+
+@pytest.mark.parametrize("x0", [0.5, -2.0])
+def test_second_order_overshoot_is_the_textbook_one_whichever_side_it_starts_from(x0):
+    zeta, omega = 0.3, 4.0
+    t = clock(10, 1e-4)
+    x = x0 * (1 - second_order(zeta, omega, t))
+    exact = 100 * math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
+    assert m.overshoot(run(t, x)) == pytest.approx(exact, rel=1e-6)
+
+
+def test_going_further_away_on_the_near_side_is_not_overshoot():
+    assert m.overshoot(run(np.arange(4.0), [1, 3, 1, 0])) == 0.0
+    assert m.overshoot(run(np.arange(4.0), [1, 3, -0.1, 0])) == pytest.approx(10.0)
+
+
+def test_overshoot_of_a_late_step_counts_from_the_step():
+    t = np.arange(6.0)
+    r = np.array([0, 0, 2, 2, 2, 2.0])
+    assert m.overshoot(run(t, [0, 0, 0, 1, 2.5, 2], r=r)) == pytest.approx(25.0)
+    assert m.overshoot(run(t, [0, 0, 0, -0.5, 2, 2], r=r)) == 0.0  # inverse response is no overshoot
+
+
+def test_overshoot_takes_a_new_side_at_each_jump_of_the_reference():
+    t = np.arange(7.0)
+    pulse = np.array([0, 2, 2, 2, 0, 0, 0.0])
+    assert m.overshoot(run(t, [0, 0, 2, 2, 2, 1, 0], r=pulse)) == 0.0
+    assert m.overshoot(run(t, [0, 0, 2, 2, 2, -0.5, 0], r=pulse)) == pytest.approx(25.0)
+    # also after a start off the reference: scale |e(0)| = 1, step to 0.5, 0.1 beyond it
+    assert m.overshoot(run(t[:5], [1, 0, 0, 0.6, 0.5], r=[0, 0, 0.5, 0.5, 0.5])) == pytest.approx(10.0)
+
+
+def test_both_sides_are_far_for_a_channel_that_begins_on_its_reference():
+    t = np.arange(4.0)
+    for sign in (1, -1):
+        x = np.array([[2, 1, 0, 0], [0, sign * 0.3, 0, 0]]).T
+        assert m.overshoot(run(t, x)) == pytest.approx(15.0)
+
+
+def test_a_slowly_moving_reference_is_one_approach():
+    t = clock(10, 1e-3)
+    r = np.sin(t)
+    tracking, regulating = run(t, r + np.exp(-t) * np.cos(3 * t), r=r), run(t, np.exp(-t) * np.cos(3 * t))
+    assert scale(tracking) == pytest.approx(2.0, rel=1e-6)  # the range of r exceeds |e(0)| = 1
+    assert 2.0 * m.overshoot(tracking) == pytest.approx(m.overshoot(regulating), rel=1e-6)
+
+
+def test_rise_time_of_an_exponential_is_ln_9_time_constants():
+    tau, h = 0.3, 1e-4
+    t = clock(5, h)
+    assert m.rise_time(run(t, 2 * np.exp(-t / tau))) == pytest.approx(tau * math.log(9), abs=h)
+    late = np.where(t < 1, 0, 1.0)
+    x = np.where(t < 1, 0, 1 - np.exp(-(t - 1) / tau))
+    assert m.rise_time(run(t, x, r=late)) == pytest.approx(tau * math.log(9), abs=h)
+
+
+def test_rise_time_is_that_of_the_slowest_channel_and_inf_if_one_never_rises():
+    t = clock(5, 1e-3)
+    fast, slow, still = np.exp(-t / 0.1), np.exp(-t / 0.4), np.zeros(t.size)
+    both = run(t, np.column_stack([fast, slow, still]))
+    assert m.rise_time(both) == m.rise_time(run(t, slow))
+    assert m.rise_time(run(t, np.column_stack([fast, np.full(t.size, 0.2)]))) == math.inf
+    assert m.rise_time(run(t)) == 0.0
+
+
+def test_peak_is_of_x_not_of_e():
+    assert m.peak(run(np.arange(3.0), [0, -3, 2], r=2.0)) == 3.0
+
+
+# The last part: 20 % of the duration
+
+
+def test_steady_metrics_of_a_sine_about_an_offset():
+    t = clock(10, 1e-3)
+    x = np.where(t < 7.9, 9.0, 0.2 + 0.05 * np.sin(2 * np.pi * 5 * t))  # whole periods in [8, 10]
+    trace = run(t, x, r=0.1)
+    assert m.ultimate_bound(trace) == pytest.approx(0.15, rel=1e-6)
+    assert m.steady_error(trace) == pytest.approx(0.1, rel=1e-6)
+    assert m.ripple(trace) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_steady_error_and_ripple_are_the_worst_channel_with_its_own_sign():
+    t = np.arange(11.0)  # last part: t = 8, 9, 10
+    x = np.zeros((11, 2))
+    x[8:, 0], x[8:, 1] = [-1, -2, -3], [2, -2, 0]
+    assert m.steady_error(run(t, x)) == 2.0
+    assert m.ripple(run(t, x)) == 4.0
+    assert m.ultimate_bound(run(t, x)) == 3.0
+
+
+def test_last_part_holds_its_first_sample_whatever_the_rounding():
+    for h in (0.1, 0.01, 0.07, 1e-3):
+        for t0 in (0.0, 3.3):
+            x = np.zeros(1001)
+            x[800] = 1.0
+            assert m.ultimate_bound(run(t0 + np.arange(1001) * h, x)) == 1.0
+            assert m.ultimate_bound(run(t0 + np.arange(1001) * h, np.roll(x, -1))) == 0.0
+
+
+# Integrals
+
+
+def test_integrals_of_an_exponential():
+    tau, a = 0.5, 2.0
+    t = clock(20, 1e-3)
+    trace = run(t + 5, a * np.exp(-t / tau))
+    assert m.ise(trace) == pytest.approx(a**2 * tau / 2, rel=1e-5)
+    assert m.iae(trace) == pytest.approx(a * tau, rel=1e-5)
+    assert m.itae(trace) == pytest.approx(a * tau**2, rel=1e-5)  # time since t[0], not t
+
+
+def test_integrals_are_trapezoids_summed_over_channels():
+    t = np.array([0.0, 1.0, 3.0])
+    x = np.array([[2.0, -1.0], [1.0, 0.0], [0.0, 0.0]])
+    assert m.iae(run(t, x)) == (2 + 1) / 2 + (1 + 0) + 0.5
+    assert m.ise(run(t, x)) == (4 + 1) / 2 + (1 + 0) + 0.5
+    assert m.itae(run(t, x)) == (0 + 1) / 2 + (1 + 0) + 0.0
+
+
+def test_energy_is_exact_for_the_held_command():
+    t = np.array([0.0, 1.0, 3.0])
+    u = np.array([[1.0, 2.0], [3.0, 0.0], [100.0, 100.0]])  # the command at the last sample is held for no time
+    assert m.energy(run(t, u=u)) == (1 + 4) * 1 + 9 * 2
+
+
+def test_integral_errors_are_second_order_in_the_sampling_time():
+    def off(h):
+        t = clock(2, h)
+        return m.ise(run(t, np.cos(t))) - (1 + math.sin(4) / 4)
+
+    assert off(1e-2) / off(1e-3) == pytest.approx(100, rel=0.01)
+
+
+# The command
+
+
+def test_square_wave_has_tv_rate_four_amplitudes_times_its_frequency():
+    amplitude, f, h = 3.0, 5.0, 1e-3
+    t = clock(10, h)
+    u = amplitude * np.where((np.arange(t.size) // 100) % 2, -1, 1)
+    trace = run(t, u=u)
+    assert m.tv_rate(trace) == pytest.approx(2 * amplitude * 2 * f)
+    assert m.tv(trace) == pytest.approx(2 * amplitude * 2 * f * 10)
+    assert m.max_step(trace) == 2 * amplitude
+    assert m.max_u(trace) == amplitude
+    assert m.energy(trace) == pytest.approx(amplitude**2 * 10)
+
+
+def test_chattering_at_every_sample_has_tv_rate_two_amplitudes_over_h():
+    t = clock(2, 1e-3)
+    assert m.tv_rate(run(t, u=6.0 * (-1.0) ** np.arange(t.size))) == pytest.approx(12 / 1e-3)
+
+
+def test_tv_rate_looks_at_the_last_part_only():
+    t = clock(10, 0.1)
+    u = np.where(t < 7.85, np.sin(40 * t), 1 + 0.5 * (t - 8))
+    assert m.tv_rate(run(t, u=u)) == pytest.approx(0.5)
+    ten = np.arange(10.0)  # last part from 7.2: the samples at 8 and 9, one second apart
+    assert m.tv_rate(run(ten, u=ten**2)) == 81 - 64
+    step = np.where(np.arange(t.size) >= 80, 1.0, 0.0)  # the step into the last part is before it
+    assert m.tv_rate(run(t, u=step)) == 0.0
+    assert m.tv(run(t, u=step)) == 1.0
+
+
+def test_effort_is_the_worst_channel_and_does_not_grow_with_n():
+    t = clock(1, 1e-2)
+    u = np.sin(30 * t)
+    one, many = run(t, u=u), run(t, u=np.column_stack([u, -u, 0.5 * u, u]))
+    for name in ("tv", "tv_rate", "max_u", "max_step"):
+        assert getattr(m, name)(many) == pytest.approx(getattr(m, name)(one), rel=1e-12)
+    assert m.hf_share(run(t, u=np.column_stack([u] * 4))) == pytest.approx(m.hf_share(one))
+
+
+@pytest.mark.parametrize("k", [1000, 1001])
+@pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (3.0, 1.0), (0.0, 2.0), (2.0, 0.0)])
+def test_hf_share_of_two_sines_is_their_share_of_the_power(k, low, high):
+    t = np.arange(k + 1) * 1e-3 * (1000 / k)  # 1 s: whole periods
+    u = 7.0 + low * np.sin(2 * np.pi * 20 * t) + high * np.cos(2 * np.pi * 120 * t)
+    assert m.hf_share(run(t, u=u)) == pytest.approx(high**2 / (low**2 + high**2), abs=1e-9)
+
+
+def test_hf_share_counts_half_the_sampling_rate_once():
+    k = 1000
+    t = np.arange(k + 1) / k
+    alternating = (-1.0) ** np.arange(k + 1)  # power 1 at 500 Hz; the sine's is 1/2
+    assert m.hf_share(run(t, u=alternating + np.sin(2 * np.pi * 10 * t))) == pytest.approx(2 / 3)
+
+
+def test_hf_share_counts_the_highest_frequency_of_an_odd_number_of_samples():
+    k = 1001
+    t = np.arange(k + 1) / k
+    u = np.sin(2 * np.pi * 500 * t) + np.sin(2 * np.pi * 10 * t)
+    assert m.hf_share(run(t, u=u)) == pytest.approx(1 / 2)
+
+
+def test_fifty_hertz_itself_is_not_above_fifty_hertz():
+    t = clock(1, 1e-3)
+    assert m.hf_share(run(t, u=np.sin(2 * np.pi * 50 * t))) == pytest.approx(0, abs=1e-9)
+    assert m.hf_share(run(t, u=np.sin(2 * np.pi * 51 * t))) == pytest.approx(1)
+
+
+def test_hf_share_pools_the_channels():
+    t = clock(1, 1e-3)
+    slow, fast = 3 * np.sin(2 * np.pi * 10 * t), np.sin(2 * np.pi * 100 * t)
+    rest = 1e-17 * (-1.0) ** np.arange(t.size)
+    assert m.hf_share(run(t, u=np.column_stack([slow, fast]))) == pytest.approx(0.1)
+    assert m.hf_share(run(t, u=np.column_stack([slow, rest]))) == pytest.approx(0, abs=1e-9)
+
+
+def test_hf_share_is_zero_for_a_constant_and_for_slow_sampling():
+    t = clock(1, 1e-3)
+    assert m.hf_share(run(t, u=0.1)) == 0.0
+    assert m.hf_share(run(t, u=0.1 + 1e-17 * np.sin(2000 * t))) == 0.0
+    slow = clock(10, 0.01)
+    assert m.hf_share(run(slow, u=(-1.0) ** np.arange(slow.size))) == 0.0
+
+
+# The sliding variable and the network
+
+
+def test_reaching_time_is_the_permanent_entry():
+    t = clock(4, 1e-3)
+    s = np.maximum(5 - 2 * t, 0)  # reaching law s' = -2: 2 % of 5 at t = 2.45
+    assert m.reaching_time(run(t, s=s)) == pytest.approx(2.45, abs=1e-3)
+    s[t > 3] = -0.2
+    assert m.reaching_time(run(t, s=s)) == math.inf
+    s[t > 3.5] = 0
+    assert m.reaching_time(run(t, s=s)) == pytest.approx(3.5, abs=1.1e-3)
+
+
+def test_reaching_time_is_that_of_the_slowest_channel_against_the_largest_start():
+    t = np.arange(5.0)
+    assert m.reaching_time(run(t, s=[1, 9, 0.1, 0.01, 0])) == 3.0  # not against the later 9
+    s = np.array([[10, 0, 0, 0, 0], [1, 1, 0.3, 0.2, 0]]).T
+    assert m.reaching_time(run(t, s=s)) == 3.0
+
+
+def test_reaching_time_of_a_run_that_starts_on_the_surface():
+    t = np.arange(5.0)
+    assert m.reaching_time(run(t)) == 0.0
+    assert m.reaching_time(run(t, s=[0, 1, 0.5, 0.01, 0])) == 3.0
+
+
+def test_network_settles_in_mean_and_spread_separately():
+    t = clock(10, 1e-3)
+    mean, half = np.exp(-t / 0.5), np.exp(-t / 0.1)
+    x = np.column_stack([mean + half, mean, mean - half])  # scale 2
+    trace = run(t, x)
+    assert m.mean_settling_time(trace) == pytest.approx(0.5 * math.log(25), abs=1e-3)
+    assert m.spread_settling_time(trace) == pytest.approx(0.1 * math.log(50), abs=1e-3)
+    assert m.spread_bound(trace) == pytest.approx(2 * math.exp(-80))
+    assert m.spread_bound(run(t, np.column_stack([t, -t]))) == pytest.approx(20)
+
+
+def test_channels_in_step_have_no_spread_and_opposite_channels_no_mean():
+    t = clock(1, 1e-2)
+    assert m.spread_settling_time(run(t, np.column_stack([np.ones(t.size)] * 3))) == 0.0
+    assert m.mean_settling_time(run(t, np.column_stack([np.ones(t.size), -np.ones(t.size)]))) == 0.0
+
+
+def test_sync_metrics_refuse_a_single_channel():
+    for name in SYNC:
+        with pytest.raises(ScenarioError, match="n >= 2"):
+            getattr(m, name)(run(np.arange(3.0)))
+
+
+# Friction and contact
+
+
+def test_a_sliding_block_sticks_from_the_time_at_which_coulomb_friction_has_stopped_it():
+    v0, deceleration, h = 2.0, 0.8, 1e-4  # stops at 2.5 s
+    t = clock(10, h)
+    v = np.maximum(v0 - deceleration * t, 0.0)
+    trace = run(t, v=v, reaction=np.where(v > 0, -deceleration, -0.1))
+    slow = 1e-3 * v0 / deceleration  # from 0.1 % of the largest speed on it is at rest
+    assert 7.5 <= m.stick_time(trace) <= 7.5 + slow + h
+
+
+def test_a_stuck_joint_may_creep_and_bristles_may_bend():
+    t = clock(10, 1e-2)
+    assert m.stick_time(run(t, v=1e-7, reaction=1.0)) == pytest.approx(10.0)  # it never moved: |v| <= 1e-5
+    v = np.where(t < 2, 1.0, 1e-3)  # a hundredth of a millimetre in a hundredth of a second is rest after 1 m/s
+    assert m.stick_time(run(t, v=v, reaction=1.0)) == pytest.approx(8.0)
+    assert m.stick_time(run(t, v=1.01 * v, reaction=1.0)) == pytest.approx(8.0)  # relative to the run's largest
+    assert m.stick_time(run(t, v=np.where(t < 2, 1.0, 1.01e-3), reaction=1.0)) == 0.0
+
+
+def test_what_nothing_holds_does_not_stick():
+    t = clock(10, 1e-2)
+    assert m.stick_time(run(t, v=np.exp(-5 * t))) == 0.0
+    assert m.stick_time(run(t)) == 0.0
+
+
+def test_an_instant_of_rest_is_no_time_and_stretches_add_up():
+    t = np.arange(8.0)
+    v = np.array([1, 0, 1, 0, 0, 1, 0, 0.0])
+    assert m.stick_time(run(t, v=v, reaction=1.0)) == 2.0
+    both = np.column_stack([v, np.ones(8)])
+    assert m.stick_time(run(t, v=both, reaction=1.0)) == 2.0  # the channel that sticks longest
+    assert m.stick_time(run(t, v=both, reaction=np.column_stack([0 * v, v]))) == 0.0  # and its own reaction
+    late = np.array([0, 0, 0, 0, 0, 0, 0, 5.0])  # that of the step which ends at the sample
+    assert m.stick_time(run(t, v=v, reaction=late)) == 1.0
+
+
+def test_peak_reaction_is_the_largest_of_either_sign_and_any_channel():
+    t = np.arange(3.0)
+    assert m.peak_reaction(run(t, reaction=np.array([[1, 0], [0, -7], [2, 2]]))) == 7.0
+    assert m.peak_reaction(run(t)) == 0.0
+
+
+@pytest.mark.parametrize("frequency", [1.0, 2.5, 20.0])
+def test_a_limit_cycle_reverses_twice_a_period(frequency):
+    t = clock(10, 1e-3)
+    wave = np.sin(2 * np.pi * frequency * t + 0.3)
+    # the last part, 2 s, may cut off a turn at either end
+    assert m.reversal_rate(run(t, 0.3 + 0.01 * wave)) == pytest.approx(2 * frequency, abs=1.0)
+    slips = np.clip(3 * wave, -1, 1)  # rests at its ends, as in stick-slip
+    assert m.reversal_rate(run(t, slips)) == pytest.approx(2 * frequency, abs=1.0)
+
+
+def test_small_teeth_on_a_cycle_are_no_reversals_and_large_ones_are():
+    t = clock(10, 1e-3)
+    slow, teeth = np.cos(2 * np.pi * t), np.where(np.arange(t.size) % 2, 1.0, -1.0)
+    assert m.reversal_rate(run(t, slow + 0.2 * teeth)) == m.reversal_rate(run(t, slow))
+    assert m.reversal_rate(run(t, teeth)) == pytest.approx(1000.0, abs=1.0)
+
+
+def test_what_creeps_or_decays_does_not_hunt():
+    t = clock(10, 1e-3)
+    for x in (np.exp(-t), 1e-7 * np.sin(20 * t) + (t < 1), 0.2 + 0.01 * t, np.ones(t.size)):
+        assert m.reversal_rate(run(t, x)) == 0.0
+
+
+def test_reversals_are_those_of_the_channel_that_hunts_fastest():
+    t = clock(10, 1e-3)
+    x = np.column_stack([np.sin(2 * np.pi * t), 1e-3 * np.sin(2 * np.pi * 7 * t), 0 * t])
+    assert m.reversal_rate(run(t, x)) == pytest.approx(14.0, abs=1.0)
+
+
+# Against python-control
+
+
+@pytest.mark.parametrize("zeta", [0.1, 0.3, 0.7, 0.9, 1.0, 1.5])
+@pytest.mark.parametrize("omega", [1.0, 5.0])
+def test_step_response_agrees_with_python_control(zeta, omega):
+    h = 1e-3
+    t = clock(60 / omega, h)
+    y = second_order(zeta, omega, t)
+    info = control.step_info(y, t, final_output=1.0)
+    trace = run(t, y, r=1.0)
+    assert m.settling_time(trace) == pytest.approx(info["SettlingTime"], abs=1.01 * h)
+    assert m.rise_time(trace) == pytest.approx(info["RiseTime"], abs=1.01 * h)
+    assert m.overshoot(trace) == pytest.approx(info["Overshoot"], abs=1e-9)
+    assert m.peak(trace) == pytest.approx(info["Peak"], rel=1e-12)
+
+
+def test_where_python_control_is_not_followed():
+    t = clock(1, 1e-2)
+    decay = np.exp(-20 * t)
+    # Regulation to zero: step_info takes percentages of the final value, which is about zero.
+    info = control.step_info(decay, t)
+    assert info["Overshoot"] > 1e9
+    assert info["SettlingTime"] == 1.0
+    assert m.overshoot(run(t, decay)) == 0.0
+    assert m.settling_time(run(t, decay)) == pytest.approx(math.log(50) / 20, abs=1e-2)
+    # NaN: comparisons are false, so step_info calls a run that ends in NaN settled, at 0.2 s.
+    broken = np.where(t > 0.5, np.nan, 1 - decay)
+    assert control.step_info(broken, t, final_output=1.0)["SettlingTime"] == pytest.approx(0.2)
+    with pytest.raises(ScenarioError):
+        m.settling_time(run(t, broken, r=1.0))
+    # Never settles: nan there, inf here, which sorts and compares. Never rises: an IndexError there.
+    ramp = 0.95 * t
+    assert math.isnan(control.step_info(ramp, t, final_output=1.0)["SettlingTime"])
+    assert m.settling_time(run(t, ramp, r=1.0)) == math.inf
+    with pytest.raises(IndexError):
+        control.step_info(0.5 * t, t, final_output=1.0)
+    assert m.rise_time(run(t, 0.5 * t, r=1.0)) == math.inf
+    # A start off zero: step_info rises to 90 % of the final value, we to 90 % of the way.
+    y = 1 - 0.5 * decay
+    assert control.step_info(y, t, final_output=1.0)["RiseTime"] == pytest.approx(math.log(5) / 20, abs=1e-2)
+    assert m.rise_time(run(t, y, r=1.0)) == pytest.approx(math.log(9) / 20, abs=1e-2)
+
+
+# The catalogue, score and refusals
+
+
+def test_score_has_every_metric_and_the_sync_metrics_for_networks_only():
+    t = clock(1, 1e-2)
+    names = [metric.name for metric in m.metrics()]
+    assert list(m.score(run(t, np.cos(t)))) == [name for name in names if name not in SYNC]
+    network = run(t, np.column_stack([np.cos(t), np.sin(t)]), u=np.column_stack([np.sin(90 * t), t]), s=0.5)
+    assert list(m.score(network)) == names
+    assert m.score(network) == {name: getattr(m, name)(network) for name in names}
+    assert all(type(value) is float for value in m.score(network).values())
+
+
+def cart_and_pole():
+    """A cart that settles at 0.2 s from 1 m, its pole at 0.4 s from 0.1 rad."""
+    x = np.array([[1.0, 0.5, 0.0, 0.0, 0.0], [0.1, -0.05, 0.01, 0.0015, 0.001]]).T
+    u = np.array([[3.0, -1.0, 0.0, 0.0, 0.0], [0.0] * 5]).T
+    t = np.arange(5) / 10
+    return run(t, x, u=u, v=np.gradient(x, t, axis=0), reaction=[[0.5, 0.2]] * 5, units=("m", "rad"), free=True)
+
+
+def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
+    trace, alone = cart_and_pole(), []
+    for i in (0, 1):
+        columns = {name: getattr(trace, name)[:, [i]] for name in ("x", "v", "u", "s", "r", "reaction")}
+        alone.append(m.score(run(trace.t, columns.pop("x"), units=("m", "rad")[i : i + 1], **columns)))
+    found = m.scores(trace)
+    assert list(found) == ["driven", "free"]
+    assert found["driven"] == alone[0]
+    commanded = {"reaching_time", "max_u", "max_step", "tv", "tv_rate", "energy", "hf_share"}
+    assert found["free"] == {name: value for name, value in alone[1].items() if name not in commanded}
+    assert (found["driven"]["settling_time"], found["free"]["settling_time"]) == (0.2, 0.3)
+    assert (found["driven"]["overshoot"], found["free"]["overshoot"]) == (0.0, pytest.approx(50.0))
+
+
+def test_times_and_percentages_of_the_motion_are_the_worst_of_cart_and_pole_and_what_has_a_unit_is_the_carts():
+    trace = cart_and_pole()
+    found, ours = m.scores(trace), m.score(trace)
+    of_both = {"settling_time", "rise_time", "overshoot", "stick_time", "reversal_rate"}
+    assert {name for name in ours if ours[name] != found["driven"][name]} == {"settling_time", "overshoot"}
+    for name, value in ours.items():
+        whose = max(found[group][name] for group in found) if name in of_both else found["driven"][name]
+        assert value == getattr(m, name)(trace) == whose, name
+
+
+def test_a_law_that_drops_the_pole_has_settled_nothing_also_where_both_have_one_unit():
+    t = clock(1, 0.1)
+    acrobot = run(t, np.column_stack([np.exp(-9 * t), 5.0 + t]), units=("rad", "rad"), free=True)
+    assert m.scores(acrobot)["driven"]["settling_time"] < 1.0
+    assert m.settling_time(acrobot) == m.scores(acrobot)["free"]["settling_time"] == math.inf
+
+
+def test_a_cart_with_its_pole_is_no_network():
+    trace = cart_and_pole()
+    assert not SYNC & set(m.score(trace))
+    assert not SYNC & set(m.scores(trace)["free"])
+    for name in SYNC:
+        with pytest.raises(ScenarioError, match=f"{name} compares channels and duffing has one of a kind"):
+            getattr(m, name)(trace)
+
+
+def test_carts_with_poles_side_by_side_are_compared_each_with_its_kind():
+    trace = run(np.arange(2.0), np.array([[0.0, 1.0, 0.2, 0.5]] * 2), units=("m", "m", "rad", "rad"), free=True)
+    assert m.spread_bound(trace) == 1.0
+    assert m.scores(trace)["free"]["spread_bound"] == pytest.approx(0.3)
+
+
+def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_either_unit():
+    t = np.arange(5.0)
+    arm = run(t, np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T, units=("m", "rad", "rad"))
+    found, ours = m.score(arm), m.scores(arm)
+    assert list(ours) == ["driven m", "driven rad"]
+    assert found["settling_time"] == ours["driven rad"]["settling_time"] == 3.0 > ours["driven m"]["settling_time"]
+    assert "ultimate_bound" not in found
+    assert (ours["driven m"]["peak"], ours["driven rad"]["peak"]) == (10.0, 0.1)
+    assert not SYNC & {*ours["driven m"]}
+    assert {*ours["driven rad"]} > SYNC  # a slide and two hinges, which can be compared
+    assert found["mean_settling_time"] == ours["driven rad"]["mean_settling_time"]
+    for name in ("peak", "itae", "tv", "spread_bound"):
+        with pytest.raises(ScenarioError, match=rf"{name} has no one value .* in m and rad, .*: use smc.scores"):
+            getattr(m, name)(arm)
+
+
+def test_rest_is_measured_beside_the_largest_speed_of_the_group():
+    """A pole at 100 rad/s does not put its cart at 0.05 m/s to rest."""
+    v = np.array([[0.05, 100.0]] * 3)
+    slow = run(np.arange(3.0), v=v, reaction=1.0, units=("m", "rad"), free=True)
+    assert m.stick_time(slow) == 0.0
+
+
+def test_every_metric_has_a_unit_and_a_one_line_summary():
+    for metric in m.metrics():
+        assert metric.summary.endswith("."), metric.name
+        assert metric.summary == (inspect.getdoc(getattr(m, metric.name)) or "").splitlines()[0]
+        assert metric.unit_for("m")
+    units = {metric.name: metric.unit_for("rad") for metric in m.metrics()}
+    assert (units["tv_rate"], units["ise"], units["settling_time"]) == ("N m/s", "rad^2 s", "s")
+
+
+def test_a_new_metric_is_one_function(monkeypatch):
+    from smc_mujoco.metrics import conventions
+
+    monkeypatch.setattr(conventions, "CATALOGUE", dict(m.CATALOGUE))
+    monkeypatch.setattr(m, "CATALOGUE", conventions.CATALOGUE)
+
+    @conventions.metric("{x}")
+    def first(trace):
+        """The first position."""
+        return trace.x[0, 0]
+
+    trace = run(np.arange(3.0), [4, 0, 0])
+    assert first(trace) == m.score(trace)["first"] == 4.0
+    assert m.metrics()[-1].summary == "The first position."
+
+
+def broken():
+    t = clock(1, 0.01)
+    late = np.where(t > 0.5, np.nan, 0.0)
+    yield "diverged at t = 0.3 s", run(t, diverged_at=0.3)
+    yield "law raised, at t = 0.3 s", run(t, diverged_at=0.3, failure="law raised, at t = 0.3 s")
+    yield "law raised, at t = 0.3 s", run(t, failure="law raised, at t = 0.3 s")
+    yield "not finite from t = 0.51 s", run(t, np.where(t > 0.5, np.inf, 0.0))
+    for name in ("x", "r", "u", "s", "v", "reaction"):
+        yield "not finite from t = 0.51 s", run(t, **{name: late})
+    for name in ("d", "applied"):
+        yield "not finite from t = 0.51 s", dataclasses.replace(run(t), **{name: late[:, None]})
+
+
+@pytest.mark.parametrize(("message", "trace"), list(broken()))
+def test_a_broken_trace_is_refused_by_score_and_by_every_metric(message, trace):
+    for function in (m.score, m.scores, *(getattr(m, metric.name) for metric in m.metrics())):
+        with pytest.raises(ScenarioError) as refusal:
+            function(trace)
+        text = str(refusal.value)
+        assert text.startswith("duffing under classical")
+        assert message in text
+        assert ("mend that" if "raised" in message else "change the gains") in text
+        assert "\n" not in text
+
+
+@pytest.mark.parametrize("n", [1, 3])
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_a_run_at_rest_scores_zero_however_short(n, samples):
+    assert set(m.score(run(np.arange(samples) * 0.1, np.zeros((samples, n)))).values()) == {0.0}
+
+
+def test_a_run_of_one_step_by_hand():
+    scores = m.score(run([0, 0.5], [2.0, -1.0], u=[3.0, -1.0], s=[1.0, 0.5]))
+    assert scores == {
+        "settling_time": math.inf,
+        "rise_time": 0.0,  # 10 % and 90 % at the same sample
+        "overshoot": 50.0,
+        "peak": 2.0,
+        "steady_error": 1.0,
+        "ultimate_bound": 1.0,
+        "ripple": 0.0,
+        "ise": 0.5 * (4 + 1) / 2,
+        "iae": 0.5 * (2 + 1) / 2,
+        "itae": 0.5 * (0 + 0.5) / 2,
+        "reaching_time": math.inf,
+        "max_u": 3.0,
+        "max_step": 4.0,
+        "tv": 4.0,
+        "tv_rate": 0.0,
+        "energy": 4.5,
+        "hf_share": 0.0,
+        "stick_time": 0.0,
+        "peak_reaction": 0.0,
+        "reversal_rate": 0.0,
+    }
+
+
+# Invariances
+
+WHOLE = st.integers(-1000, 1000)
+
+
+@st.composite
+def random_runs(draw):
+    """Whole-number signals, so that scaling by a power of two and adding an offset are exact."""
+    n, samples = draw(st.integers(1, 4)), draw(st.integers(2, 30))
+    block = st.lists(st.lists(WHOLE, min_size=n, max_size=n), min_size=samples, max_size=samples).map(np.array)
+    x, u, s = draw(block), draw(block), draw(block)
+    r = np.where(np.arange(samples)[:, None] < draw(st.integers(0, samples)), 0, draw(WHOLE))
+    if draw(st.booleans()):
+        x[-max(1, samples // 2) :] = r[-1]  # settles
+    more = {"v": draw(block), "reaction": draw(block)}
+    return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s, **more)
+
+
+@settings(max_examples=200, deadline=None)
+@given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]))
+def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, c):
+    if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
+        return  # the scale is then 1 by convention
+    before = m.score(trace)
+    after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r))
+    powers = dict.fromkeys(("peak", "steady_error", "ultimate_bound", "ripple", "iae", "itae", "spread_bound"), 1)
+    powers["ise"] = 2
+    for name, value in before.items():
+        assert after[name] == pytest.approx(abs(c) ** powers.get(name, 0) * value, rel=1e-12, abs=1e-12), name
+
+
+@settings(max_examples=200, deadline=None)
+@given(random_runs(), st.randoms(use_true_random=False))
+def test_permuting_channels_changes_nothing(trace, random):
+    order = list(range(trace.x.shape[1]))
+    random.shuffle(order)
+    shuffled = {name: getattr(trace, name)[:, order] for name in ("x", "v", "u", "applied", "s", "d", "r", "reaction")}
+    assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(m.score(trace), rel=1e-12)
+
+
+@settings(max_examples=100, deadline=None)
+@given(random_runs(), WHOLE, WHOLE)
+def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
+    moved = dataclasses.replace(trace, t=trace.t + start, x=trace.x + shift, r=trace.r + shift)
+    before, after = m.score(trace), m.score(moved)
+    del before["peak"], after["peak"]
+    assert after == pytest.approx(before, rel=1e-12)
+
+
+@settings(max_examples=200, deadline=None)
+@given(random_runs())
+def test_metrics_respect_their_orders(trace):
+    scores = m.score(trace)
+    assert scores["steady_error"] <= scores["ultimate_bound"] * (1 + 1e-12)
+    assert scores["ripple"] <= 2 * scores["ultimate_bound"]
+    assert scores["max_step"] <= min(scores["tv"], 2 * scores["max_u"])
+    assert 0 <= scores["hf_share"] <= 1
+    assert all(value >= 0 for value in scores.values())
+    if trace.x.shape[1] > 1:
+        assert scores["mean_settling_time"] <= scores["settling_time"]
+        assert scores["spread_bound"] <= 2 * scores["ultimate_bound"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["settling_time", "rise_time", "overshoot", "ultimate_bound", "ise", "iae", "itae", "tv", "energy"],
+)
+def test_refining_the_samples_converges(name):
+    def at(h):
+        t = clock(6, h)
+        x = np.exp(-t) * np.cos(5 * t)
+        return getattr(m, name)(run(t, x, u=np.exp(-t) * np.sin(5 * t)))
+
+    limit = at(1e-5)
+    assert abs(at(1e-2) - limit) <= 2e-2
+    assert abs(at(1e-4) - limit) <= 2e-4

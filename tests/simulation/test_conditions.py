@@ -1,0 +1,255 @@
+"""Conditions and starts: named, combined, read from text without being evaluated, and used on any plant."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.cli.main import app
+from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed
+from smc_mujoco.simulation.initial_states import SEEDS
+from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.run_key import condition as told
+from smc_mujoco.studies.run_key import key
+
+ARM = """<mujoco model="arm">
+  <option gravity="0 0 -9.81"/>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" type="hinge" axis="0 1 0" damping="0.1"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.03" mass="1.0" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="shoulder" joint="shoulder" ctrllimited="true" ctrlrange="-20 20"/></actuator>
+</mujoco>"""
+WORN = smc.condition(
+    "worn gear", friction=smc.Coulomb(0.05), actuator=smc.Backlash(0.02), sensor=smc.Encoder(counts=4096)
+)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    return path
+
+
+@pytest.fixture
+def arm(file):
+    return smc.plant_from(file, ["shoulder"])
+
+
+# names, text, combinations
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        WORN,
+        smc.condition("a", mismatch={"mass": 1.1}, input_delay=0.003),
+        smc.condition("b", velocity=smc.estimator("levant", L=30.0), noise=smc.Noise(0.01)),
+        smc.condition("c", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(-0.1)), contact="stops", u_max=math.inf),
+        smc.condition("d", jump=smc.Jump(0.5, {"mass": 2.0}), x0=[0.3], reference=smc.Step(0.1)),
+    ],
+)
+def test_text_says_a_condition_whole(condition):
+    assert parsed(str(condition)) == condition
+
+
+def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
+    @dataclasses.dataclass(frozen=True)
+    class Sine(smc.Signal):  # pyright: ignore[reportUnusedClass]
+        level: float = 0.0
+
+    @dataclasses.dataclass(frozen=True)
+    class Mine(smc.Constant):
+        pass
+
+    made = smc.condition("own", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(0.1), Mine(0.3)))
+    assert parsed(str(made)) == made
+
+
+def test_the_suites_conditions_go_by_their_names():
+    assert [str(one) for one in NAMED.values()] == list(NAMED)
+    assert find_condition("noise") is NAMED["noise"]
+
+
+def test_conditions_add_up():
+    duffing = smc.plant("duffing")
+    both = find_condition("sine + coulomb + constant").on(duffing, 4.0)
+    assert both == {"disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)), "friction": smc.Coulomb(0.1)}
+    assert find_condition("noise + noise").on(duffing, 4.0) == {"noise": smc.Noise(0.01, 0.05)}
+    with pytest.raises(smc.ScenarioError, match="'light' and 'heavy' both set mismatch"):
+        find_condition("light + heavy").on(duffing, 4.0)
+    assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
+
+
+def test_what_happens_once_does_so_at_half_time():
+    assert NAMED["pulse"].on(smc.plant("duffing"), 3.0)["disturbance"].time == 1.5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("worn: friction=Coulomb(k=3)", "unknown field of Coulomb 'k'|takes level"),
+        ("worn: friction=open('x')", "unknown part, signal or estimator 'open'"),
+        ("worn: friction=().__class__", "give numbers, texts and parts"),
+        ("worn: friction=[i for i in (1,)]", "give numbers, texts and parts"),
+        ("worn: friction=Coulomb(0.05", "cannot be read"),
+        ("worn: friction=Coulomb(-'a')", "a value is 'a'"),
+        ("worn: Coulomb(1)", "cannot be read"),
+        ("worn: **{'a': 1}", "cannot be read"),
+        ("worn: frction=1", "did you mean 'friction'"),
+        ("worn: plant='duffing'", "which the grid itself says"),
+        ("worn:", "has no fields"),
+        (": input_delay=0.01", "a condition's name"),
+        ("noise: input_delay=0.01", "is a name of the suite"),
+        ("noisy", "did you mean 'noise'"),
+        ("noise + ", "unknown condition ''"),
+        ("a" * 10**5 + ": x=" + "(" * 10**4, "cannot be read"),
+    ],
+)
+def test_a_text_that_is_none_is_one_sentence(text, words):
+    with pytest.raises(smc.ScenarioError, match=words) as error:
+        find_condition(text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_holds_a_condition_a_line(tmp_path):
+    path = tmp_path / "conditions.txt"
+    path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
+    assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
+    with pytest.raises(smc.ScenarioError, match="cannot read conditions"):
+        from_file(tmp_path / "none.txt")
+
+
+# grids
+
+
+def test_a_grid_has_conditions_of_ones_own_under_their_names():
+    made = smc.grid("duffing", "classical", ["nominal", WORN, "noise + coulomb"], 2, gains="default", duration=1.0)
+    assert [told(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + ["noise + coulomb"] * 2
+    assert made[2].friction == (smc.Coulomb(0.05),)
+    assert dataclasses.replace(made[2], friction=None).condition is None  # the name goes with the fields
+
+
+def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
+    (ours,) = smc.grid("duffing", "classical", "noise", 1, gains="default")
+    by_hand = paper.scenario("duffing", "classical", "noise", gains="default")
+    assert (ours, key(ours)) == (by_hand, key(by_hand))
+    (one,) = smc.grid("duffing", "classical", smc.condition("one", noise=smc.Noise(0.01, 0.05)), 1, gains="default")
+    assert one == ours
+    assert key(one) != key(ours)
+
+
+def test_starts_are_around_the_plants_own_or_around_a_given_one():
+    near = smc.grid("pendulum_network", "none", "nominal", 3)
+    x0 = np.array(smc.plant("pendulum_network").x0)
+    assert near[0].x0 == tuple(x0)
+    assert all((np.abs(np.array(s.x0) / x0 - 1.0) <= 0.2).all() for s in near)
+    away = smc.grid("duffing", "none", "nominal", 4, starts=smc.starts(x0=0.0, by=0.3))
+    assert away[0].x0 == (0.0,)
+    assert 0.0 < max(abs(s.x0[0]) for s in away) <= 0.3
+    assert len({s.x0 for s in away}) == 4
+
+
+def test_no_grid_has_the_starts_and_the_noise_of_tuning():
+    tuned = {s.seed for s in Objective().scenarios("duffing", smc.law("classical"), 0)}
+    assert min(tuned) >= SEEDS
+    assert len(tuned) == 7
+    with pytest.raises(smc.ScenarioError, match="seed is"):
+        smc.grid("duffing", "none", "nominal", [SEEDS])
+    starts = [s.x0[0] for s in Objective().scenarios("duffing", smc.law("classical"), 0)]
+    assert len(set(starts)) == 7
+    assert all(abs(x / 1.5 - 1.0) <= 0.2 for x in starts)
+
+
+# any plant
+
+
+def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
+    law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
+    scenarios = smc.grid([arm, "duffing"], law, ["nominal", WORN], 2, duration=0.5, starts=smc.starts(x0=0.4))
+    table = smc.study(scenarios, tmp_path / "study")
+    assert sorted(set(table.column("plant"))) == ["arm", "duffing"]
+    assert sorted(set(table.column("condition"))) == ["nominal", "worn gear"]
+    assert set(table.column("failure")) == {None}
+
+
+def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm):
+    law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
+    with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
+        smc.margins(arm, law, "delay")
+    (found,) = smc.margins(arm, law, "delay", quick=True, starts=smc.starts(x0=0.4))
+    assert (found.plant, found.law, found.unit) == ("arm", "boundary_layer", "s")
+    assert found.value > 0.0
+
+
+def test_a_condition_narrows_a_margin():
+    law = smc.law("observer_free", lam=6.0, k1=3.0)
+    base, late = (
+        smc.margins("duffing", law, "delay", quick=True, condition=condition)[0].value
+        for condition in ("nominal", smc.condition("strong push", disturbance=smc.Constant(1.0)))
+    )
+    assert late < base
+
+
+def test_a_region_of_a_model_is_asked_for_its_reach(arm):
+    law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
+    grid = {"x": [-0.4, 0.4], "v": [-0.5, 0.5]}
+    assert smc.basin(arm, law, **grid, duration=3.0, condition="coulomb").plant == "arm"
+
+
+def test_a_model_is_tuned_in_conditions_of_ones_own(arm):
+    with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
+        smc.tune(arm, "observer_free", budget=4, conditions="nominal")
+    goal = Objective(conditions=("nominal",), duration=0.5)
+    found = smc.tune(arm, "observer_free", 4, objective=goal, conditions=[WORN], starts=smc.starts(x0=0.4))
+    assert [one.name for one in found.definition.conditions] == ["worn gear"]
+    assert found.scales["X"] == 0.4
+
+
+def test_an_objective_of_ones_own_is_saved_and_read_back(arm, tmp_path):
+    goal = Objective(conditions=("nominal", WORN), duration=0.5, starts=smc.starts(x0=0.4, by=0.1))
+    found = smc.tune("duffing", "observer_free", 4, objective=goal)
+    assert smc.tuning.load(found.save(tmp_path / "it.json")) == found
+
+
+# the command line
+
+
+def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    own = "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"
+    plants = f"duffing,{file}:shoulder"
+    arguments = ["--laws", "observer_free", "--gains", "default", "--seeds", "1", "--duration", "0.5", "--x0", "0.4"]
+    done = CliRunner().invoke(app, ["bench", "--plants", plants, "--condition", own, *arguments])
+    assert done.exit_code == 0, done.output
+    table = smc.Table.read(tmp_path / "study" / "results.parquet")
+    assert set(zip(table.column("plant"), table.column("condition"), strict=True)) == {
+        ("duffing", "worn gear"),
+        ("arm", "worn gear"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("bench", "--condition", "worn: friction=Colomb(0.05)"), "did you mean 'Coulomb'"),
+        (("margins", "duffing", "--condition", "noisy"), "did you mean 'noise'"),
+        (("basin", "duffing", "--condition", "a: b=1"), "unknown field"),
+        (("bench", "--plants", "arm.xml"), "names no joints"),
+        (("bench", "--plants", "arm.xml:"), "names no joints"),
+        (("tune", "duffing", "classical", "--conditions", "noisy"), "did you mean 'noise'"),
+    ],
+)
+def test_commands_refuse_in_one_sentence(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, list(arguments))
+    said = done.output + capsys.readouterr().err
+    assert done.exit_code == 2
+    assert words in " ".join(said.split())

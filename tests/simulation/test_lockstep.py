@@ -1,0 +1,449 @@
+"""The compiled callback and the plain Python loop give the same numbers, to the last bit, whatever else runs.
+
+The plain loop uses numpy's own generator and calls the laws as the Python functions they are: agreement holds the
+callback's clock, noise, delay, estimators, signals, saturation and logging against a second telling of them.
+"""
+
+import dataclasses
+import hashlib
+import importlib
+import math
+import os
+import subprocess
+import sys
+import threading
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import reference
+
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+PLANTS = pytest.mark.parametrize("plant", smc.plants())
+STUDY = pytest.mark.parametrize("plant", smc.paper.GAINS)
+STUDIED = [*smc.paper.GAINS["duffing"], "none"]
+runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
+chunk_module = importlib.import_module("smc_mujoco.simulation.batch")
+
+
+def same(a, b):
+    """Fail unless two traces hold the same bits and ended the same way."""
+    assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
+
+
+def shortened(s, duration):
+    """The scenario with its run, and every time in it, shrunk to a duration."""
+    shrink = duration / s.duration
+    signals = tuple(
+        dataclasses.replace(d, **{k: v * shrink for k, v in d.parameters().items() if k in ("time", "width")})
+        for d in s.disturbance
+    )
+    jump = s.jump and smc.Jump(time=s.jump.time * shrink, factors=s.jump.factors)
+    return dataclasses.replace(s, duration=duration, disturbance=signals, jump=jump)
+
+
+@STUDY
+@pytest.mark.parametrize("condition", smc.paper.CONDITIONS)
+def test_callback_equals_plain_loop_in_every_condition_of_the_study(plant, condition):
+    scenarios = [shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.2) for law in STUDIED]
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        same(trace, reference.run(scenario))
+
+
+@pytest.mark.parametrize("model", ["none", "nominal"])
+def test_callback_equals_plain_loop_under_every_law(model):
+    """To rounding, as compiled powers and compiled models may differ from Python's by one."""
+    scenarios = [
+        smc.Scenario(plant=plant, law=law, model=model, duration=0.05, noise=smc.Noise(0.01, 0.05), velocity=velocity)
+        for law in smc.laws()
+        for plant in [name for name in smc.plants() if law in smc.laws(name)][:2]
+        for velocity in ("measured", "levant")
+    ]
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        other = reference.run(scenario)
+        assert trace.failure is None
+        for name in ARRAYS:
+            np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("surface", smc.surfaces())
+def test_callback_equals_plain_loop_on_every_surface(surface):
+    scenario = smc.Scenario(
+        plant="inverted_pendulum", law="boundary_layer", surface=surface, model="nominal", duration=0.2
+    )
+    trace, other = smc.run(scenario), reference.run(scenario)
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("velocity", smc.estimators())
+def test_callback_equals_plain_loop_with_every_estimator(velocity):
+    scenario = smc.Scenario(
+        plant="duffing", law="classical", velocity=velocity, noise=smc.Noise(0.01), duration=0.3, seed=4
+    )
+    trace, other = smc.run(scenario), reference.run(scenario)
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+@smc.law_function(gains={"a": 1.0, "b": 2.0}, memory=2)
+def curious(y, gains, memory):
+    """Reads everything a law may read, and remembers."""
+    memory[0] += y.dt * y.e
+    memory[1] = 0.9 * memory[1] + y.de
+    model = (y.ddr - y.f) / y.g
+    u = model - gains.a * y.x - gains.b * y.v - memory[0] - 0.1 * memory[1] + 1e-3 * y.t + y.r - y.dr
+    return u, memory[0]
+
+
+def scattered(number):
+    """A random valid scenario."""
+    rng = np.random.default_rng(number)
+    plant = smc.plant(str(rng.choice(smc.plants())))
+    period, step = [(1e-3, 1e-3), (2e-3, 1e-3), (5e-3, 1e-3), (20e-3, 1e-3), (4e-3, 5e-4)][rng.integers(5)]
+    key = str(rng.choice([*plant.parameters, "mass"]))
+    signals = [
+        smc.Constant(rng.normal()),
+        smc.Sine(rng.normal(), omega=rng.uniform(1, 50), phase=rng.uniform(0, 6)),
+        smc.Step(rng.normal(), time=rng.uniform(0, 0.2)),
+        smc.Pulse(rng.normal(), time=rng.uniform(0, 0.2), width=rng.uniform(0.001, 0.1)),
+        smc.OrnsteinUhlenbeck(rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)),
+    ]
+    return smc.Scenario(
+        plant=plant,
+        law=smc.law(str(rng.choice(STUDIED))),
+        duration=0.2,
+        control_period=period,
+        physics_step=step,
+        u_max=float(rng.choice([0.3, 6.0, math.inf])),
+        x0=tuple(rng.uniform(-1.5, 1.5, plant.n)),
+        v0=tuple(rng.uniform(-1.5, 1.5, plant.n)),
+        reference=signals[rng.integers(4)],
+        disturbance=tuple(signals[i] for i in rng.choice(5, size=rng.integers(4), replace=False)),
+        noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
+        input_delay=int(rng.integers(0, 40)) * step,
+        velocity=str(rng.choice(["measured", "filtered_difference"])),
+        mismatch={key: rng.uniform(0.6, 1.6)},
+        jump=smc.Jump(time=rng.uniform(0, 0.2), factors={key: rng.uniform(0.6, 1.6)}),
+        seed=int(rng.integers(2**53)),
+        integrator=str(rng.choice(["RK4", "Euler", "implicitfast", "implicit"])),
+    )
+
+
+def test_callback_equals_plain_loop_in_scattered_scenarios():
+    scenarios = [scattered(number) for number in range(80)]
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        same(trace, reference.run(scenario))
+
+
+def test_a_users_law_sees_the_same_measurement_in_both_loops():
+    """To rounding only: numba multiplies x**3 of the nominal Duffing spring out, Python takes a power."""
+    scenarios = [dataclasses.replace(scattered(number), law=curious(a=3.0)) for number in range(40)]
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        other = reference.run(scenario)
+        for name in ARRAYS:
+            np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-12, atol=1e-12)
+
+
+@PLANTS
+def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
+    base = smc.plant(plant)
+    size = {"n": base.n} if base.n > 1 else {}
+    scenarios = []
+    for i, (key, value) in enumerate(base.parameters.items()):
+        common = {"law": "super_twisting", "duration": 0.1, "disturbance": smc.Sine(0.2, omega=5.0)}
+        jump = smc.Jump(time=0.01 * i, factors={key: 1.7})  # the first at time 0
+        scenarios.append(smc.Scenario(plant=plant, jump=jump, mismatch={key: 0.8}, **common))
+        scenarios.append(smc.Scenario(plant=smc.plant(plant, **{key: 1.3 * value}, **size), **common))
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        same(trace, reference.run(scenario))
+
+
+@pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
+def test_the_law_and_the_trace_share_one_clock(period, steps):
+    """period / steps * steps is below the period in floating point: a step reference at a sample must not come late."""
+    scenario = smc.Scenario(
+        plant="duffing",
+        law="classical",
+        control_period=period,
+        physics_step=period / steps,
+        duration=0.5,
+        reference=smc.Step(1.0, time=period),
+    )
+    trace = smc.run(scenario)
+    assert trace.r[1] == 1.0
+    same(trace, reference.run(scenario))
+
+
+@pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
+def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
+    step = smc.Step(1.0, time=2 * period)
+    scenario = smc.Scenario(
+        plant="duffing", law="none", control_period=period, physics_step=period / steps, duration=0.5, disturbance=step
+    )
+    assert smc.run(scenario).d[:4, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_applied_is_the_command_of_the_delay_ago():
+    delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
+    common = {
+        "plant": "duffing",
+        "law": "observer_free",
+        "duration": 0.2,
+        "control_period": 0.005,
+        "physics_step": 0.001,
+    }
+    scenarios = [smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay) for delay in delays]
+    for trace in smc.run(scenarios):
+        samples = math.ceil(round(trace.scenario.input_delay / 0.001) / 5)  # a command acts from the next sample on
+        np.testing.assert_array_equal(trace.applied[:samples], 0.0)
+        np.testing.assert_array_equal(trace.applied[samples:], trace.u[: len(trace.u) - samples])
+        assert np.unique(trace.u).size > 1
+
+
+def batch():
+    """Two plants, all laws, mixed gains, signals, noise, seeds, delays, jumps and periods."""
+    found = []
+    for plant in ("duffing", "pendulum_network"):
+        for i, law in enumerate(STUDIED):
+            common = smc.paper.scenario(plant, law, "jump_mild", seed=i)
+            noisy = {"noise": smc.Noise(0.01, 0.05), "disturbance": smc.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1)}
+            found.append(shortened(common, 0.1))
+            found.append(shortened(dataclasses.replace(common, **noisy, input_delay=i * 1e-3), 0.1))
+            found.append(shortened(dataclasses.replace(common, **noisy, velocity="filtered_difference"), 0.1))
+            found.append(dataclasses.replace(found[-1], jump=None, control_period=5e-3, u_max=0.1 * (i + 1)))
+    return found
+
+
+def digest(traces):
+    """A fingerprint of every bit of some traces."""
+    total = hashlib.sha256()
+    for trace in traces:
+        for name in ARRAYS:
+            total.update(np.ascontiguousarray(getattr(trace, name)).tobytes())
+    return total.hexdigest()
+
+
+@pytest.fixture(scope="module")
+def together():
+    return smc.run(batch(), threads=1)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_threads_change_no_bit(together, threads):
+    assert digest(smc.run(batch(), threads=threads)) == digest(together)
+
+
+def test_order_changes_no_bit(together):
+    order = np.random.default_rng(0).permutation(len(together))
+    scenarios = batch()
+    for i, trace in zip(order, smc.run([scenarios[i] for i in order], threads=2), strict=True):
+        same(trace, together[i])
+
+
+def test_company_changes_no_bit(together):
+    for scenario, trace in zip(batch(), together, strict=True):
+        same(smc.run(scenario), trace)
+
+
+@pytest.mark.parametrize("chunk_bytes", [1, 300_000, 10**9])
+@pytest.mark.parametrize("slice_steps", [1, 777, 10**9])
+def test_chunks_and_slices_change_no_bit(together, monkeypatch, chunk_bytes, slice_steps):
+    monkeypatch.setattr(runner, "CHUNK_BYTES", chunk_bytes)
+    monkeypatch.setattr(chunk_module, "SLICE_STEPS", slice_steps)
+    assert digest(smc.run(batch(), threads=2)) == digest(together)
+
+
+def test_another_process_gives_the_same_bits(together):
+    here = Path(__file__).parent
+    code = "import smc_mujoco as smc, test_lockstep as t; print(t.digest(smc.run(t.batch())))"
+    env = os.environ | {"PYTHONPATH": f"{here.parent}{os.pathsep}{here}"}
+    run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=100, check=True)
+    assert run.stdout.strip() == digest(together)
+
+
+def test_another_seed_gives_other_bits(together):
+    assert digest(smc.run([dataclasses.replace(s, seed=s.seed + 1) for s in batch()])) != digest(together)
+
+
+def test_runs_from_several_python_threads_give_the_same_bits(together):
+    found = {}
+
+    def work(i):
+        found[i] = digest(smc.run(batch(), threads=1 + i % 2))
+
+    workers = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert found == dict.fromkeys(range(4), digest(together))
+
+
+@smc.law_function(gains={"at": 0.05, "how": 0.0}, memory=1)
+def doomed(y, gains, memory):
+    """Fails at a time: 0 returns NaN, 1 raises, 2 writes beyond its memory, 3 throws the plant out of the world."""
+    if y.t >= gains.at:
+        if gains.how == 0.0:
+            return math.nan, y.e
+        if gains.how == 1.0:
+            raise ValueError
+        if gains.how == 2.0:
+            memory[3] = 1.0
+        if gains.how == 3.0:
+            return 1e9, y.e
+    return -y.e - y.de, y.e
+
+
+def test_a_failure_leaves_its_neighbours_alone(together):
+    scenarios = []
+    for i, scenario in enumerate(batch()):
+        law = doomed(at=0.013 * (i % 3) + 0.011, how=i % 4)
+        scenarios += [dataclasses.replace(scenario, law=law, u_max=math.inf), scenario]
+    traces = smc.run(scenarios, threads=2)
+    assert all(trace.failure for trace in traces[::2])
+    assert digest(traces[1::2]) == digest(together)
+
+
+@PLANTS
+@pytest.mark.parametrize("how", range(4))
+def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
+    scenario = smc.Scenario(plant=plant, law=doomed(how=how), u_max=math.inf, duration=0.1, control_period=2e-3)
+    trace = smc.run(scenario)
+    same(trace, reference.run(scenario))
+    assert trace.diverged_at is not None
+    assert trace.failure is not None
+    assert 0.05 <= trace.diverged_at <= 0.07
+    assert f"t = {trace.diverged_at:g} s" in trace.failure
+    for name in ("x", "v", "u", "applied", "s", "d"):
+        finite = np.isfinite(getattr(trace, name)).all(axis=1)
+        np.testing.assert_array_equal(finite, trace.t < trace.diverged_at)
+
+
+def test_a_command_too_large_for_mujoco_is_not_dropped_in_silence():
+    """Beyond 1e10 MuJoCo sets every control to 0 and only counts a warning: the trace must not say that it acted."""
+
+    @smc.law_function()
+    def huge(y, gains, memory):
+        return 1e11, y.e
+
+    free = smc.Scenario(plant="duffing", law="none", duration=0.02, u_max=math.inf)
+    trace = smc.run(dataclasses.replace(free, law=huge()))
+    assert trace.failure or not np.array_equal(trace.x, smc.run(free).x)
+
+
+def test_plants_of_one_name_and_two_mechanisms_are_not_mixed():
+    duffing = smc.plant("duffing")
+
+    def tilted(n):
+        spec = duffing.build(n)
+        spec.option.gravity = (-9.81, 0.0, 0.0)
+        return spec
+
+    flat = smc.Scenario(plant=duffing, law="none", duration=0.05)
+    steep = dataclasses.replace(flat, plant=dataclasses.replace(duffing, build=tilted))
+    for trace, scenario in zip(smc.run([flat, steep]), (flat, steep), strict=True):
+        same(trace, reference.run(scenario))
+
+
+def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
+    """An autoreset wipes userdata, and with it the row: without a word, the rest of the trace would be raw memory."""
+    duffing = smc.plant("duffing")
+
+    def resetting(n):
+        spec = duffing.build(n)
+        spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
+        return spec
+
+    plant = dataclasses.replace(duffing, name="resetting", build=resetting)
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, disturbance=smc.Constant(1e12)))
+    assert trace.diverged_at == 1e-3
+    assert "finite world" in str(trace.failure)
+
+
+class Policy:
+    """A law that no compiler takes, for the plain loop; it may think with a simulation of its own."""
+
+    def __init__(self, think=lambda: None):
+        self.think = think
+
+    def __call__(self, y, gains, memory):
+        self.think()
+        return -3.0 * y.e - y.de, y.e
+
+
+def uncompiled(think=lambda: None, duration=0.05):
+    """A scenario under a Policy."""
+    return smc.Scenario(plant="duffing", law=smc.law_function()(Policy(think))(), duration=duration)
+
+
+def test_a_law_that_does_not_compile_takes_the_plain_loop_and_says_so():
+    @smc.law_function()
+    def compiled(y, gains, memory):
+        return -3.0 * y.e - y.de, y.e
+
+    with pytest.warns(smc.PlainLoopWarning, match="Policy"):
+        trace = smc.run(uncompiled())
+    other = smc.run(dataclasses.replace(uncompiled(), law=compiled()))
+    np.testing.assert_array_equal(trace.x, other.x)
+
+
+def test_a_python_law_may_simulate_a_model_of_its_own():
+    """A predictive law steps MuJoCo inside the callback. In a process of its own, since the worst case is an abort."""
+    here = Path(__file__).parent
+    env = os.environ | {"PYTHONPATH": f"{here.parent}{os.pathsep}{here}"}
+    code = "import test_lockstep as t; t.predict()"
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert run.returncode == 0, run.stderr[-500:]
+
+
+def predict():
+    """A run whose law steps another model gives what it gives without."""
+    model = smc.plant("duffing").load()
+    data = mujoco.MjData(model)
+    warnings.simplefilter("ignore", smc.PlainLoopWarning)
+    thinking = smc.run(uncompiled(lambda: mujoco.mj_step(model, data)))
+    assert data.ctrl[0] == 0.0
+    np.testing.assert_array_equal(thinking.x, smc.run(uncompiled()).x)
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+def test_a_python_law_may_run_scenarios_of_its_own():
+    inner = smc.Scenario(plant="duffing", law="classical", duration=0.005)
+    alone, inside = smc.run(inner), []
+    trace = smc.run(uncompiled(lambda: inside.append(smc.run(inner)), duration=0.005))
+    assert trace.failure is None
+    np.testing.assert_array_equal(trace.x, smc.run(uncompiled(duration=0.005)).x)
+    for other in inside:
+        same(other, alone)
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+def test_a_plain_loop_does_not_disturb_runs_on_another_thread():
+    started, stop = threading.Event(), threading.Event()
+    quick = smc.Scenario(plant="duffing", law="classical", duration=0.05)
+    alone, slow = smc.run(quick), []
+
+    def think():
+        started.set()
+        stop.wait(1e-3)
+
+    worker = threading.Thread(target=lambda: slow.append(smc.run(uncompiled(think, duration=0.2))))
+    worker.start()
+    started.wait(10)
+    try:
+        same(smc.run(quick), alone)
+    finally:
+        stop.set()
+        worker.join()
+    assert slow[0].failure is None

@@ -1,0 +1,271 @@
+"""The only unsafe code: offsets are refused when wrong, and the harness touches nothing but its own rows."""
+
+import ctypes
+import dataclasses
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.introspect import ast_nodes, structs
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation import offsets as layout
+
+FIELDS = layout.Offsets._fields[1:]
+SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind():
+    before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()  # dm_control has a warning handler of its own
+    mujoco.set_mjcb_control(None)
+    mujoco.set_mju_user_warning(None)
+    yield
+    left = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
+    mujoco.set_mjcb_control(before[0])
+    mujoco.set_mju_user_warning(before[1])
+    assert left == (None, None)
+
+
+@pytest.fixture
+def live():
+    model = smc.plant("duffing").load(nuserdata=17)
+    return model, mujoco.MjData(model)
+
+
+def doctored(monkeypatch, name, change):
+    """Let introspection report other fields of a struct."""
+    struct = structs.STRUCTS[name]
+    fields = tuple(change(list(struct.fields)))
+    monkeypatch.setitem(structs.STRUCTS, name, dataclasses.replace(struct, fields=fields))
+
+
+def position(fields, name):
+    return [field.name for field in fields].index(name)
+
+
+def test_offsets_are_where_the_live_arrays_are(live):
+    model, data = live
+    offsets = layout.checked(model, data)
+    assert offsets == layout.offsets()
+    assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
+    for name in FIELDS:
+        assert (
+            ctypes.c_void_p.from_address(data._address + getattr(offsets, name)).value
+            == getattr(data, name).ctypes.data
+        )
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_field_more_before_an_array_is_refused(monkeypatch, live, name):
+    extra = structs.STRUCTS["mjData"].fields[position(structs.STRUCTS["mjData"].fields, "qpos")]
+
+    def insert(fields):
+        fields.insert(position(fields, name), dataclasses.replace(extra, name="extra"))
+        return fields
+
+    doctored(monkeypatch, "mjData", insert)
+    with pytest.raises(layout.LayoutError, match=rf"mjData\.{name} is not at byte"):
+        layout.checked(*live)
+
+
+def test_a_field_less_is_refused(monkeypatch, live):
+    doctored(monkeypatch, "mjData", lambda fields: fields[1:])
+    with pytest.raises(layout.LayoutError, match=r"mjData\.qpos is not at byte"):
+        layout.checked(*live)
+
+
+def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
+    def swap(fields):
+        i, j = position(fields, "qpos"), position(fields, "qvel")
+        fields[i], fields[j] = fields[j], fields[i]
+        return fields
+
+    doctored(monkeypatch, "mjData", swap)
+    with pytest.raises(layout.LayoutError, match="qpos"):
+        layout.checked(*live)
+
+
+def test_arrays_in_another_order_are_refused(monkeypatch, live):
+    """Also where the last field that we read comes first, or one is gone."""
+
+    def turn(fields):
+        fields.insert(0, fields.pop(position(fields, "sensordata")))
+        return fields
+
+    doctored(monkeypatch, "mjData", turn)
+    with pytest.raises(layout.LayoutError):
+        layout.checked(*live)
+
+
+@pytest.mark.parametrize("name", ["qpos", "sensordata"])
+def test_an_array_that_is_gone_is_refused(monkeypatch, live, name):
+    def remove(fields):
+        del fields[position(fields, name)]
+        return fields
+
+    doctored(monkeypatch, "mjData", remove)
+    with pytest.raises(layout.LayoutError):
+        layout.checked(*live)
+
+
+def test_a_shifted_model_is_refused(monkeypatch, live):
+    def insert(fields):
+        return [dataclasses.replace(fields[0], name="extra"), *fields]
+
+    doctored(monkeypatch, "mjModel", insert)
+    with pytest.raises(layout.LayoutError, match="nuserdata"):
+        layout.checked(*live)
+
+
+def test_an_unknown_type_is_refused(monkeypatch, live):
+    def insert(fields):
+        return [dataclasses.replace(fields[0], name="extra", type=ast_nodes.ValueType(name="quaternion_t")), *fields]
+
+    doctored(monkeypatch, "mjData", insert)
+    with pytest.raises(layout.LayoutError, match="quaternion_t"):
+        layout.checked(*live)
+
+
+def test_nothing_is_installed_when_the_layout_is_wrong(monkeypatch):
+    doctored(monkeypatch, "mjModel", lambda fields: [dataclasses.replace(fields[0], name="extra"), *fields])
+    layout.offsets.cache_clear()
+    callback.harness.cache_clear()
+    with pytest.raises(layout.LayoutError), callback.installed():
+        pass
+    assert mujoco.get_mjcb_control() is None
+    monkeypatch.undo()
+    assert smc.run(SCENARIO).failure is None
+
+
+def counting():
+    """A native control callback that counts its calls, and the list that holds the count."""
+    calls = [0]
+
+    def count(model, data):
+        calls[0] += 1
+
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(count), calls
+
+
+def test_the_callback_before_is_back_after_the_block_and_after_an_exception(live):
+    before, calls = counting()
+    callback.harness()  # compiled by now, with the little model that checks the layout
+    mujoco.set_mjcb_control(before)
+    with callback.installed():
+        mujoco.mj_forward(*live)
+    assert calls == [0]
+    with pytest.raises(KeyboardInterrupt), callback.installed():
+        raise KeyboardInterrupt
+    mujoco.mj_forward(*live)
+    assert calls == [1]
+    mujoco.set_mjcb_control(None)
+
+
+def test_the_warning_handler_before_is_back_too():
+    def heard(message):
+        raise AssertionError(message)
+
+    mujoco.set_mju_user_warning(heard)
+    with callback.installed():
+        assert mujoco.get_mju_user_warning() is not heard
+    assert mujoco.get_mju_user_warning() is heard
+    mujoco.set_mju_user_warning(None)
+
+
+def test_blocks_nest():
+    with callback.installed():
+        outer = mujoco.get_mjcb_control()
+        inner, calls = counting()
+        with callback.installed(inner):
+            assert mujoco.get_mjcb_control() is inner
+        with callback.installed():
+            assert smc.run(SCENARIO).failure is None
+        assert mujoco.get_mjcb_control() is outer
+        assert calls == [0]
+
+
+def test_a_second_thread_waits_for_the_first():
+    entered = threading.Event()
+
+    def work():
+        with callback.installed():
+            entered.set()
+
+    worker = threading.Thread(target=work)
+    with callback.installed():
+        worker.start()
+        assert not entered.wait(0.1)
+    worker.join(10)
+    assert entered.is_set()
+
+
+@pytest.mark.parametrize("native", [True, False], ids=["native", "python"])
+def test_a_run_puts_a_users_own_callback_back(native):
+    """A Python callback makes MuJoCo's model compiler fail: no model may be built while it is installed."""
+    own = counting()[0] if native else lambda model, data: None
+    alone = smc.run(SCENARIO)
+    layout.offsets.cache_clear()  # as in a fresh process
+    callback.harness.cache_clear()
+    mujoco.set_mjcb_control(own)
+    try:
+        trace = smc.run(SCENARIO)
+        assert mujoco.get_mjcb_control() is own
+    finally:
+        mujoco.set_mjcb_control(None)
+    np.testing.assert_array_equal(trace.x, alone.x)
+
+
+def test_a_run_that_is_interrupted_puts_the_callback_back():
+    def interrupt(steps):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        list(smc.stream([SCENARIO], report=interrupt))
+    assert mujoco.get_mjcb_control() is None
+    assert smc.run(SCENARIO).failure is None
+
+
+def userdata(kind, size):
+    """What a stranger may keep in userdata."""
+    rng = np.random.default_rng(size)
+    return {
+        "zeros": np.zeros(size),
+        "ones": np.ones(size),
+        "numbers": rng.normal(size=size) * 1e6,
+        "nan": np.full(size, np.nan),
+        "nearly a mark": np.full(size, callback.mark() + 1),
+    }[kind]
+
+
+@pytest.mark.parametrize("size", [0, 1, state.HEADER - 1, state.HEADER, 500])
+@pytest.mark.parametrize("kind", ["zeros", "ones", "numbers", "nan", "nearly a mark"])
+def test_strangers_are_not_touched(size, kind):
+    model = smc.plant("pendulum_network").load(nuserdata=size)
+    ends = []
+    for inside in (False, True):
+        data = mujoco.MjData(model)
+        data.qpos[:], data.userdata[:], data.ctrl[:], data.xfrc_applied[:] = 0.3, userdata(kind, size), 0.2, 0.01
+        if inside:
+            with callback.installed():
+                mujoco.mj_step(model, data, 20)
+        else:
+            mujoco.mj_step(model, data, 20)
+        np.testing.assert_array_equal(data.userdata, userdata(kind, size))
+        assert np.all(data.ctrl == 0.2)
+        assert np.all(data.xfrc_applied == 0.01)
+        ends.append(np.concatenate([data.qpos, data.qvel]))
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_row_shorter_than_a_header_is_never_read_as_a_row():
+    """Even if it begins with our mark."""
+    model = smc.plant("duffing").load(nuserdata=state.HEADER - 1)
+    data = mujoco.MjData(model)
+    data.userdata[0] = callback.mark()
+    before = data.userdata.copy()
+    with callback.installed():
+        mujoco.mj_step(model, data)
+    np.testing.assert_array_equal(data.userdata, before)

@@ -1,0 +1,198 @@
+"""Noise is numpy's Philox bit for bit, normal, independent where it must be, and a function of time and seed alone."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy import stats
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import philox, reference
+
+LARGEST_SEED = 2**53 - 1
+
+
+@njit
+def draws(seed, channel, stream, n):
+    """Pairs of normals of n consecutive blocks, (n, 2)."""
+    z = np.empty((n, 2))
+    for k in range(n):
+        z[k] = philox.normals(seed, channel, stream, k)
+    return z
+
+
+def numpys(seed, channel, stream, k):
+    """Block k from numpy's generator, which counts up before it draws; key and counter as little-endian words."""
+    counter = (k + (stream << 64) - 1) % 2**256
+    return np.random.Philox(key=seed | channel << 64, counter=counter).random_raw(4)
+
+
+def test_philox_blocks_equal_numpys_bit_for_bit():
+    words = np.random.default_rng(0).integers(2**64, size=(500, 4), dtype=np.uint64)
+    edges = [np.uint64(w) for w in (0, 1, 2**32 - 1, 2**32, LARGEST_SEED, 2**63, 2**64 - 1)]
+    for seed, channel, stream, k in itertools.chain(words, itertools.product(edges, repeat=4)):
+        ours = np.array(philox.block(seed, channel, stream, k))
+        np.testing.assert_array_equal(ours, numpys(int(seed), int(channel), int(stream), int(k)))
+
+
+def test_philox_takes_the_float_arguments_that_a_row_holds():
+    for seed, channel, k in itertools.product((0, 1, LARGEST_SEED), (0, 999), (0, 1, 10**8)):
+        floats = philox.block(float(seed), channel, philox.PROCESS, float(k))
+        np.testing.assert_array_equal(np.array(floats), numpys(seed, channel, philox.PROCESS, k))
+
+
+def test_normals_are_box_muller_of_the_top_53_bits():
+    for k in range(200):
+        a, b, _, _ = (int(w) >> 11 for w in numpys(5, 2, philox.MEASUREMENT, k))
+        radius, angle = math.sqrt(-2 * math.log((a + 1) / 2**53)), 2 * math.pi * b / 2**53
+        expected = radius * math.cos(angle), radius * math.sin(angle)
+        np.testing.assert_allclose(philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15)
+
+
+def test_normals_are_standard_normal():
+    z = draws(1, 0, philox.MEASUREMENT, 200_000)
+    for column in z.T:
+        assert stats.kstest(column, "norm").pvalue > 1e-3
+        assert abs(column.mean()) < 4 / math.sqrt(len(z))
+        assert abs(column.var() - 1) < 4 * math.sqrt(2 / len(z))
+        assert abs(stats.skew(column)) < 4 * math.sqrt(6 / len(z))
+        assert abs(stats.kurtosis(column)) < 4 * math.sqrt(24 / len(z))
+
+
+def test_pairs_channels_streams_seeds_and_samples_are_independent():
+    n, keys = 20_000, itertools.product((0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS))
+    series = np.concatenate([draws(*key, n).T for key in keys])
+    later = np.roll(series, 1, axis=1)
+    together = np.corrcoef(np.concatenate([series, later, series**2]))
+    np.fill_diagonal(together, 0.0)
+    assert np.abs(together).max() < 6 / math.sqrt(n)
+
+
+@smc.law_function()
+def show_position(y, gains, memory):
+    return 0.0, y.x
+
+
+@smc.law_function()
+def show_velocity(y, gains, memory):
+    return 0.0, y.v
+
+
+def at_rest(law, **fields):
+    """A run at the origin: what the law shows as s is the noise alone, exactly."""
+    common = {"plant": "duffing", "x0": 0.0, "duration": 0.1, "noise": smc.Noise(position=0.5, velocity=3.0), "seed": 9}
+    trace = smc.run(smc.Scenario(law=law(), **(common | fields)))
+    assert not trace.x.any()
+    return trace.s[:, 0]
+
+
+def test_sensors_show_the_truth_plus_the_normals_of_the_sample():
+    expected = np.array([reference.normals(9, 0, philox.MEASUREMENT, k) for k in range(101)])
+    np.testing.assert_allclose(at_rest(show_position), 0.5 * expected[:, 0], rtol=1e-15)
+    np.testing.assert_allclose(at_rest(show_velocity), 3.0 * expected[:, 1], rtol=1e-15)
+
+
+@pytest.mark.parametrize("law", [show_position, show_velocity])
+def test_measurement_noise_knows_neither_physics_step_nor_integrator_nor_delay(law):
+    noisy = at_rest(law)
+    for fields in (
+        {"physics_step": 2.5e-4},
+        {"integrator": "Euler"},
+        {"integrator": "implicit"},
+        {"input_delay": 0.01},
+        {"duration": 0.2},
+    ):
+        np.testing.assert_array_equal(at_rest(law, **fields)[: len(noisy)], noisy)
+    assert not np.any(at_rest(law, seed=10) == noisy)
+
+
+def test_position_and_velocity_noise_are_switched_separately():
+    assert not at_rest(show_position, noise=smc.Noise(velocity=3.0)).any()
+    assert not at_rest(show_velocity, noise=smc.Noise(position=0.5)).any()
+
+
+TAU, SIGMA = 0.05, 0.7
+
+
+def path(signal, times, seed=0, channel=0):
+    """The signal's values at rising times."""
+    memory = np.zeros(signal.memory)
+    return np.array([type(signal).value(t, signal, memory, seed, channel, philox.PROCESS)[0] for t in times])
+
+
+def test_process_noise_has_its_standard_deviation_and_correlation_time():
+    knots, dt = 400_000, 5e-3
+    d = path(smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt), np.arange(knots) * dt, seed=3)
+    independent = knots * dt / (2 * TAU)
+    assert abs(d.mean()) < 4 * SIGMA / math.sqrt(independent)
+    assert abs(d.std() / SIGMA - 1) < 4 / math.sqrt(independent)
+    for lag in (1, 2, 5, 10, 20, 60):
+        correlation = np.mean(d[lag:] * d[:-lag]) / SIGMA**2
+        assert abs(correlation - math.exp(-lag * dt / TAU)) < 4 / math.sqrt(independent)
+
+
+def test_process_noise_is_stationary_from_the_start():
+    """Over many seeds the spread is sigma at time 0 and one correlation time later."""
+    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    ends = np.array([path(signal, (0.0, TAU), seed=seed) for seed in range(4000)])
+    assert np.all(np.abs(ends.std(axis=0) / SIGMA - 1) < 4 / math.sqrt(2 * 4000))
+    assert abs(np.corrcoef(ends.T)[0, 1] - math.exp(-1)) < 4 / math.sqrt(4000)
+
+
+def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
+    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
+    fine = np.arange(4001) * 2.5e-4
+    values = path(signal, fine)
+    np.testing.assert_allclose(path(signal, fine[::3]), values[::3], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(path(signal, np.repeat(fine, 2)), np.repeat(values, 2), rtol=0, atol=1e-12)
+
+
+def test_process_noise_is_continuous_and_linear_between_knots():
+    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
+    values = path(signal, np.arange(4001) * 2.5e-4)
+    bends = np.abs(np.diff(values, 2))
+    assert bends[3::4].min() > 0.0  # at the knots
+    inside = np.delete(bends, np.s_[3::4])
+    assert inside.max() < 1e-12
+
+
+def process(plant="duffing", **fields):
+    """d of a run under process noise."""
+    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    common = {"plant": plant, "law": "none", "duration": 0.4, "disturbance": signal, "seed": 4}
+    return smc.run(smc.Scenario(**(common | fields)))
+
+
+def test_process_noise_of_a_run_knows_neither_physics_step_nor_control_period_nor_integrator():
+    d = process().d
+    assert d.std() > 0.1 * SIGMA
+    for fields in ({"physics_step": 2.5e-4}, {"integrator": "Euler"}, {"law": "classical"}, {"noise": smc.Noise(1, 1)}):
+        np.testing.assert_allclose(process(**fields).d, d, rtol=0, atol=1e-12)
+    for period in (2e-3, 20e-3):
+        np.testing.assert_allclose(process(control_period=period).d, d[:: round(period / 1e-3)], rtol=0, atol=1e-12)
+
+
+def test_process_noise_differs_between_channels_and_seeds():
+    d = process("pendulum_network", duration=2.0).d
+    other = process("pendulum_network", duration=2.0, seed=5).d
+    pairs = np.corrcoef(np.concatenate([d, other], axis=1).T) - np.eye(10)
+    assert np.abs(pairs).max() < 4 / math.sqrt(2.0 / (2 * TAU))
+    np.testing.assert_array_equal(d[:, 0], process(duration=2.0).d[:, 0])  # channel 0 is channel 0 in any plant
+
+
+def test_two_process_noises_of_one_run_are_independent():
+    """The sum of two equal ones has sqrt(2) times the spread of one, not 2 times."""
+    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    one = process(duration=20.0).d
+    two = process(duration=20.0, disturbance=(signal, dataclasses.replace(signal))).d - one
+    assert abs(np.corrcoef(one[:, 0], two[:, 0])[0, 1]) < 4 / math.sqrt(20.0 / (2 * TAU))
+
+
+@pytest.mark.parametrize("dt", [1e-12, 1e-300])
+def test_process_noise_with_absurdly_many_knots_is_refused(dt):
+    """Each knot costs time: 1e13 of them would hang in compiled code that hears no Ctrl-C."""
+    with pytest.raises(smc.ScenarioError, match="dt"):
+        smc.Scenario(plant="duffing", law="none", disturbance=smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt))

@@ -1,0 +1,874 @@
+"""Realistic mechanisms as a whole: parts in scenarios, alone and together, against the plain loop and the formulas.
+
+What one part does on its own stands in test_friction, test_actuators, test_contact and test_sensors.
+"""
+
+import dataclasses
+import importlib
+import math
+import pickle
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.coerce import REALISTIC_STEP, FilledName, FilledNumber
+from smc_mujoco.simulation.trace import ARRAYS
+
+runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
+PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
+ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
+LUGRE = smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.ScenarioWarning")  # motors of any strength
+MOTOR = smc.DCMotor()
+
+
+APART = {"x0": (-0.5, 0.0, 0.0), "v0": (12.0, 0.0, 0.0)}  # of three bobs the first, which then runs into the second
+
+
+def small(name):
+    """The plant; of networks three channels."""
+    return smc.plant(name, n=3) if smc.plant(name).network else smc.plant(name)
+
+
+def scenario(name="duffing", law="observer_free", **changes):
+    """The paper's law with its gains on a plant, for a short while."""
+    plant = small(name) if isinstance(name, str) else name
+    if isinstance(law, str):
+        law = smc.law(law, **smc.paper.GAINS[plant.name].get(law, {}))
+    return smc.Scenario(**({"plant": plant, "law": law, "duration": 0.1} | changes))
+
+
+def start(plant):
+    """A start free of every obstacle, towards them."""
+    return {"x0": 0.9 * plant.x0[0], "v0": 3.0} if plant.n == 1 else APART
+
+
+def same(a, b):
+    """Fail unless two traces hold the same bits and ended the same way."""
+    assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
+
+
+# the compiled callback and the plain loop
+
+
+PARTS = {
+    "viscous": {"friction": smc.Viscous(0.1)},
+    "coulomb": {"friction": smc.Coulomb(0.5)},
+    "lugre": {"friction": LUGRE},
+    "all frictions": {"friction": (smc.Viscous(0.1), LUGRE, smc.Coulomb(0.02))},
+    "lag": {"actuator": smc.Lag(0.01)},
+    "rate limit": {"actuator": smc.RateLimit(100.0)},
+    "motor": {"actuator": MOTOR},
+    "motor, no inductance, cogging": {"actuator": smc.DCMotor(inductance=0.0, cogging=0.02)},
+    "backlash": {"actuator": smc.Backlash(0.02)},
+    "motor and backlash": {"actuator": (MOTOR, smc.Backlash(0.02))},
+    "backlash and lugre": {"actuator": (smc.Lag(0.01), smc.Backlash(0.02)), "friction": LUGRE},
+    "encoder": {"sensor": smc.Encoder(500, bias=0.01, dropout=0.2, period=2.5e-3, delay=1e-3), "friction": LUGRE},
+    "gust": {"disturbance": (smc.Gust(5.0, time=0.02, width=0.05), smc.Impulse(0.2, time=0.01, width=2e-3))},
+    "noise": {"disturbance": smc.BandLimited(1.0, low=1.0, high=40.0), "noise": smc.Noise(0.01, 0.05)},
+    "delay": {"input_delay": 7.5e-4, "actuator": MOTOR},
+    "series": {"disturbance": smc.TimeSeries((0.0, 0.02, 0.05), (0.0, 1.0, -1.0)), "friction": smc.Coulomb(0.1)},
+    "heavier": {"jump": smc.Jump(0.05, {"mass": 3.0}), "friction": (LUGRE, smc.Viscous(0.1)), "actuator": MOTOR},
+}
+
+
+@PLANTS
+def test_callback_equals_plain_loop_with_every_part(name):
+    scenarios = [scenario(name, "super_twisting", **fields) for fields in PARTS.values()]
+    for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        same(trace, reference.run(s))
+
+
+@PLANTS
+def test_callback_equals_plain_loop_in_every_contact_and_mechanism(name):
+    plant = small(name)
+    scenarios = [
+        scenario(plant, contact=contact, mechanism=mechanism, **start(plant), **fields)
+        for contact in ("none", *plant.contacts)
+        for mechanism in ("equation", *plant.mechanisms)
+        for fields in ({}, {"friction": LUGRE, "actuator": (MOTOR, smc.Backlash(0.01))})
+        if contact != "bobs" or not fields
+    ]
+    for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        same(trace, reference.run(s))
+
+
+def pick(rng, *options):
+    return options[rng.integers(len(options))]
+
+
+def scattered(number):
+    """A random valid realistic scenario."""
+    rng = np.random.default_rng(number)
+    plant = small(str(rng.choice(list(smc.paper.GAINS))))
+    u, h = rng.uniform, 2.5e-4
+    frictions = {
+        "viscous": smc.Viscous(u(0, 1)),
+        "coulomb": smc.Coulomb(pick(rng, 0.0, u(0, 2))),
+        "lugre": smc.LuGre(u(0.01, 0.5), u(0.5, 1.0), u(0.001, 0.1)),
+    }
+    drive = pick(
+        rng, None, smc.Lag(pick(rng, 0.0, u(1e-4, 0.1))), smc.RateLimit(u(10, 1000)), smc.RateLimit(math.inf),
+        smc.DCMotor(inductance=pick(rng, 0.0, 1e-4), voltage=u(5, 50), current=u(5, 50), cogging=u(0, 0.05)),
+    )  # fmt: skip
+    play = pick(rng, None, None, smc.Backlash(pick(rng, 0.0, u(0, 0.1)), rotor_inertia=u(1e-3, 0.1)))
+    sensor = smc.Encoder(
+        counts=pick(rng, 100, 4096, math.inf), bias=pick(rng, 0.0, 0.01), dropout=pick(rng, 0.0, 0.3),
+        period=pick(rng, None, 3 * h, 20 * h), delay=h * int(rng.integers(0, 9)),
+    )  # fmt: skip
+    key = str(rng.choice([k for k in plant.parameters if k not in ("alpha", "beta", "l")]))
+    signals = [
+        smc.Gust(u(-5, 5), time=u(0, 0.1), width=u(0.01, 0.1)), smc.Impulse(u(-0.5, 0.5), time=u(0, 0.1), width=5e-3),
+        smc.BandLimited(u(0, 2), low=u(0, 5), high=u(6, 100)), smc.Sine(u(0, 2), omega=u(1, 50)),
+        smc.TimeSeries((0.0, u(0.01, 0.1)), tuple(rng.normal(size=2))),
+        smc.OrnsteinUhlenbeck(u(0.1, 1), tau=u(0.01, 1)),
+    ]  # fmt: skip
+    contact = pick(rng, "none", "none", *plant.contacts)
+    if contact != "none":
+        edited = plant.spec()
+        plant.contacts[contact](edited)
+        takes = {"friction": any(p.name.startswith("rub:") for p in edited.pairs)}
+        takes["restitution"] = any(p.name.startswith("hit:") for p in edited.pairs)
+        numbers = {"friction": u(0, 1), "restitution": u(0, 0.9)}
+        contact = smc.Contact(contact, **{k: numbers[k] for k, take in takes.items() if take and rng.integers(2)})
+    return smc.Scenario(
+        plant=plant,
+        law=smc.law(str(rng.choice(smc.laws()))),
+        duration=0.05,
+        control_period=int(rng.integers(1, 20)) * h,
+        physics_step=h,
+        x0=start(plant)["x0"],
+        v0=u(-3, 3) if plant.n == 1 else (u(0, 12), 0.0, 0.0),
+        friction=tuple(frictions[k] for k in frictions if rng.integers(2)),
+        contact=contact,
+        mechanism=pick(rng, "equation", *plant.mechanisms),
+        actuator=tuple(part for part in (drive, play) if part),
+        sensor=pick(rng, None, sensor),
+        disturbance=tuple(signals[i] for i in rng.choice(6, size=rng.integers(4), replace=False)),
+        noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
+        input_delay=h * int(rng.integers(0, 30)),
+        mismatch={key: u(0.8, 1.2)},
+        jump=pick(rng, None, smc.Jump(u(0, 0.04), {"mass": u(0.5, 2.0)})),
+        velocity=pick(rng, None, "measured", "filtered_difference"),
+        seed=number,
+        integrator=pick(rng, "implicitfast", "implicitfast", "Euler"),
+    )
+
+
+def test_callback_equals_plain_loop_in_scattered_realistic_scenarios():
+    scenarios = [scattered(number) for number in range(24)]
+    for s, trace in zip(scenarios, smc.run(scenarios, threads=2), strict=True):
+        same(trace, reference.run(s))
+
+
+# one batch
+
+
+NUMBERS = {
+    "viscous": [{"friction": smc.Viscous(b)} for b in (0.0, 0.1, 3.0)],
+    "coulomb": [{"friction": smc.Coulomb(level)} for level in (0.0, 0.05, 2.0)],
+    "lugre": [
+        {"friction": f}
+        for f in (LUGRE, smc.LuGre(0.01, 0.01, 0.1), dataclasses.replace(LUGRE, stiffness=200.0, damping=1.0))
+    ],
+    "lag": [{"actuator": smc.Lag(tau)} for tau in (1e-4, 0.01, 1.0)],
+    "rate limit": [{"actuator": smc.RateLimit(rate)} for rate in (1.0, 500.0, math.inf)],
+    "motor": [
+        {"actuator": m}
+        for m in (
+            MOTOR,
+            smc.DCMotor(0.5, 1e-3, 0.05, 5.0, 1e-4, 0.01, 7.0, 12.0, 2.0),
+            smc.DCMotor(voltage=math.inf, current=math.inf, rotor_inertia=0.0),
+        )
+    ],
+    "motor without inductance": [
+        {"actuator": smc.DCMotor(inductance=0.0, gear=gear, cogging=cogging)}
+        for gear, cogging in ((12.0, 0.0), (3.0, 0.01), (50.0, 0.1))
+    ],
+    "backlash": [
+        {"actuator": smc.Backlash(*numbers)} for numbers in ((0.0,), (0.02, 1e-2, 0.0), (0.1, 1e-3, 0.1), (1.0,))
+    ],
+    "encoder": [
+        {"sensor": s}
+        for s in (smc.Encoder(), smc.Encoder(math.inf, bias=0.1), smc.Encoder(100, dropout=0.5))
+    ],
+    "late encoder": [
+        {"sensor": s}
+        for s in (
+            smc.Encoder(delay=0.03), smc.Encoder(period=7e-3), smc.Encoder(100, period=3e-3, delay=1e-3, dropout=0.5)
+        )
+    ],
+    "input delay": [{"input_delay": delay, "friction": LUGRE} for delay in (0.0, 2.5e-4, 0.0125)],
+    "plant": [
+        {"friction": LUGRE, "actuator": MOTOR, "mismatch": {"mass": 1.3}},
+        {"friction": LUGRE, "actuator": MOTOR, "jump": smc.Jump(0.05, {"mass": 0.5})},
+        {"friction": LUGRE, "actuator": MOTOR, "noise": smc.Noise(0.01), "disturbance": smc.Gust(3.0, 0.0, 0.1)},
+    ],
+}  # fmt: skip
+CONTACT_NUMBERS = [(name, contact) for name in smc.paper.GAINS for contact in smc.plant(name).contacts]
+
+
+def one_batch(scenarios):
+    """Fail unless the scenarios share a layout, and run in one batch as they run alone, on any number of threads."""
+    assert len({runner.layout(s) for s in scenarios}) == 1
+    alone = [smc.run(s, threads=1) for s in scenarios]
+    for threads in (1, 3):
+        for a, b in zip(alone, smc.run(scenarios, threads=threads), strict=True):
+            same(a, b)
+    return alone
+
+
+@pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
+@pytest.mark.parametrize("part", NUMBERS)
+def test_scenarios_that_differ_in_numbers_are_one_batch(name, part):
+    scenarios = [scenario(name, **fields) for fields in NUMBERS[part]]
+    traces = one_batch([scenarios[i] for i in (0, 1, 2, *range(3, len(scenarios)), 0)])
+    assert len({trace.u.tobytes() for trace in traces}) == len(scenarios)  # and the numbers arrive
+    same(traces[0], traces[-1])
+
+
+@pytest.mark.parametrize(("name", "kind"), CONTACT_NUMBERS)
+def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
+    plain_contact = smc.Contact(kind)
+    edited = small(name).spec()
+    small(name).contacts[kind](edited)
+    takes = [("friction", "rub:"), ("restitution", "hit:")]
+    found = [plain_contact] + [
+        dataclasses.replace(plain_contact, **{field: value})
+        for field, sort in takes
+        if any(pair.name.startswith(sort) for pair in edited.pairs)
+        for value in (0.0, 0.3, 0.9)
+    ]
+    begin = APART if small(name).n > 1 else {"v0": 3.0}
+    one_batch([scenario(name, contact=contact, **begin) for contact in found])
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"friction": smc.Coulomb(0.1)},
+        {"friction": LUGRE},
+        {"actuator": smc.Lag(0.1)},
+        {"actuator": MOTOR},
+        {"actuator": smc.Backlash(0.1)},
+        {"contact": "stops"},
+        {"mechanism": "springs"},
+        {"sensor": smc.Encoder(delay=1e-3)},
+    ],
+)
+def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
+    common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
+    ideal, realistic = scenario(**common), scenario(**common, **fields)
+    assert runner.layout(ideal) != runner.layout(realistic)
+    for s, trace in zip((realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True):
+        same(trace, smc.run(s))
+
+
+# with every realism at zero
+
+
+ZEROS = {
+    "viscous": {"friction": smc.Viscous(0.0)},
+    "coulomb": {"friction": smc.Coulomb(0.0)},
+    "lag": {"actuator": smc.Lag(0.0)},
+    "rate limit": {"actuator": smc.RateLimit(math.inf)},
+    "backlash": {"actuator": smc.Backlash(0.0, rotor_inertia=1e-9)},
+    "motor": {
+        "actuator": smc.DCMotor(
+            inductance=0.0, torque_constant=1e-6, gear=1.0, rotor_inertia=0.0, voltage=math.inf, current=math.inf
+        )
+    },
+    "lugre": {"friction": smc.LuGre(1e-9, 1e-9, 1.0, stiffness=1e-6, damping=0.0)},
+}
+ZERO = pytest.mark.parametrize("zero", ZEROS)
+
+
+@PLANTS
+@ZERO
+@pytest.mark.parametrize("law", ["observer_free", "boundary_layer"])
+def test_without_realism_the_realistic_path_is_the_ideal_one_to_first_order(name, zero, law):
+    """implicitfast errs by O(h): h, h/2, h/4 against RK4."""
+    steps = (2.5e-4, 1.25e-4, 6.25e-5)
+    sensor = {"sensor": smc.Encoder(math.inf), "velocity": "measured"}
+    ideal = smc.run(scenario(name, law, duration=0.5))
+    path = smc.run([scenario(name, law, duration=0.5, physics_step=h, **ZEROS[zero], **sensor) for h in steps])
+    errors = [np.abs(trace.x - ideal.x).max() for trace in path]
+    assert errors[0] < 4e-3
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(orders, 1.0, atol=0.1)
+
+
+@PLANTS
+@pytest.mark.parametrize("zero", ["viscous", "coulomb"])
+def test_without_realism_the_ideal_integrator_gives_the_ideal_trace(name, zero):
+    ideal = smc.run(scenario(name, duration=0.5))
+    same_but_zero = smc.run(scenario(name, duration=0.5, integrator="RK4", physics_step=1e-3, **ZEROS[zero]))
+    np.testing.assert_allclose(same_but_zero.x, ideal.x, atol=1e-9)
+    np.testing.assert_allclose(same_but_zero.u, ideal.u, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "contact"), [(n, c) for n, c in CONTACT_NUMBERS if c in ("stops", "wall") or n == "inverted_pendulum"]
+)
+def test_an_obstacle_that_is_not_reached_is_not_there(name, contact):
+    start = {"x0": 0.15 if name == "inverted_pendulum" else 1.2, "v0": -0.1}
+    law = smc.law("none") if contact == "peg" else "observer_free"
+    if contact == "peg":
+        start = {"x0": 1.0, "v0": 0.0}  # and away from there
+    ideal = smc.run(scenario(name, law, duration=0.3, **start))
+    beside = smc.run(scenario(name, law, duration=0.3, integrator="RK4", physics_step=1e-3, contact=contact, **start))
+    assert not beside.reaction.any()
+    np.testing.assert_allclose(beside.x, ideal.x, atol=1e-9)
+    np.testing.assert_allclose(beside.u, ideal.u, atol=1e-8)
+
+
+# where smooth laws rest under friction
+
+
+RESTING = 6.0  # s
+LEVELS = (0.05, 0.5, 2.0, 8.0)  # N m, N
+STARTS = (1.0, 0.4, -0.05)  # of the plant's x0
+WEAK = {"observer_free": {"lam": 0.4}, "boundary_layer": {"k": 0.4}}  # barely pushing: Duffing rests near a well
+
+
+def resting(name):
+    """Scenarios of smooth laws, strong and weak, from near and far, under little and much friction."""
+    plant = small(name)
+    found = []
+    for law, weak in WEAK.items():
+        gains = smc.paper.GAINS[name][law]
+        for these in (gains, gains | weak):
+            for level in LEVELS:
+                for friction in (smc.Coulomb(level), smc.LuGre(0.8 * level, level, 0.01)):
+                    for start in STARTS if isinstance(friction, smc.Coulomb) else STARTS[:1]:
+                        found.append(
+                            scenario(
+                                plant,
+                                law=smc.law(law, **these),
+                                friction=friction,
+                                x0=tuple(start * x for x in plant.x0),
+                                duration=RESTING,
+                                control_period=2e-3,
+                                physics_step=5e-4,
+                            )
+                        )
+    return found
+
+
+def balance(trace, end=-1):
+    """What the law's command and the plant's own forces exert on each joint at rest at a sample, (n,)."""
+    s = trace.scenario
+    values, x = s.plant.values({}), trace.x[end]
+    law, gains = s.law.name, s.law.gains
+    if law == "observer_free":
+        u = -gains["lam"] * np.tanh(gains["k1"] * x)
+    else:
+        u = -gains["k"] * np.clip(gains["c"] * x / gains["phi"], -1.0, 1.0)
+    own = [s.plant.nominal(x, 0.0 * x, i, values) for i in range(s.plant.n)]
+    return np.clip(u, -s.u_max, s.u_max) + np.array([f / g for f, g in own])
+
+
+def breakaway(friction):
+    return friction.level if isinstance(friction, smc.Coulomb) else friction.static
+
+
+@PLANTS
+def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
+    """|lam tanh(k1 x) - restoring force(x)| <= F within 2 %; and friction is what holds it."""
+    inside = far = rests = 0
+    for trace in smc.run(resting(name)):
+        assert trace.failure is None
+        level = breakaway(trace.scenario.friction[0])
+        if np.abs(trace.v[-200:]).max() > 1e-3:
+            continue  # a weak law leaves a Van der Pol oscillator, say, on its limit cycle
+        rests += 1
+        left = balance(trace)
+        assert (np.abs(left) <= 1.02 * level).all(), trace.scenario
+        np.testing.assert_allclose(trace.reaction[-1], -left, atol=0.02 * level)
+        inside += np.any((np.abs(left) < 0.9 * level) & (np.abs(trace.x[-1]) > 1e-3))
+        far += np.abs(trace.x[-1]).max() > 0.3
+    assert rests >= 40
+    assert inside >= 10  # not all at the edge, where the bound would hold by a hair or not at all
+    assert far >= 5
+
+
+@PLANTS
+def test_without_friction_a_smooth_law_does_not_rest_off_balance(name):
+    """The claim above is about friction: a tenth of the friction lets go of where more held."""
+    strong = [s for s in resting(name) if isinstance(s.friction[0], smc.Coulomb) and s.friction[0].level == 8.0]
+    held = [t for t in smc.run(strong) if np.abs(t.v[-200:]).max() < 1e-3 and np.abs(balance(t)).max() > 1.0]
+    assert len(held) >= 2
+    weaker = [dataclasses.replace(t.scenario, friction=smc.Coulomb(0.8), x0=tuple(t.x[-1]), duration=0.2) for t in held]
+    for trace in smc.run(weaker):
+        assert np.abs(trace.v).max() > 0.01
+
+
+# energy
+
+
+def energies(s):
+    """Mechanical energy at every physics step of a scenario without a command."""
+    model = assembly.numbered(assembly.model([s]), s)
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = assembly.start(model, s)
+    found = []
+    for _ in range(s.samples * s.steps):
+        mujoco.mj_step(model, data)
+        found.append(data.energy.sum())
+    return np.array(found)
+
+
+PASSIVE = {
+    "coulomb": {"friction": smc.Coulomb(0.05)},
+    "lugre": {"friction": LUGRE},
+    "backlash": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01)},
+    "both": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01), "friction": LUGRE},
+    "springs": {"mechanism": "springs", "friction": smc.Coulomb(0.05)},
+}
+
+
+@pytest.mark.parametrize("name", [n for n in smc.paper.GAINS if n != "van_der_pol"])  # which makes energy
+@pytest.mark.parametrize("part", PASSIVE)
+def test_a_passive_mechanism_never_gains_energy(name, part):
+    if part == "springs" and not smc.plant(name).mechanisms:
+        pytest.skip("has no springs")
+    s = scenario(name, "none", duration=2.0, v0=0.5, **PASSIVE[part])
+    energy = energies(s)
+    span = energy[0] - energy.min()
+    stored = s.plant.n * LUGRE.static**2 / (2 * LUGRE.stiffness) if LUGRE in s.friction else 0.0  # in bent bristles
+    gained = (energy - np.minimum.accumulate(energy)).max()
+    assert span > 0.05
+    assert gained <= 1e-3 * span + stored
+
+
+# a jump of the mass in mid-run
+
+
+@PLANTS
+def test_a_jump_of_the_mass_leaves_the_parts_as_they_are(name):
+    rotor, extra = smc.DCMotor(rotor_inertia=1e-4), smc.Viscous(0.3)
+    s = scenario(name, actuator=rotor, friction=(extra, smc.Coulomb(0.2)), jump=smc.Jump(0.05, {"mass": 3.0}))
+    compiled = assembly.model([s])
+    before, after = assembly.numbered(compiled, s), assembly.numbered(compiled, s, s.jump_step)
+    dofs = dof_ids(compiled)
+    own = assembly.numbered(assembly.model([scenario(name)]), scenario(name))
+    for model in (before, after):
+        np.testing.assert_allclose(model.dof_damping[dofs], own.dof_damping[dofs] + 0.3)
+        np.testing.assert_allclose(model.dof_armature[dofs], own.dof_armature[dofs] + rotor.gear**2 * 1e-4)
+        np.testing.assert_array_equal(model.dof_frictionloss[dofs], 0.2)
+    assert after.body_mass.sum() > 1.5 * before.body_mass.sum()
+
+
+@PLANTS
+def test_a_jump_at_the_start_is_a_mismatch(name):
+    fields = {"actuator": MOTOR, "friction": (LUGRE, smc.Viscous(0.1)), "sensor": smc.Encoder(delay=1e-3)}
+    jumped = smc.run(scenario(name, jump=smc.Jump(0.0, {"mass": 2.0}), **fields))
+    other = smc.run(scenario(name, mismatch={"mass": 2.0}, **fields))
+    for array in ARRAYS:
+        np.testing.assert_array_equal(getattr(jumped, array), getattr(other, array), err_msg=array)
+
+
+@pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
+def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
+    fields = {"friction": (smc.Coulomb(0.3), smc.Viscous(0.1))}
+    whole = smc.run(scenario(name, jump=smc.Jump(0.04, {"mass": 2.0}), **fields))
+    start = {"x0": tuple(whole.x[40]), "v0": tuple(whole.v[40])}
+    rest = smc.run(scenario(name, mismatch={"mass": 2.0}, duration=0.06, **start, **fields))
+    np.testing.assert_allclose(whole.x[40:], rest.x, atol=1e-9)
+    np.testing.assert_allclose(whole.v[40:], rest.v, atol=1e-7)
+
+
+# what force and reaction say
+
+
+@pytest.mark.parametrize("name", [n for n in smc.paper.GAINS if n != "van_der_pol"])
+@pytest.mark.parametrize("friction", [smc.Coulomb(20.0), smc.LuGre(20.0, 20.0, 0.1)])
+def test_the_reaction_that_holds_a_stuck_joint_balances_all_other_forces(name, friction):
+    trace = smc.run(scenario(name, friction=friction, duration=8.0, disturbance=smc.Constant(0.7)))
+    assert np.abs(trace.v[-1]).max() < 1e-4
+    np.testing.assert_allclose(trace.force[-1], trace.applied[-2], rtol=1e-12)
+    np.testing.assert_allclose(trace.reaction[-1], -(balance(trace) + trace.d[-1]), rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ONE_JOINT)
+def test_the_reaction_of_a_sliding_joint_is_its_friction(name):
+    fast = smc.run(scenario(name, friction=smc.Coulomb(0.3), v0=2.0, x0=0.3, duration=0.04))
+    assert (fast.v > 0.5).all()
+    np.testing.assert_allclose(fast.reaction[1:], -0.3, rtol=1e-3)
+
+
+def test_two_frictions_react_together():
+    friction = (smc.Coulomb(0.3), smc.LuGre(0.2, 0.2, 0.1))
+    fast = smc.run(scenario(friction=friction, v0=2.0, x0=0.3, duration=0.05))
+    np.testing.assert_allclose(fast.reaction[20:], -0.5, rtol=2e-3)
+
+
+def test_nothing_reacts_on_an_ideal_plant():
+    for name in smc.paper.GAINS:
+        trace = smc.run(scenario(name))
+        assert not trace.reaction.any()
+        np.testing.assert_array_equal(trace.force[0], 0.0)
+        np.testing.assert_allclose(trace.force[1:], trace.applied[:-1], rtol=1e-12)
+
+
+@PLANTS
+def test_a_motors_force_is_its_torque(name):
+    """Of a held rotor, gear k i settles at u, the stall torque; the current's limit cuts it."""
+    fields = {"friction": smc.Coulomb(50.0), "duration": 0.05, "law": smc.law("observer_free", lam=3.0, k1=20.0)}
+    trace = smc.run(scenario(name, actuator=MOTOR, **fields))
+    np.testing.assert_allclose(trace.force[-1], trace.applied[-1], rtol=1e-3)
+    limit = 5.0 * MOTOR.constant
+    cut = smc.run(scenario(name, actuator=dataclasses.replace(MOTOR, current=5.0), **fields))
+    np.testing.assert_allclose(np.abs(cut.force[-1]), np.minimum(limit, np.abs(cut.applied[-1])), rtol=1e-3)
+
+
+LOSSLESS = {  # so that the sum below knows every force from the trace
+    "duffing": {"delta": 0.0},
+    "inverted_pendulum": {"b": 0.0},
+    "pendulum_network": {"b": 0.0},
+    "inverted_pendulum_network": {"b": 0.0},
+    "van_der_pol": {"mu": 0.0},
+}
+PUSHED = {
+    "coulomb": {"friction": smc.Coulomb(0.4)},
+    "lugre": {"friction": LUGRE},
+    "both": {"friction": (LUGRE, smc.Coulomb(0.1))},
+    "lag": {"actuator": smc.Lag(0.02), "friction": smc.Coulomb(0.4)},
+    "rate limit": {"actuator": smc.RateLimit(50.0)},
+    "motor": {"actuator": dataclasses.replace(MOTOR, rotor_inertia=0.0), "friction": LUGRE},
+    "backlash": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01)},
+    "stops": {"contact": "stops", "v0": 5.0},
+    "bobs": {"contact": "bobs", **APART},
+    "floor": {"contact": "floor"},
+    "peg": {"contact": "peg"},
+    "wall": {"contact": "wall", "v0": 5.0},
+}
+
+
+@PLANTS
+@pytest.mark.parametrize("part", PUSHED)
+def test_the_impulse_of_all_forces_is_the_change_of_momentum(name, part):
+    """Step by step: M (v_(k+1) - v_k) = h (force + reaction + d + the plant's own); a play hands the force on."""
+    fields = dict(PUSHED[part])
+    if "contact" in fields and fields["contact"] not in smc.plant(name).contacts:
+        pytest.skip(f"{name} offers no {part}")
+    n = {"n": 3} if smc.plant(name).n > 1 else {}
+    plant, h = smc.plant(name, **LOSSLESS[name], **n), 2.5e-4
+    common = {"control_period": h, "physics_step": h, "integrator": "Euler", "disturbance": smc.Sine(1.0, 20.0)}
+    trace = smc.run(scenario(plant, duration=0.3, **common, **fields))
+    assert trace.failure is None
+    values = plant.values({})
+    own = np.array([[plant.nominal(x, 0 * x, i, values)[0] for i in range(plant.n)] for x in trace.x])
+    inertia = 1.0 / plant.nominal(trace.x[0], trace.v[0], 0, values)[1]
+    force = 0.0 if part == "backlash" else trace.force[1:]
+    left = inertia * np.diff(trace.v, axis=0)
+    right = h * (force + trace.reaction[1:] + trace.d[:-1] + inertia * own[:-1])
+    exact = 1e-4 if "contact" in fields else 1e-6  # a blow's force is found to a tolerance, which MuJoCo's solver has
+    np.testing.assert_allclose(left, right, atol=exact * np.abs(left).max())
+    if part == "backlash":
+        assert np.abs(trace.reaction).max() > 0.5
+
+
+def test_forces_are_means_over_the_control_period():
+    """The impulse of a blow that is over between two samples is still in them, to the last newton second."""
+    fine, coarse = (
+        smc.run(scenario(law="none", contact="stops", v0=5.0, duration=0.3, control_period=p)) for p in (2.5e-4, 0.02)
+    )
+    total = fine.reaction[1:].sum() * 2.5e-4
+    assert abs(total) > 1.0
+    assert coarse.reaction[1:].sum() * 0.02 == pytest.approx(total, rel=1e-9)
+
+
+# what is refused
+
+
+def refused(**fields):
+    """The one sentence with which a scenario is refused."""
+    with pytest.raises(smc.ScenarioError) as caught:
+        smc.Scenario(**({"plant": "duffing", "law": "observer_free"} | fields))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert len(message) < 300
+    return message
+
+
+@pytest.mark.parametrize(
+    ("make", "names"),
+    [
+        (lambda: smc.Coulomb(-0.1), ["Coulomb's level", "-0.1", "give"]),
+        (lambda: smc.Coulomb(math.nan), ["Coulomb's level", "nan", "give"]),
+        (lambda: smc.Coulomb("much"), ["Coulomb's level", "'much'", "give"]),
+        (lambda: smc.Viscous(-1), ["Viscous's b", "-1", "give"]),
+        (lambda: smc.LuGre(0.1, 0.05, 0.01), ["LuGre's static", "0.05", "0.1", "give"]),
+        (lambda: smc.LuGre(-0.1, 0.05, 0.01), ["LuGre's coulomb", "-0.1", "give"]),
+        (lambda: smc.LuGre(0.0, 0.05, 0.01), ["LuGre's coulomb", "0", "give"]),
+        (lambda: smc.LuGre(0.1, 0.2, 0.0), ["LuGre's stribeck", "0", "give"]),
+        (lambda: smc.LuGre(0.1, 0.2, 0.1, stiffness=math.inf), ["LuGre's stiffness", "inf", "give"]),
+        (lambda: smc.Lag(-1e-3), ["Lag's tau", "-0.001", "give"]),
+        (lambda: smc.RateLimit(0.0), ["RateLimit's rate", "0", "give"]),
+        (lambda: smc.DCMotor(resistance=0.0), ["DCMotor's resistance", "0", "give"]),
+        (lambda: smc.DCMotor(gear=-1.0), ["DCMotor's gear", "-1", "give"]),
+        (lambda: smc.DCMotor(current=math.nan), ["DCMotor's current", "nan", "give"]),
+        (lambda: smc.Backlash(-0.01), ["Backlash's gap", "-0.01", "give"]),
+        (lambda: smc.Backlash(0.01, rotor_inertia=0.0), ["Backlash's rotor_inertia", "0", "give"]),
+        (lambda: smc.Encoder(dropout=1.5), ["Encoder's dropout", "1.5", "give"]),
+        (lambda: smc.Contact("stops", restitution=1.0), ["restitution", "1", "give"]),
+        (lambda: smc.Contact("stops", restitution=-0.1), ["restitution", "-0.1", "give"]),
+        (lambda: smc.Contact("floor", friction=-0.1), ["friction", "-0.1", "give"]),
+        (lambda: smc.Contact("floor", friction=math.nan), ["friction", "nan", "give"]),
+    ],
+)
+def test_a_bad_number_of_a_part_is_refused_in_one_sentence(make, names):
+    with pytest.raises(smc.ScenarioError) as caught:
+        make()
+    message = str(caught.value)
+    assert "\n" not in message
+    for name in names:
+        assert name in message
+
+
+@pytest.mark.parametrize("text", ["t,d\n0,1\n1,\n2,3\n", "t,d\n0,1\n1,nan\n2,3\n", "t,d\n0,1\n1,1\n2,1\n9,1\n"])
+def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, text):
+    path = tmp_path / "force.csv"
+    path.write_text(text)
+    with pytest.raises(smc.ScenarioError) as caught:
+        smc.TimeSeries.from_csv(path)
+    assert "line" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"friction": 0.1}, "friction is 0.1: give one such as smc.Coulomb(0.05)"),
+        ({"friction": "Coulomb"}, "friction is 'Coulomb': give one"),
+        ({"friction": smc.Coulomb}, "friction is <class"),
+        ({"friction": smc.Lag(0.1)}, "friction is Lag(tau=0.1): give one"),
+        ({"friction": (smc.Coulomb(0.1), smc.Coulomb(0.2))}, "friction has a Coulomb twice"),
+        ({"friction": (LUGRE, LUGRE)}, "friction has a LuGre twice"),
+        ({"actuator": 0.01}, "actuator is 0.01: give one such as smc.Lag(0.01)"),
+        ({"actuator": smc.Coulomb(0.1)}, "actuator is Coulomb(level=0.1): give one"),
+        ({"actuator": (smc.DCMotor(), smc.Lag(0.1))}, "actuator has DCMotor(resistance=0.299"),
+        ({"actuator": (smc.Backlash(0.1), smc.Backlash(0.1))}, "actuator has a Backlash twice"),
+        ({"contact": 3}, "contact is 3: give smc.Contact(...) or one of "),
+        ({"contact": smc.Coulomb(0.1)}, "contact is Coulomb"),
+        ({"contact": "wal"}, "'wal'"),
+        ({"contact": smc.Contact("bobs")}, "'bobs'"),
+        ({"contact": smc.Contact("none", friction=0.1)}, "none"),
+        ({"contact": smc.Contact("stops", friction=0.1)}, "friction"),
+        ({"mechanism": "string"}, "unknown mechanism of duffing 'string': did you mean 'springs'?"),
+        ({"mechanism": None}, "unknown mechanism of duffing None: choose from equation, springs"),
+        ({"mechanism": ["springs"]}, "unknown mechanism of duffing"),
+        ({"integrator": "RK4", "friction": LUGRE}, "integrator RK4 with LuGre"),
+        ({"integrator": "RK4", "actuator": smc.Lag(0.1)}, "integrator RK4 with Lag"),
+        ({"integrator": "RK4", "actuator": smc.RateLimit(1.0)}, "integrator RK4 with RateLimit"),
+        ({"integrator": "RK4", "actuator": smc.DCMotor()}, "integrator RK4 with DCMotor"),
+        ({"integrator": "rk4"}, "unknown integrator 'rk4': did you mean 'RK4'?"),
+        ({"reference": smc.Gust(1.0, 0.0, 1.0)}, "reference is a Gust"),
+        ({"reference": smc.BandLimited(1.0, 0.0, 1.0)}, "reference is BandLimited"),
+        ({"disturbance": smc.Impulse(1.0, 0.0, 1e-4)}, "Impulse(impulse=1.0, time=0.0, width=0.0001) is shorter than"),
+        ({"input_delay": 1e-4, "friction": LUGRE}, "input_delay 0.0001 s is no whole number of physics steps"),
+        ({"physics_step": 3e-4, "friction": LUGRE}, "physics_step 0.0003 s does not divide"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_sentence(fields, says):
+    message = refused(**fields)
+    assert says in message
+    assert "give" in message or "choose" in message or "mean" in message or "leave" in message or "widen" in message
+
+
+@pytest.mark.parametrize("name", smc.paper.GAINS)
+def test_an_unknown_contact_or_mechanism_lists_what_the_plant_offers(name):
+    plant = smc.plant(name)
+    message = refused(plant=plant, contact="zzz")
+    assert all(kind in message for kind in (*plant.contacts, "none"))
+    message = refused(plant=plant, mechanism="zzz")
+    assert all(kind in message for kind in (*plant.mechanisms, "equation"))
+
+
+INSIDE = [
+    {"plant": "duffing", "contact": "stops", "x0": 1.71},
+    {"plant": "duffing", "contact": "stops", "x0": 1.9},
+    {"plant": "duffing", "contact": "stops", "x0": -3.0},
+    {"plant": "duffing", "contact": "floor", "x0": 1.9},
+    {"plant": "duffing", "contact": "peg", "x0": 0.48},
+    {"plant": "duffing", "contact": "peg", "x0": 0.4},
+    {"plant": "van_der_pol", "contact": "peg", "x0": 0.2},
+    {"plant": "van_der_pol", "contact": "stops", "x0": 2.22},
+    {"plant": "van_der_pol", "contact": "stops", "x0": 2.6},
+    {"plant": "inverted_pendulum", "contact": "stops", "x0": 1.1},
+    {"plant": "inverted_pendulum", "contact": "stops", "x0": 1.3},
+    {"plant": "inverted_pendulum", "contact": "stops", "x0": -1.5},
+    {"plant": "inverted_pendulum", "contact": "wall", "x0": 1.5},
+    {"plant": "inverted_pendulum", "contact": "floor", "x0": 3.0},
+    {"plant": "inverted_pendulum", "contact": "wall", "x0": 0.8},
+    {"plant": "inverted_pendulum", "contact": "peg", "x0": 0.1},
+    {"plant": "pendulum_network", "contact": "bobs", "x0": (0.5, -0.5, 0.0, 0.0, 0.0)},
+    {"plant": "inverted_pendulum_network", "contact": "bobs", "x0": (0.3, -0.3, 0.0, 0.0, 0.0)},
+]
+
+
+@pytest.mark.parametrize("fields", INSIDE, ids=lambda f: f"{f['plant']} {f['contact']} {f['x0']}")
+def test_a_start_inside_an_obstacle_is_refused_before_anything_runs(fields):
+    inside = smc.Scenario(law="none", duration=0.01, **fields)
+    free = smc.Scenario(plant="van_der_pol", law="none", duration=0.01)
+    with pytest.raises(smc.ScenarioError) as caught:
+        next(iter(smc.stream([free, inside])))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("x0 ")
+    assert fields["plant"] in message
+    assert repr(fields["contact"]) in message
+    assert message.endswith("give another x0")
+
+
+@pytest.mark.parametrize("change", [{"plant": smc.plant("inverted_pendulum", l=0.25)}, {"mismatch": {"l": 1.1}}])
+def test_a_rod_of_another_length_is_refused_where_the_obstacles_stand(change):
+    with pytest.raises(smc.ScenarioError, match=r"'wall' of inverted_pendulum stands where l is 0\.5"):
+        smc.Scenario(**{"plant": "inverted_pendulum", "law": "none", "contact": "wall"} | change)
+
+
+def test_a_motor_too_weak_for_any_voltage_is_refused():
+    with pytest.raises(smc.ScenarioError, match="torque_constant 1e-12 N m/A is too weak"):
+        smc.DCMotor(torque_constant=1e-12, rotor_inertia=0.0, voltage=math.inf, current=math.inf)
+
+
+def test_a_voltage_that_mujoco_would_drop_ends_the_run():
+    """MuJoCo drops a control above 1e10: a run may not go on without its motor and say nothing."""
+    weak = smc.DCMotor(torque_constant=1e-10, gear=12.0, resistance=1e3, rotor_inertia=0.0, voltage=math.inf)
+    trace = smc.run(scenario(actuator=weak, u_max=math.inf))
+    assert trace.failure is not None
+    same(trace, reference.run(trace.scenario))
+
+
+@pytest.mark.parametrize("fields", [{"mismatch": {"alpha": -5.0}}, {"jump": smc.Jump(0.05, {"alpha": -5.0})}])
+def test_parameters_that_no_springs_have_are_refused_before_anything_runs(fields):
+    """alpha = +5 has no wells to snap into; a jump to it may not end the runs beside it in the middle."""
+    done = []
+    try:
+        impossible = scenario(mechanism="springs", **fields)
+        for index, _ in smc.stream([scenario(), impossible]):
+            done.append(index)
+    except smc.ScenarioError:
+        assert not done
+    else:
+        pytest.fail("was not refused")
+
+
+def test_the_plain_loop_refuses_a_start_inside_too():
+    @smc.law_function
+    def slow(y, gains, memory):
+        return float(str(y.x)), 0.0  # numba makes no number of a text
+
+    inside = smc.Scenario(plant="duffing", law=slow(), duration=0.01, contact="stops", x0=1.9)
+    with pytest.warns(smc.PlainLoopWarning), pytest.raises(smc.ScenarioError, match="inside"):
+        smc.run(inside)
+
+
+# scenarios as values
+
+
+EVERYTHING = {
+    "friction": (smc.Viscous(0.1), LUGRE, smc.Coulomb(0.02)),
+    "actuator": (MOTOR, smc.Backlash(0.02)),
+    "sensor": smc.Encoder(1000, bias=0.01, dropout=0.1, period=2e-3, delay=1e-3),
+    "contact": smc.Contact("stops", restitution=0.3),
+    "mechanism": "springs",
+    "disturbance": (smc.Gust(1.0, 0.0, 0.1), smc.BandLimited(0.1, 1.0, 5.0), smc.TimeSeries((0, 1), (0, 1))),
+    "input_delay": 7.5e-4,
+}
+
+
+def test_what_is_left_out_fits_what_is_there():
+    ideal, realistic = scenario(), scenario(friction=smc.Coulomb(0.1))
+    assert (ideal.integrator, ideal.physics_step) == ("RK4", 1e-3)
+    assert (realistic.integrator, realistic.physics_step) == ("implicitfast", REALISTIC_STEP)
+    for a, b in ((ideal, realistic), (realistic, ideal)):
+        there = dataclasses.replace(a, friction=b.friction)
+        back = dataclasses.replace(there, friction=a.friction)
+        assert there == b
+        assert back == a
+        assert hash(back) == hash(a)
+    assert dataclasses.replace(realistic, control_period=5e-3).physics_step == REALISTIC_STEP
+    assert dataclasses.replace(realistic, control_period=1e-4).physics_step == 1e-4
+
+
+@pytest.mark.parametrize("field", ["contact", "mechanism", "actuator", "friction"])
+def test_every_realism_brings_its_defaults(field):
+    value = {"contact": "stops", "mechanism": "springs", "actuator": smc.Lag(0.01), "friction": LUGRE}[field]
+    made = dataclasses.replace(scenario(), **{field: value})
+    assert (made.integrator, made.physics_step) == ("implicitfast", REALISTIC_STEP)
+
+
+def test_what_was_given_is_kept():
+    given = scenario(integrator="Euler", physics_step=5e-4)
+    there = dataclasses.replace(given, friction=smc.Coulomb(0.1))
+    assert (there.integrator, there.physics_step) == ("Euler", 5e-4)
+    assert (dataclasses.replace(there, friction=()).integrator) == "Euler"
+    ideal = scenario(integrator="RK4", physics_step=1e-3)
+    assert dataclasses.replace(ideal, friction=smc.Coulomb(0.1)).integrator == "RK4"
+
+
+def test_filled_in_values_are_plain_values():
+    s = scenario(friction=LUGRE)
+    assert isinstance(s.physics_step, FilledNumber)
+    assert isinstance(s.integrator, FilledName)
+    explicit = scenario(friction=LUGRE, integrator="implicitfast", physics_step=REALISTIC_STEP)
+    assert s == explicit
+    assert hash(s) == hash(explicit)
+
+
+def test_a_realistic_scenario_survives_a_pickle_and_stays_refillable():
+    s = scenario(**EVERYTHING)
+    again = pickle.loads(pickle.dumps(s))
+    assert again == s
+    assert hash(again) == hash(s)
+    ideal = {"friction": (), "actuator": (), "contact": "none", "mechanism": "equation"}
+    assert dataclasses.replace(again, **ideal, sensor=None, input_delay=0.0).integrator == "RK4"
+
+
+@PLANTS
+def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
+    offers = smc.plant(name)
+    fields = EVERYTHING | {"mechanism": "springs" if offers.mechanisms else "equation"}
+    fields["contact"] = smc.Contact(next(iter(offers.contacts)), restitution=0.3)
+    trace = smc.run(scenario(name, **fields, **(APART if offers.n > 1 else {})))
+    again = smc.load(trace.save(tmp_path / "a.npz"))
+    assert again.scenario == trace.scenario
+    assert hash(again.scenario) == hash(trace.scenario)
+    same(again, trace)
+    same(smc.run(again.scenario), trace)
+
+
+def test_a_loaded_scenario_still_finds_its_defaults_anew(tmp_path):
+    loaded = smc.load(smc.run(scenario(friction=LUGRE)).save(tmp_path / "a.npz")).scenario
+    assert dataclasses.replace(loaded, friction=()) == scenario()
+
+
+def test_parts_that_differ_make_scenarios_that_differ():
+    every = [scenario(**fields) for fields in PARTS.values()]
+    assert len(set(every)) == len(every)
+
+
+def test_an_order_of_drive_and_play_that_says_the_same_is_the_same():
+    assert scenario(actuator=(MOTOR, smc.Backlash(0.1))) == scenario(actuator=(smc.Backlash(0.1), MOTOR))
+
+
+def test_every_channel_starts_with_its_rotor_in_the_middle_of_the_play():
+    s = scenario("pendulum_network", actuator=smc.Backlash(0.1), v0=(0.1, 0.2, 0.3))
+    model = assembly.numbered(assembly.model([s]), s)
+    qpos, qvel = assembly.start(model, s)
+    for i, joint in enumerate(joint_ids(model)):
+        rotor = model.joint(f"rotor:{model.joint(joint).name}")
+        assert qpos[rotor.qposadr[0]] == qpos[model.jnt_qposadr[joint]] == s.x0[i]
+        assert qvel[rotor.dofadr[0]] == s.v0[i]

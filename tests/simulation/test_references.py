@@ -1,0 +1,156 @@
+"""References and how laws follow them: derivatives are exact, and with the model r'' is fed forward."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control.law import Measurement, catalogue
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.references import MinimumJerk, Ramp
+from smc_mujoco.simulation.signals import Sine, Step
+
+REFERENCES = [Ramp(0.7, 0.3), Ramp(-2.0), MinimumJerk(1.5, 0.2, 0.9), MinimumJerk(-0.4, -0.1, 2.0), Sine(0.5, 3.0, 0.2)]
+PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")
+# Laws of e and its rate, on any plant, that act: their theory is the same for every reference.
+FOLLOWING = [n for n, t in catalogue().items() if t.degree < 3 and not t.plants and n != "none"]
+
+
+def at(signal, t):
+    """Value and both derivatives."""
+    return np.array(type(signal).value(float(t), signal))
+
+
+@pytest.mark.parametrize("signal", REFERENCES, ids=repr)
+def test_derivatives_are_those_of_the_value(signal):
+    """Central differences of step h miss the slope by h^2/6 times a third derivative."""
+    h = 1e-4
+    for t in np.linspace(0.0, 2.0, 41) + 0.0123:  # no corner
+        before, here, after = (at(signal, t + k * h) for k in (-1, 0, 1))
+        np.testing.assert_allclose((after[:2] - before[:2]) / (2 * h), here[1:], atol=1e-5)
+
+
+def test_a_ramp_is_zero_then_a_line():
+    ramp = Ramp(0.7, 0.3)
+    assert at(ramp, 0.299).tolist() == [0.0, 0.0, 0.0]
+    assert at(ramp, 0.3).tolist() == [0.0, 0.7, 0.0]
+    assert at(ramp, 10.3) == pytest.approx([7.0, 0.7, 0.0])
+
+
+def test_a_ramp_starts_on_the_sample_that_its_time_names():
+    """k h misses the decimal time by an ulp; the slope is there all the same."""
+    for k in range(1, 200):
+        assert at(Ramp(1.0, k / 1000), k * 1e-3)[1] == 1.0
+
+
+def test_minimum_jerk_moves_from_rest_to_rest_and_stays():
+    move = MinimumJerk(1.5, 0.2, 0.9)
+    for t in (-1.0, 0.0, 0.2):
+        assert at(move, t).tolist() == [0.0, 0.0, 0.0]
+    for t in (1.1 + 1e-12, 5.0):
+        assert at(move, t) == pytest.approx([1.5, 0.0, 0.0], abs=1e-12)
+    assert at(move, 0.65) == pytest.approx([0.75, 1.5 * 1.875 / 0.9, 0.0])  # halfway: 15/8 of the mean speed
+
+
+def test_no_other_move_between_the_same_rests_has_less_jerk():
+    """The integral of the squared third derivative: 720 A^2/T^5, and more for the quintic plus any a^3 (1 - a)^3."""
+    move, h = MinimumJerk(1.0, 0.0, 1.0), 1e-3
+    t = np.arange(0.0, 1.0 + h / 2, h)
+    ddr = np.array([at(move, ti)[2] for ti in t])
+    bump = 6 * t - 36 * t**2 + 60 * t**3 - 30 * t**4  # second derivative of a^3 (1 - a)^3
+
+    def jerk(acceleration):
+        return np.sum(np.diff(acceleration) ** 2) / h
+
+    assert jerk(ddr) == pytest.approx(720.0, rel=1e-4)
+    for size in (-0.5, -0.1, 0.1, 0.5):
+        assert jerk(ddr + size * bump) > jerk(ddr)
+
+
+@pytest.mark.parametrize("make", [lambda: MinimumJerk(1.0, 0.0, 0.0), lambda: Ramp(math.nan), lambda: Ramp("1")])
+def test_what_is_no_move_is_refused(make):
+    with pytest.raises(smc.ScenarioError):
+        make()
+
+
+@pytest.mark.parametrize("signal", [Ramp(0.1, 0.05), MinimumJerk(0.4, 0.05, 0.3)], ids=repr)
+def test_a_reference_is_followed_alike_in_both_loops(signal):
+    scenario = smc.Scenario(
+        plant="pendulum_network", law="computed_torque", model="nominal", reference=signal, duration=0.5
+    )
+    fast, slow = smc.run(scenario), reference.run(scenario)
+    for name in ("x", "v", "u", "r"):
+        np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
+    np.testing.assert_array_equal(fast.r[:, 0], [at(signal, t)[0] for t in fast.t])
+    again = dataclasses.replace(scenario, reference=dataclasses.replace(signal))
+    assert again == scenario
+
+
+# laws that follow
+
+
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_with_it(name):
+    """u changes by r''/g with the model; published model-free laws do not know r''."""
+    law = smc.law(name)
+    assert law.function is not None
+    for model, expected in ((1.0, 3.0 / 1.6), (0.0, 0.0)):
+        u = []
+        for ddr in (0.0, 3.0):
+            y = Measurement(t=0.0, dt=1e-3, x=0.3, v=-0.2, e=0.1, de=0.05, r=0.2, dr=-0.25, ddr=ddr, f=0.7, g=1.6,
+                            model=model)  # fmt: skip
+            u.append(law.function(y, reference.named(law), np.zeros(law.memory))[0])
+        assert u[1] - u[0] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """Every law with the model along a sine from a wrong speed, and along a smooth move from where it stands."""
+    sine, move = Sine(0.5, 2.0), MinimumJerk(0.5, 0.5, 1.5)
+    cases = [(name, plant) for name in FOLLOWING for plant in PLANTS]
+    common = {"model": "nominal", "x0": 0.0}
+    scenarios = [
+        smc.Scenario(plant=plant, law=name, reference=r, duration=T, **common)
+        for name, plant in cases
+        for r, T in ((sine, 6.0), (move, 2.5))
+    ]
+    traces = iter(smc.run(scenarios))
+    return {case: (next(traces), next(traces)) for case in cases}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_a_law_with_the_model_follows_a_sine(name, plant, followed):
+    """e ends within 2 % of the amplitude: what is left is the sampling, and an integrator's memory of the start."""
+    trace = followed[name, plant][0]
+    assert trace.failure is None
+    assert np.abs(trace.x - trace.r)[trace.t > 4.5].max() < 0.02 * 0.5
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_a_law_with_the_model_moves_along_a_smooth_path_without_leaving_it(name, plant, followed):
+    """It starts on it: at no time is e more than 0.5 % of the way."""
+    trace = followed[name, plant][1]
+    assert trace.failure is None
+    assert np.abs(trace.x - trace.r).max() < 0.005 * 0.5
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", ["computed_torque", "observer_free", "boundary_layer"])
+def test_without_the_model_a_continuous_law_lags_behind_a_sine(name, plant, followed):
+    """What the model would have fed forward, (r'' - f)/g, takes an error to produce: ten times the error at least."""
+    blind = smc.run(smc.Scenario(plant=plant, law=name, reference=Sine(0.5, 2.0), x0=0.0, duration=6.0))
+    error, seeing = (np.abs(t.x - t.r)[t.t > 4.5].max() for t in (blind, followed[name, plant][0]))
+    assert error > 10 * seeing
+
+
+def test_a_step_is_taken_and_kept_by_the_model():
+    scenario = smc.Scenario(
+        plant="inverted_pendulum", law="observer_free", model="nominal", reference=Step(0.3, 0.5), x0=0.0, duration=5.0
+    )
+    trace = smc.run(scenario)
+    assert not trace.x[trace.t < 0.5].any()
+    assert trace.x[-1, 0] == pytest.approx(0.3, abs=1e-3)

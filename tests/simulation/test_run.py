@@ -1,0 +1,668 @@
+"""What `run` takes and gives, and that no failing run is silent or harms another."""
+
+# pyright: reportOperatorIssue=false, reportOptionalOperand=false
+import dataclasses
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from pathlib import Path
+
+import mujoco
+import numba
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+
+UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
+LOGGED = ("x", "v", "u", "applied", "s", "d")
+ARRAYS = (*LOGGED, "r")
+
+
+def scenario(law="classical", **fields):
+    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
+
+
+def made(function, gains=None, memory=8):
+    """A law of a function."""
+    return smc.law_function(gains=gains, memory=memory)(function)()
+
+
+def same(a, b) -> bool:
+    """Whether two traces are equal to the last bit."""
+    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ("t", *ARRAYS))
+
+
+def plainly(*args, **kwargs):
+    """`smc.run` of something that takes the plain loop, without the warning about it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        return smc.run(*args, **kwargs)
+
+
+def failed(trace, at: float, *words: str):
+    """The trace failed at a time in s, said so in one sentence, and holds numbers before and NaN after."""
+    assert trace.diverged_at == pytest.approx(at, abs=1e-9)
+    assert trace.failure.endswith(f"at t = {at:g} s")
+    assert "\n" not in trace.failure
+    for word in words:
+        assert word in trace.failure
+    before = trace.t < at - 1e-9
+    for name in LOGGED:
+        array = getattr(trace, name)
+        assert np.isfinite(array[before]).all(), name
+        assert np.isnan(array[~before]).all(), name
+
+
+def python(code: str, folder: Path) -> subprocess.CompletedProcess:
+    """A fresh interpreter running a file with this code, in an empty folder."""
+    (folder / "job.py").write_text(code)
+    command = [sys.executable, "-B", "job.py"]
+    environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+# what goes in and comes out
+
+
+def test_one_scenario_gives_a_trace_and_many_give_a_list_in_their_order():
+    many = [scenario(seed=seed, noise=smc.Noise(0.1)) for seed in range(5)]
+    one = smc.run(many[3])
+    assert isinstance(one, smc.Trace)
+    traces = smc.run(many)
+    assert [trace.scenario.seed for trace in traces] == [0, 1, 2, 3, 4]
+    assert same(one, traces[3])
+
+
+@pytest.mark.parametrize("kind", [list, tuple, iter, lambda many: (s for s in many)])
+def test_any_iterable_of_scenarios_will_do(kind):
+    many = [scenario(seed=seed) for seed in range(3)]
+    assert [trace.scenario for trace in smc.run(kind(many))] == many
+    assert sorted(index for index, _ in smc.stream(kind(many))) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("nothing", [[], (), iter(())])
+def test_no_scenarios_give_no_traces(nothing):
+    assert smc.run(nothing, progress=True) == []
+
+
+def test_plants_sizes_and_durations_mix_in_one_call():
+    many = [
+        scenario(plant="duffing"),
+        scenario(plant=smc.plant("pendulum_network", n=2)),
+        scenario(plant=smc.plant("pendulum_network", n=3)),
+        scenario(plant="duffing", duration=0.03),
+        scenario(plant="duffing", integrator="Euler"),
+        scenario(plant="duffing", control_period=2e-3),
+    ]
+    traces = smc.run(many)
+    assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1)]
+    assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
+
+
+@pytest.mark.parametrize(
+    "thing", [None, 5, "duffing", smc.plant("duffing"), {}.get], ids=lambda thing: type(thing).__name__
+)
+def test_what_is_no_scenario_is_refused(thing):
+    with pytest.raises(smc.ScenarioError, match="Scenario"):
+        smc.run(thing)
+    with pytest.raises(smc.ScenarioError, match="Scenario"):
+        smc.run([scenario(), thing])
+
+
+@pytest.mark.parametrize("threads", [0, -1, True, 1.5, "2", math.nan, [2]], ids=repr)
+def test_a_bad_number_of_threads_is_refused(threads):
+    with pytest.raises(smc.ScenarioError, match="threads is"):
+        smc.run([scenario()], threads=threads)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 64, np.int64(2)])
+def test_the_number_of_threads_changes_nothing(threads):
+    many = [scenario(seed=seed, noise=smc.Noise(0.1), duration=0.1) for seed in range(5)]
+    assert all(map(same, smc.run(many, threads=threads), smc.run(many)))
+
+
+def test_progress_is_shown_on_a_terminal_and_changes_nothing(capfd, monkeypatch):
+    many = [scenario(seed=seed) for seed in range(3)]
+    assert all(map(same, smc.run(many, progress=True), smc.run(many)))
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes it for a terminal
+    smc.run(many, progress=True)
+    assert "3 runs" in capfd.readouterr().err
+
+
+# failures
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast", "implicit"])
+def test_an_unstable_plant_is_marked_with_the_time_at_which_it_left(integrator):
+    trace = smc.run(scenario("none", plant=UNSTABLE, integrator=integrator))
+    failed(trace, trace.diverged_at, "left the finite world")
+    assert 0.0 < trace.diverged_at < 0.02
+    assert np.abs(trace.x[trace.t < trace.diverged_at - 1e-9]).max() < 1e6
+
+
+def test_a_failure_between_two_samples_is_timed_to_the_physics_step():
+    trace = smc.run(scenario("none", plant=UNSTABLE, control_period=0.01, physics_step=1e-3))
+    finer = smc.run(scenario("none", plant=UNSTABLE))
+    failed(trace, finer.diverged_at)
+    assert trace.diverged_at % 0.01 > 1e-9
+
+
+def test_a_failed_run_has_no_reference_from_then_on_either():
+    trace = smc.run(scenario("none", plant=UNSTABLE, reference=smc.Constant(0.5)))
+    np.testing.assert_array_equal(trace.r, np.where(np.isnan(trace.x), np.nan, 0.5))
+
+
+def test_a_state_that_starts_outside_the_world_has_diverged_at_once():
+    failed(smc.run(scenario(x0=1e6)), 0.0, "left the finite world")
+
+
+def test_a_run_that_fails_leaves_those_beside_it_alone():
+    def sour(y, gains, memory):
+        if y.t > 0.0055:
+            raise ValueError("sour")
+        return 0.0, 0.0
+
+    good = [scenario(seed=seed, noise=smc.Noise(0.1)) for seed in range(4)]
+    bad = [
+        scenario(made(sour)),
+        scenario("none", plant=UNSTABLE),
+        scenario(made(lambda y, gains, memory: (math.nan, 0.0))),
+    ]
+    for threads in (1, 2):
+        traces = smc.run([good[0], bad[0], good[1], bad[1], good[2], bad[2], good[3]], threads=threads)
+        assert all(map(same, traces[::2], smc.run(good)))
+        failed(traces[1], 0.006, "law 'sour'", "ValueError", "sour")
+        failed(traces[3], traces[3].diverged_at, "left the finite world")
+        failed(traces[5], 0.0, "returned")
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("which", ["u", "s"])
+def test_a_law_that_returns_no_finite_number_is_named_and_timed(bad, which):
+    def rotten(y, gains, memory):
+        late = y.t > 0.0045
+        return (bad if late and which == "u" else 0.0), (bad if late and which == "s" else 0.0)
+
+    failed(smc.run(scenario(made(rotten))), 0.005, "law 'rotten'", f"{which} = {bad}")
+
+
+def raises_value_error(y, gains, memory):
+    """Raises."""
+    if y.t > 0.0045:
+        raise ValueError("first line\nsecond line")
+    return 0.0, 0.0
+
+
+def divides_by_zero(y, gains, memory):
+    """Raises in Python, returns inf in numba."""
+    return (1.0 / 0.0 if y.t > 0.0045 else 0.0), 0.0
+
+
+def overflows(y, gains, memory):
+    """Raises in Python, returns inf in numba."""
+    return math.exp(2e5 * y.t), 0.0
+
+
+def writes_beyond_its_memory(y, gains, memory):
+    """Raises."""
+    if y.t > 0.0045:
+        memory[len(memory)] = 1.0
+    return 0.0, 0.0
+
+
+def reads_before_its_memory(y, gains, memory):
+    """Raises."""
+    return memory[-9 if y.t > 0.0045 else 0], 0.0
+
+
+@pytest.mark.parametrize(
+    ("function", "at", "words"),
+    [
+        (raises_value_error, 0.005, ("ValueError", "first line second line")),
+        (divides_by_zero, 0.005, ("ZeroDivisionError",)),
+        (overflows, 0.004, ("OverflowError",)),
+        (writes_beyond_its_memory, 0.005, ("IndexError",)),
+        (reads_before_its_memory, 0.005, ("IndexError",)),
+    ],
+)
+def test_a_compiled_law_that_raises_is_named_and_timed(function, at, words):
+    failed(smc.run(scenario(made(function))), at, f"law '{function.__name__}'", *words)
+
+
+def test_a_law_that_its_author_compiled_cannot_write_beyond_its_memory_either():
+    law = made(numba.njit(writes_beyond_its_memory))
+    trace = smc.run(scenario(law, plant=smc.plant("pendulum_network", n=3)))
+    failed(trace, 0.005, "law 'writes_beyond_its_memory'", "IndexError")
+
+
+def test_a_law_s_memory_starts_at_zero_in_every_channel_and_every_run():
+    def counts(y, gains, memory):
+        memory[0] += 1.0
+        return 0.0, memory[0]
+
+    one = scenario(made(counts), plant=smc.plant("pendulum_network", n=3))
+    for trace in [*smc.run([one, one]), smc.run(one)]:
+        np.testing.assert_array_equal(trace.s, np.arange(1.0, 22.0)[:, None].repeat(3, axis=1))
+
+
+RETURNS = {
+    "nothing": lambda y, gains, memory: None,
+    "one": lambda y, gains, memory: 0.0,
+    "three": lambda y, gains, memory: (0.0, 0.0, 0.0),
+    "text": lambda y, gains, memory: ("a", "b"),
+    "complex": lambda y, gains, memory: (1j, 0.0),
+    "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
+    "memory": lambda y, gains, memory: memory,
+    "huge": lambda y, gains, memory: (json.loads("1") * 10**400, 0.0),
+    "empty": lambda y, gains, memory: (),
+}
+
+
+@pytest.mark.parametrize("name", RETURNS)
+def test_a_law_that_returns_the_wrong_thing_is_named(name, capfd):
+    failed(plainly(scenario(made(RETURNS[name]))), 0.0, "law '<lambda>'", "instead of the two numbers u, s")
+    assert capfd.readouterr().err == ""
+
+
+def test_a_generator_is_no_law():
+    def generates(y, gains, memory):
+        yield 0.0
+        yield 0.0
+
+    trace = plainly(scenario(made(generates)))
+    assert trace.failure is not None or np.all(trace.u == 0.0)
+
+
+def changes_its_gains(y, gains, memory):
+    """Breaks its contract."""
+    gains.k = 5.0
+    return 0.0, 0.0
+
+
+def changes_its_measurement(y, gains, memory):
+    """Breaks its contract."""
+    y.x = 5.0
+    return 0.0, 0.0
+
+
+@pytest.mark.parametrize("function", [changes_its_gains, changes_its_measurement])
+def test_a_law_cannot_change_what_it_is_given(function):
+    failed(plainly(scenario(made(function, {"k": 1.0}))), 0.0, f"law '{function.__name__}'", "AttributeError")
+
+
+@pytest.mark.parametrize(
+    "error", [KeyError("k"), ValueError("first\nsecond"), AssertionError(), ZeroDivisionError("0")]
+)
+def test_a_law_that_raises_in_the_plain_loop_is_named_and_timed(error):
+    def sour(y, gains, memory):
+        json.dumps(y.t)  # not for numba
+        if y.t > 0.0045:
+            raise error
+        return 0.0, 0.0
+
+    failed(plainly(scenario(made(sour))), 0.005, "law 'sour'", type(error).__name__)
+
+
+def test_endless_recursion_is_a_failure_like_any_other():
+    def endless(y, gains, memory):
+        return endless(y, gains, memory)
+
+    failed(plainly(scenario(made(endless))), 0.0, "RecursionError")
+
+
+def test_an_estimator_that_raises_is_named():
+    @smc.estimator_function()
+    def sour(y, gains, memory):
+        if y.x < 2.0:
+            raise ValueError("sour")
+        return y.v
+
+    failed(smc.run(scenario(velocity=sour())), 0.0, "estimator 'sour'", "ValueError")
+
+
+@pytest.mark.parametrize("value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__)
+def test_an_estimator_that_returns_no_number_is_named(value):
+    @smc.estimator_function()
+    def odd(y, gains, memory):
+        json.dumps(y.x)
+        return value
+
+    failed(plainly(scenario("none", velocity=odd())), 0.0, "estimator 'odd'")
+
+
+@dataclasses.dataclass(frozen=True)
+class Sour(smc.Signal):
+    """A user's signal that raises after a while."""
+
+    start: float = 0.0045
+
+    @staticmethod
+    def value(t, p):
+        """Raises."""
+        if t > p.start:
+            raise ValueError("sour")
+        return 0.0, 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Rotten(smc.Signal):
+    """A user's signal that is NaN after a while."""
+
+    start: float = 0.0045
+
+    @staticmethod
+    def value(t, p):
+        """NaN."""
+        return (math.nan if t > p.start else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Flat(smc.Signal):
+    """A user's signal that forgets its derivatives."""
+
+    level: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        """One number."""
+        return p.level
+
+
+@dataclasses.dataclass(frozen=True)
+class Written(smc.Signal):
+    """A user's signal that numba does not compile."""
+
+    level: float = 0.1
+
+    @staticmethod
+    def value(t, p):
+        """A constant."""
+        return float(json.loads(json.dumps(p.level))), 0.0, 0.0
+
+
+@pytest.mark.parametrize("signal", [Sour, Rotten])
+@pytest.mark.parametrize("field", ["reference", "disturbance"])
+def test_a_signal_that_fails_fails_the_run_and_is_timed(signal, field):
+    trace = smc.run(scenario(**{field: signal()}))
+    failed(trace, trace.diverged_at)
+    assert trace.diverged_at in (pytest.approx(0.004), pytest.approx(0.005))  # some stage of a step, or the next
+
+
+@pytest.mark.parametrize("law", ["classical", "none"])
+def test_a_disturbance_that_is_nan_from_the_start_fails_the_run_at_the_start(law):
+    failed(smc.run(scenario(law, disturbance=Rotten(-1.0))), 0.0)
+    failed(smc.run(scenario(law, disturbance=[Rotten(-1.0), smc.Constant(1.0)], control_period=0.01)), 0.0)
+
+
+@pytest.mark.parametrize("field", ["reference", "disturbance"])
+def test_a_signal_of_the_wrong_shape_fails_the_run(field):
+    failed(plainly(scenario("none", **{field: Flat()})), 0.0, "Flat")
+
+
+def test_a_signal_that_does_not_compile_takes_the_plain_loop():
+    with pytest.warns(smc.PlainLoopWarning, match="Written"):
+        trace = smc.run(scenario(disturbance=Written()))
+    assert same(trace, smc.run(scenario(disturbance=smc.Constant(0.1))))
+
+
+@pytest.mark.parametrize("plant", smc.plants())
+def test_extreme_sensor_noise_is_no_exception(plant):
+    trace = smc.run(scenario(plant=plant, noise=smc.Noise(1e100, 1e100)))
+    assert trace.diverged_at is None or "law 'classical' returned" in trace.failure
+
+
+# the plain loop
+
+
+def native(y, gains, memory):
+    """A law with memory."""
+    memory[0] += y.dt * y.e
+    return -gains.k * y.de - gains.k * y.e - memory[0], y.e + y.de
+
+
+def with_json(y, gains, memory):
+    """The same, of what numba does not know."""
+    memory[0] += y.dt * y.e
+    k = json.loads(json.dumps(gains.k))
+    return -k * y.de - k * y.e - memory[0], y.e + y.de
+
+
+class WithClass:
+    """The same, as an object."""
+
+    def __call__(self, y, gains, memory):
+        """The law."""
+        return native(y, gains, memory)
+
+
+class Unhashable(WithClass):
+    """The same, not to be found again."""
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+
+def with_array(y, gains, memory):
+    """The same, through an array of objects."""
+    memory[0] += y.dt * y.e
+    k = np.array([gains.k], dtype=object)[0]
+    return -k * y.de - k * y.e - memory[0], y.e + y.de
+
+
+@pytest.mark.parametrize(
+    "function", [with_json, WithClass(), Unhashable(), with_array], ids=["json", "class", "unhashable", "array"]
+)
+def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin(function):
+    rich = {
+        "duration": 0.1,
+        "plant": smc.plant("pendulum_network", n=3),
+        "control_period": 2e-3,
+        "noise": smc.Noise(0.01, 0.05),
+        "disturbance": [smc.Sine(0.2, 5.0), smc.OrnsteinUhlenbeck(0.2, 0.1)],
+        "input_delay": 3e-3,
+        "jump": smc.Jump(0.05, {"mass": 2.0}),
+        "seed": 3,
+    }
+    twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
+    with pytest.warns(smc.PlainLoopWarning, match="plain loop"):
+        trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12)
+
+
+def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_caller():
+    with pytest.warns(smc.PlainLoopWarning, match="with_json.*json") as caught:
+        smc.run(scenario(made(with_json, {"k": 2.0})))
+    assert caught[0].filename == __file__
+
+    @smc.estimator_function()
+    def loaded(y, gains, memory):
+        return float(json.loads(json.dumps(y.v)))
+
+    with pytest.warns(smc.PlainLoopWarning, match="loaded.*json"):
+        smc.run(scenario(velocity=loaded()))
+
+
+def test_a_law_may_simulate_a_model_of_its_own():
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint type='slide'/><geom size='1'/></body></worldbody></mujoco>"
+    )
+
+    def predicts(y, gains, memory):
+        data = mujoco.MjData(model)
+        data.qvel[0] = y.v
+        mujoco.mj_step(model, data)
+        return -2.0 * y.de - 2.0 * y.e, y.e
+
+    def twin(y, gains, memory):
+        return -2.0 * y.de - 2.0 * y.e, y.e
+
+    assert same(
+        plainly(scenario(made(predicts))), plainly(scenario(made(lambda y, g, m: (json.dumps(1), twin(y, g, m))[1])))
+    )
+
+
+def test_a_law_from_a_file_without_its_code_is_refused(tmp_path):
+    smc.run(scenario(made(lambda y, gains, memory: (0.0, 0.0)))).save(tmp_path / "a.npz")
+    with pytest.raises(smc.ScenarioError, match="lambda"):
+        smc.run(smc.load(tmp_path / "a.npz").scenario)
+
+
+def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path):
+    mine = smc.estimator_function()(lambda y, gains, memory: y.v)()
+    smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")
+    with pytest.raises(smc.ScenarioError, match="lambda"):
+        smc.run(smc.load(tmp_path / "a.npz").scenario)
+
+
+# the process around it
+
+
+WILD = """
+import json, math, warnings
+import smc_mujoco as smc
+warnings.simplefilter("ignore", smc.PlainLoopWarning)
+def law(function):
+    return smc.law_function()(function)()
+def run(law, **fields):
+    return smc.run(smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields))
+for factor in (1e-300, 1e-30, 1e-16, 1e30, 1e308):
+    run("none", mismatch={"mass": factor})
+    run("none", jump=smc.Jump(0.01, {"mass": factor}))
+    run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), mismatch={"mass": factor})
+for name in ("alpha", "beta", "delta"):
+    for value in (-1e9, 1e9):
+        assert run("none", plant=smc.plant("duffing", **{name: value})).diverged_at is not None
+        run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), plant=smc.plant("duffing", **{name: value}))
+assert run(law(lambda y, gains, memory: (math.nan, 0.0)), noise=smc.Noise(1e90, 1e90)).diverged_at == 0.0
+assert run(law(lambda y, gains, memory: memory)).diverged_at == 0.0
+print("done")
+"""
+
+
+def test_diverging_runs_print_nothing_and_leave_no_file(tmp_path):
+    done = python(WILD, tmp_path)
+    assert done.stderr == ""
+    assert done.stdout == "done\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["job.py"]
+
+
+MANY = """
+import resource, smc_mujoco as smc, smc_mujoco.simulation.run
+import sys
+sys.modules["smc_mujoco.simulation.run"].CHUNK_BYTES = 2**20
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+def play(count):
+    for _ in smc.stream([smc.Scenario(plant="duffing", law="none", duration=0.5, seed=i) for i in range(count)]):
+        pass
+play(40)
+before = peak()
+play(800)
+print(peak() - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="resource")
+def test_a_stream_of_runs_holds_one_chunk_of_them(tmp_path):
+    done = python(MANY, tmp_path)
+    logs = 800 * 6 * 501 * 8
+    assert done.stderr == ""
+    assert int(done.stdout) < 0.3 * logs
+
+
+def test_runs_of_two_python_threads_do_not_meet():
+    slow = scenario(made(with_json, {"k": 2.0}), duration=0.1, mismatch={"M": 2.0})
+    fast = [
+        scenario(made(native, {"k": 2.0}), seed=seed, noise=smc.Noise(0.1), mismatch={"M": 1.0 + seed})
+        for seed in range(3)
+    ]
+    expected = plainly([slow, *fast])
+    wrong: list = []
+
+    def work(scenarios, traces, rounds):
+        for _ in range(rounds):
+            try:
+                found = smc.run(scenarios)
+                wrong.extend(s for s, a, b in zip(scenarios, found, traces, strict=True) if not same(a, b))
+            except Exception as error:
+                wrong.append(error)
+
+    jobs = [([slow], expected[:1], 10), (fast, expected[1:], 40), (fast, expected[1:], 40)]
+    threads = [threading.Thread(target=work, args=job) for job in jobs]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert wrong == []
+    assert mujoco.get_mjcb_control() is None
+
+
+def test_a_callback_that_was_installed_is_put_back():
+    calls = []
+
+    def mine(model, data):
+        calls.append(data)
+
+    smc.run(scenario())  # has imported all there is to import: mujoco.batch compiles a model
+    mujoco.set_mjcb_control(mine)
+    try:
+        trace, plain = smc.run(scenario()), plainly(scenario(made(with_json, {"k": 2.0})))
+        assert mujoco.get_mjcb_control() is mine
+    finally:
+        mujoco.set_mjcb_control(None)
+    assert calls == []
+    assert same(trace, smc.run(scenario()))
+    assert same(plain, plainly(scenario(made(with_json, {"k": 2.0}))))
+
+
+@pytest.mark.parametrize("law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "plain loop"])
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
+def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    plainly(scenario(law))
+    handler = mujoco.get_mju_user_warning()
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    begin = time.perf_counter()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            plainly(scenario(law, duration=10_000.0, integrator="Euler"))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - begin < 10.0  # on a loaded machine; the run itself would take a minute
+    assert mujoco.get_mjcb_control() is None
+    assert mujoco.get_mju_user_warning() is handler
+    assert smc.run(scenario()).diverged_at is None
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_scenarios_travel_to_another_process(tmp_path):
+    code = """
+import multiprocessing, smc_mujoco as smc
+if __name__ == "__main__":
+    one = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0), duration=0.02, noise=smc.Noise(0.1))
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        trace = pool.apply(smc.run, (one,))
+    assert trace.scenario == one
+    assert (trace.x == smc.run(one).x).all()
+    assert not trace.x.flags.writeable
+    print("done")
+"""
+    done = python(code, tmp_path)
+    assert done.stderr == ""
+    assert done.stdout == "done\n"

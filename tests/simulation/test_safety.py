@@ -1,0 +1,1051 @@
+"""What a hostile review broke, and what must stay mended: memory, processes, names, signs, clocks."""
+
+# pyright: reportOptionalMemberAccess=false, reportOperatorIssue=false
+import contextlib
+import copy
+import ctypes
+import dataclasses
+import importlib
+import itertools
+import json
+import math
+import os
+import pickle
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import types
+import warnings
+from pathlib import Path
+
+import mujoco
+import numba
+import numpy as np
+import pytest
+from numba.core import caching
+from numba.core.compiler_lock import global_compiler_lock
+
+import smc_mujoco as smc
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common import jit as compiled_module
+from smc_mujoco.common.jit import compiled
+from smc_mujoco.control.law import Measurement, catalogue
+from smc_mujoco.simulation import batch, callback, offsets, reference, state
+from smc_mujoco.simulation.channels import channels
+from smc_mujoco.studies import run_key
+
+PACKAGE = Path(smc.__file__).parent
+RUN = importlib.import_module("smc_mujoco.simulation.run")  # the module; the public name is the function
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+THREE = smc.plant("pendulum_network", n=3)
+
+
+def scenario(law="classical", **fields):
+    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
+
+
+def made(function, gains=None, memory=8):
+    """A law of a function."""
+    return smc.law_function(gains=gains, memory=memory)(function)()
+
+
+def same(a, b) -> bool:
+    """Whether two traces are equal to the last bit."""
+    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ARRAYS)
+
+
+def plainly(*args, **kwargs):
+    """`smc.run` of something that takes the plain loop, without the warning about it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        return smc.run(*args, **kwargs)
+
+
+# (a) the cache
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in PACKAGE.glob("*.py")))
+def test_the_mark_of_a_row_changes_with_every_module_of_the_package(name, tmp_path, monkeypatch):
+    before = callback.mark()
+    copied = Path(shutil.copytree(PACKAGE, tmp_path / "smc_mujoco", ignore=shutil.ignore_patterns("__pycache__")))
+    monkeypatch.setattr(callback, "__file__", str(copied / "callback.py"))
+    assert callback.mark.__wrapped__() == before
+    with (copied / name).open("a") as file:
+        file.write("#\n")
+    after = callback.mark.__wrapped__()
+    assert after != before
+    assert after == int(after) < 2**53  # a float64 holds it
+
+
+# (b) memory
+
+
+@numba.njit
+def writes_beyond(memory):
+    """Writes into the next channel."""
+    memory[8] = 99.0
+
+
+@numba.njit
+def compiled_before(memory):
+    """Likewise, compiled by its author ahead."""
+    memory[8] = 99.0
+
+
+compiled_before(np.zeros(16))
+
+
+@numba.njit
+def passes_on(memory):
+    """Calls what writes beyond."""
+    compiled_before(memory)
+
+
+LIBRARY = types.ModuleType("library")
+LIBRARY.writes_beyond = compiled_before
+
+
+def by_global(y, gains, memory):
+    """A helper among the globals."""
+    if y.t > 0.0045:
+        writes_beyond(memory)
+    return 0.0, memory[0]
+
+
+def by_global_compiled_before(y, gains, memory):
+    """A helper that is compiled already."""
+    if y.t > 0.0045:
+        compiled_before(memory)
+    return 0.0, memory[0]
+
+
+def by_another_helper(y, gains, memory):
+    """A helper of a helper."""
+    if y.t > 0.0045:
+        passes_on(memory)
+    return 0.0, memory[0]
+
+
+def closed_over():
+    """A law with a helper in a closure cell."""
+
+    @numba.njit
+    def inner(memory):
+        memory[8] = 99.0
+
+    inner(np.zeros(16))
+
+    def by_cell(y, gains, memory):
+        if y.t > 0.0045:
+            inner(memory)
+        return 0.0, memory[0]
+
+    return by_cell
+
+
+def by_module(y, gains, memory):
+    """A helper of a module."""
+    if y.t > 0.0045:
+        LIBRARY.writes_beyond(memory)
+    return 0.0, memory[0]
+
+
+def by_inner_function(y, gains, memory):
+    """A helper that only a function within the law names."""
+
+    def inner(m):
+        writes_beyond(m)
+        return 0.0
+
+    if y.t > 0.0045:
+        inner(memory)
+    return 0.0, memory[0]
+
+
+VANDALS = [by_global, by_global_compiled_before, by_another_helper, closed_over(), by_module, by_inner_function]
+
+
+@pytest.mark.parametrize("function", VANDALS, ids=lambda function: function.__name__)
+def test_a_helper_that_writes_beyond_the_memory_fails_the_run_and_touches_nothing_else(function):
+    good = [scenario(plant=THREE, seed=seed, noise=smc.Noise(0.1), law="adaptive") for seed in range(3)]
+    bad = scenario(made(function), plant=THREE)
+    first, trace, *others = plainly([good[0], bad, *good[1:]])
+    assert trace.failure is not None
+    assert f"law '{function.__name__}'" in trace.failure
+    assert "IndexError" in trace.failure
+    assert trace.diverged_at == pytest.approx(0.005)
+    assert not trace.s[:5].any()
+    assert np.isnan(trace.s[5:]).all()
+    assert all(map(same, [first, *others], smc.run(good)))
+
+
+def test_a_helper_that_writes_beyond_the_memory_is_caught_in_the_plain_loop_too():
+    def slow(y, gains, memory):
+        json.dumps(y.t)  # not for numba
+        if y.t > 0.0045:
+            writes_beyond(memory)
+        return 0.0, memory[0]
+
+    trace = plainly(scenario(made(slow), plant=THREE))
+    assert "IndexError" in (trace.failure or "")
+    assert trace.diverged_at == pytest.approx(0.005)
+
+
+@numba.njit
+def factorial(n):
+    """A helper that calls itself."""
+    if n <= 0:
+        return 1.0
+    return n * factorial(n - 1)
+
+
+def test_a_helper_that_calls_itself_compiles():
+    trace = smc.run(scenario(made(lambda y, gains, memory: (0.0, factorial(4)))))  # a warning would be an error
+    assert (trace.s == 24.0).all()
+
+
+@numba.njit
+def halved(value):
+    """A helper that behaves."""
+    return 0.5 * value
+
+
+def test_a_helper_that_behaves_gives_what_it_would_give_written_out():
+    helped = made(lambda y, gains, memory: (-halved(y.e) - halved(y.de), y.e))
+    written = made(lambda y, gains, memory: (-0.5 * y.e - 0.5 * y.de, y.e))
+    assert same(smc.run(scenario(helped)), smc.run(scenario(written)))
+
+
+# (c) what a law returns
+
+
+def late_number(y, gains, memory):
+    """None at first."""
+    u = None
+    if y.t > 0.0045:
+        u = 1.0
+    return u, 0.0
+
+
+def late_none(y, gains, memory):
+    """None in the end."""
+    u = None
+    if y.t < 0.0045:
+        u = 1.0
+    return u, 0.0
+
+
+@pytest.mark.parametrize(("function", "at"), [(late_number, 0.0), (late_none, 0.005)])
+def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(function, at):
+    with pytest.warns(smc.PlainLoopWarning, match=f"'{function.__name__}' does not compile.*instead of numbers"):
+        trace = smc.run(scenario(made(function)))
+    assert trace.diverged_at == pytest.approx(at)
+    assert f"law '{function.__name__}' returned (None, 0.0) instead of the two numbers u, s" in trace.failure
+
+
+# (d) signs
+
+STUDIED = list(smc.paper.GAINS["duffing"])  # the other laws' signs are tested with their theorems
+TURNING = {"k", "k1", "k2", "gamma", "c", "leak", "deadzone", "k0", "lam", "phi", "w_max"}
+# observer_free holds a plant with a spring of its own for some negative k1 (lam k1 > -K), so it may have one
+SIGNED = [
+    (name, gain)
+    for name in STUDIED
+    for gain in catalogue()[name].defaults
+    if gain in TURNING and (name, gain) != ("observer_free", "k1")
+]
+
+
+def seen(e: float, de: float, dt: float = 1e-3) -> Measurement:
+    """A measurement of an error."""
+    return Measurement(t=0.0, dt=dt, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0)
+
+
+def record(gains) -> types.SimpleNamespace:
+    return types.SimpleNamespace(**gains)
+
+
+def test_every_gain_of_the_study_is_among_these():
+    assert {gain for name in STUDIED for gain in catalogue()[name].defaults} <= TURNING
+
+
+@pytest.mark.parametrize("name", smc.laws())
+def test_a_gain_that_must_have_a_sign_is_refused_without_it(name):
+    template = catalogue()[name]
+    for gain in template.positive | template.nonnegative:
+        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -1"):
+            smc.law(name, **{gain: -1.0})
+    for gain in template.positive:
+        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is 0"):
+            smc.law(name, **{gain: 0.0})
+
+
+@pytest.mark.parametrize(("name", "gain"), SIGNED)
+@pytest.mark.parametrize("value", [-1.0, -1e-300, -1e9])
+def test_a_negative_gain_that_would_turn_a_law_round_is_refused(name, gain, value):
+    with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -"):
+        smc.law(name, **{gain: value})
+
+
+@pytest.mark.parametrize("name", STUDIED)
+def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
+    template = catalogue()[name]
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        gains = {gain: abs(rng.normal()) * 5.0 + 1e-3 for gain in template.defaults}
+        assert template.function(seen(0.0, 0.0), record(gains), np.zeros(template.memory)) == (0.0, 0.0)
+        memory = np.zeros(template.memory)
+        e, de = rng.normal(size=2)
+        first = template.function(seen(e, de), record(gains), memory)
+        second = template.function(seen(e, de), record(gains), memory)  # what it remembers points the same way
+        for u, s in (first, second):
+            assert u * s <= 0.0
+        assert second[0] * second[1] < 0.0
+
+
+@pytest.mark.parametrize("name", ["classical", "adaptive", "adaptive_leak", "super_twisting"])
+def test_the_sign_of_zero_is_zero_whatever_came_before(name):
+    """On the surface, though not at the origin, and with a gain: a switching law does not choose a side."""
+    template = catalogue()[name]
+    gains = dict(template.defaults) | {"c": 2.0} | ({"k0": 3.0} if "k0" in template.defaults else {})
+    memory = np.zeros(template.memory)
+    assert template.function(seen(0.5, -1.0), record(gains), memory) == (0.0, 0.0)
+    assert template.function(seen(-0.5, 1.0), record(gains), memory) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("leak_dt", [0.5, 1.5, 3.0, 100.0])
+@pytest.mark.parametrize("k0", [0.0, 2.0])
+def test_the_gain_of_adaptive_leak_never_falls_below_0(leak_dt, k0):
+    template, memory = catalogue()["adaptive_leak"], np.zeros(8)
+    gains = record(dict(template.defaults) | {"leak": leak_dt / 1e-2, "k0": k0, "gamma": 40.0, "c": 1.0})
+    lowest = math.inf
+    for e, de in np.random.default_rng(1).normal(size=(500, 2)):
+        u, s = template.function(seen(e, de, dt=1e-2), gains, memory)
+        lowest = min(lowest, -u * math.copysign(1.0, s))
+    assert lowest >= 0.0
+
+
+# (e) references
+
+
+@dataclasses.dataclass(frozen=True)
+class Sour(smc.Signal):
+    """A reference that raises after a while."""
+
+    start: float = 0.0095
+
+    @staticmethod
+    def value(t, p):
+        """Raises."""
+        if t > p.start:
+            raise ValueError("sour")
+        return 0.1, 0.0, 0.0
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_reference_that_raises_in_mid_run_fails_its_own_run_only(threads):
+    good = [scenario(seed=seed, noise=smc.Noise(0.1), reference=smc.Sine(0.1, 5.0)) for seed in range(4)]
+    bad = scenario(reference=Sour())
+    first, trace, *others = smc.run([good[0], bad, *good[1:]], threads=threads)
+    assert trace.diverged_at == pytest.approx(0.01)
+    assert "Sour raised ValueError (sour)" in trace.failure
+    assert (trace.r[:10] == 0.1).all()
+    assert np.isfinite(trace.x[:10]).all()
+    assert np.isnan(trace.x[10:]).all()
+    assert all(map(same, [first, *others], smc.run(good)))
+
+
+# (f) other people's callbacks
+
+FIRST = """
+import mujoco
+def mine(model, data):
+    calls.append(1)
+calls = []
+mujoco.set_mjcb_control(mine)
+import smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.02))
+assert mujoco.get_mjcb_control() is mine
+assert calls == []
+mujoco.set_mjcb_control(None)
+assert (trace.x == smc.run(trace.scenario).x).all()
+print("done")
+"""
+
+
+def test_a_run_is_the_first_thing_in_a_process_with_a_callback_of_its_own_and_puts_it_back(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == ("done\n", "")
+
+
+# (g) chunks
+
+
+LARGE = [
+    scenario(made(lambda y, gains, memory: (0.0, 0.0), memory=10_000), plant=smc.plant("pendulum_network", n=50)),
+    scenario(disturbance=[smc.OrnsteinUhlenbeck(0.1, 0.1)] * 40, plant=smc.plant("pendulum_network", n=50)),
+    scenario(input_delay=1.0, duration=2.0, plant=smc.plant("pendulum_network", n=20)),
+    scenario(velocity=smc.estimator_function(memory=5000)(lambda y, gains, memory: y.v)()),
+    scenario(duration=10.0),
+]
+
+
+@pytest.mark.parametrize("large", LARGE, ids=["law", "noise", "delay", "estimator", "log"])
+def test_what_a_simulation_is_reckoned_to_take_is_what_it_takes(large):
+    log = np.empty((state.LOGS, large.samples + 1, large.plant.n))
+    packed = state.pack(batch.contents(large), 0.0, np.empty((large.plant.n, 7), np.int64), log)
+    data = mujoco.MjData(large.plant.load(nuserdata=len(packed)))
+    struct = offsets.offsets().userdata  # its arrays of statistics come first, and are most of it
+    takes = log.nbytes + packed.nbytes + struct + data.nbuffer
+    assert takes <= RUN._bytes(large) <= 1.5 * takes
+
+
+def test_chunks_of_laws_with_large_memory_stay_bounded():
+    law = made(lambda y, gains, memory: (0.0, 0.0), memory=10_000)
+    many = [scenario(law, plant=smc.plant("pendulum_network", n=1000), seed=seed) for seed in range(20)]
+    chunks = list(RUN._chunks(many, range(20), 1))
+    assert sorted(itertools.chain(*chunks)) == list(range(20))
+    each = 2 * 8 * 10_000 * 1000
+    assert max(map(len, chunks)) * each <= max(RUN.CHUNK_BYTES, each)
+
+
+# (h) telling failures again
+
+
+def sour_law(y, gains, memory):
+    """Raises."""
+    if y.t > 0.0045:
+        raise ValueError("sour")
+    return 0.0, y.f
+
+
+def none_law(y, gains, memory):
+    """Returns NaN, from 0/0 that compiled code does not raise."""
+    return math.nan if y.t > 0.0045 else 0.0, y.f
+
+
+def square_root(y, gains, memory):
+    """Leaves a function's domain, which only Python minds."""
+    return math.sqrt(0.0045 - y.t), y.f
+
+
+def exits(y, gains, memory):
+    """Ends the process, if it could."""
+    if y.t > 0.0045:
+        raise SystemExit(3)
+    return 0.0, 0.0
+
+
+class Speechless(Exception):
+    """Has no text."""
+
+    def __str__(self):
+        raise RuntimeError("none")
+
+
+def speechless(y, gains, memory):
+    """Raises what cannot be shown."""
+    if y.t > 0.0045:
+        raise Speechless
+    return 0.0, 0.0
+
+
+def unprintable(y, gains, memory):
+    """Raises what spoils a terminal and a table."""
+    if y.t > 0.0045:
+        raise ValueError("\x1b[31m\x00\ud800" + "long " * 200_000)
+    return 0.0, 0.0
+
+
+def third_call(y, gains, memory):
+    """Changes its memory before it raises."""
+    memory[0] += 1.0
+    if memory[0] == 6.0:
+        raise ValueError("sixth")
+    return 0.0, 0.0
+
+
+SAYS = {
+    sour_law: "law 'sour_law' raised ValueError (sour) in channel 0, at t = 0.005 s",
+    none_law: "law 'none_law' returned u = nan, s = {s} in channel 0, at t = 0.005 s",
+    square_root: "law 'square_root' raised ValueError (math domain error) in channel 0, at t = 0.005 s",
+    exits: "law 'exits' raised SystemExit (3) in channel 0, at t = 0.005 s",
+    speechless: "law 'speechless' raised Speechless (its text cannot be shown) in channel 0, at t = 0.005 s",
+    unprintable: f"law 'unprintable' raised ValueError (?[31m??{('long ' * 99)[:190]}...) in channel 0, at t = 0.005 s",
+    third_call: "law 'third_call' raised ValueError (sixth) in channel 0, at t = 0.005 s",
+}
+
+
+@pytest.mark.parametrize("function", SAYS, ids=lambda function: function.__name__)
+def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
+    many = [scenario(made(function), seed=seed, noise=smc.Noise(0.1)) for seed in range(3)]
+    beside = plainly([scenario(), *many, scenario()])
+    said = [trace.failure for trace in beside[1:-1]]
+    assert said == [plainly(one).failure for one in many] == [reference.run(one).failure for one in many]
+    assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
+    assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
+
+
+def test_a_law_of_python_that_exits_fails_its_own_run_alone():
+    def leaves(y, gains, memory):
+        json.dumps(y.t)  # not for numba
+        raise SystemExit(3)
+
+    first, second = plainly([scenario(made(leaves)), scenario()])
+    assert first.failure == "law 'leaves' raised SystemExit (3) in channel 0, at t = 0 s"
+    assert second.failure is None
+
+
+def sour_estimator(y, gains, memory):
+    """Raises in one channel."""
+    if y.x > 2.5:
+        raise ValueError("sour")
+    return y.v
+
+
+def sour_surface(y, gains, memory):
+    """Raises in one channel."""
+    if y.e > 2.5:
+        raise ValueError("sour")
+    return y.de, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class SourNoise(smc.Signal):
+    """A disturbance of each channel that raises in one."""
+
+    start: float = 0.0095
+    memory = 1
+    random = True
+
+    @staticmethod
+    def value(t, p, memory, seed, channel, stream):
+        """Raises, having counted nothing."""
+        if t > p.start and channel == 1:
+            raise ValueError("sour")
+        memory[0] = t
+        return 0.0, 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"velocity": smc.estimator_function(sour_estimator)()}, "estimator 'sour_estimator' raised ValueError (sour)"),
+        ({"surface": smc.surface_function(sour_surface)()}, "surface 'sour_surface' raised ValueError (sour)"),
+        ({"reference": Sour()}, "Sour raised ValueError (sour)"),
+        ({"disturbance": [smc.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
+    ],
+    ids=["estimator", "surface", "reference", "disturbance"],
+)
+def test_every_part_that_raises_is_named_without_a_second_run(fields, words, monkeypatch):
+    one = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
+    again = reference.run(one).failure
+    monkeypatch.setattr(reference, "run", None)
+    trace = smc.run([scenario(plant=THREE), one])[1]
+    assert trace.failure.startswith(words)
+    assert trace.failure == again
+
+
+@pytest.mark.parametrize("run", [smc.run, reference.run])
+def test_a_trace_is_finite_up_to_its_end_in_all_its_signals(run):
+    @dataclasses.dataclass(frozen=True)
+    class Unbounded(smc.Signal):
+        @staticmethod
+        def value(t, p):
+            return math.inf if t > 0.0095 else 0.0, 0.0, 0.0
+
+    trace = run(scenario("none", reference=Unbounded()))
+    assert trace.failure == "r became NaN or inf, at t = 0.01 s"
+    assert trace.diverged_at == pytest.approx(0.01)
+    for name in (*ARRAYS[1:], "force", "reaction"):
+        assert np.isfinite(getattr(trace, name)[:10]).all()
+        assert np.isnan(getattr(trace, name)[10:]).all()
+
+
+def test_a_motor_of_next_to_no_resistance_is_refused():
+    with pytest.raises(smc.ScenarioError, match=r"resistance is 4\.94066e-324: give at least 1e-09"):
+        smc.DCMotor(resistance=5e-324, inductance=0, torque_constant=1.0)
+
+
+def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused():
+    plant = smc.plant("pendulum_network", n=1000)
+    with pytest.raises(smc.ScenarioError, match="dt 5e-10 s makes too many knots: give 2e-07 s or more"):
+        scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10))
+    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
+    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1)
+
+
+def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
+    """Whether it was run again for its words or not."""
+
+    def cancels(y, gains, memory):
+        if y.t > 0.35:
+            raise ValueError("sour")
+        return (-y.f - 3.0 * y.de - 2.0 * y.e) / y.g, math.sin(y.f) * y.g
+
+    many = [scenario(made(cancels), plant=THREE, duration=0.4, v0=v0) for v0 in (1.0, 2.0, 3.0)]
+    assert all(map(same, smc.run(many), [smc.run(one) for one in many]))
+
+
+# (i) forks
+
+
+def child_runs() -> int:
+    """0 where a forked child finishes a run of its own, its exit status where not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # forking with threads about is what is tested
+        child = os.fork()
+    if child == 0:
+        signal.alarm(20)  # a child that hangs dies of it
+        try:
+            os._exit(0 if smc.run(scenario()).failure is None else 3)
+        except BaseException:
+            os._exit(4)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_forked_during_a_run_of_another_thread_can_run():
+    expected = smc.run(scenario())
+    long = scenario(duration=400.0, control_period=0.1, physics_step=1e-3)
+    thread = threading.Thread(target=smc.run, args=(long,))
+    thread.start()
+    while mujoco.get_mjcb_control() is None and thread.is_alive():
+        time.sleep(1e-3)
+    held = thread.is_alive()
+    status = child_runs()
+    thread.join()
+    assert held
+    assert status == 0
+    assert same(smc.run(scenario()), expected)  # the parent is as it was
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_forked_by_a_law_in_the_plain_loop_can_run():
+    status = []
+
+    def forks(y, gains, memory):
+        if not status:
+            status.append(child_runs())
+        return 0.0, 0.0
+
+    smc.run(scenario())
+    assert plainly(scenario(made(forks))).failure is None
+    assert status == [0]
+
+
+# (j) clocks of signals
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2e-3, 5e-3, 1e-2])
+def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
+    wrong = []
+    for start, width in itertools.product((*range(0, 60), 500, 4999), (1, 2, 3, 7, 10, 33, 100)):
+        pulse = smc.Pulse(1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}"))
+        on = [k for k in range(start - 2, start + width + 3) if pulse.value(k * dt, pulse)[0]]
+        if on != list(range(start, start + width)):
+            wrong.append((pulse, on))
+    assert wrong == []
+
+
+def test_a_pulse_of_a_run_lasts_as_long():
+    pulses = [smc.Pulse(1.0, 0.008, 0.1), smc.Pulse(1.0, 0.1, 0.008), smc.Pulse(1.0, 0.07, 0.03)]
+    pulses += [smc.Pulse(1.0, round(0.001 * i, 3), 0.003) for i in range(1, 60)]
+    traces = smc.run([scenario("none", duration=0.15, disturbance=pulse) for pulse in pulses])
+    assert [int(trace.d.sum()) for trace in traces] == [100, 8, 30, *[3] * 59]
+    assert [trace.t[np.flatnonzero(trace.d)[0]] for trace in traces] == pytest.approx([p.time for p in pulses])
+
+
+NOISE = smc.OrnsteinUhlenbeck(0.2, 0.1)
+
+
+@pytest.mark.parametrize("before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.Pulse(0.0, 0.1, 0.1)]])
+def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(before):
+    alone = smc.run(scenario("none", plant=THREE, disturbance=NOISE, seed=3))
+    assert np.ptp(alone.d) > 0.0
+    np.testing.assert_array_equal(
+        smc.run(scenario("none", plant=THREE, disturbance=[*before, NOISE], seed=3)).d, alone.d
+    )
+    np.testing.assert_array_equal(
+        smc.run(scenario("none", plant=THREE, disturbance=[NOISE, *before], seed=3)).d, alone.d
+    )
+
+
+# (k) file names
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        {"a": {"B c": 1, "b_c": 2}},
+        {"a": {"?": 1, "!": 2}},
+        {"A": {"x": 1}, "a": {"x": 2}},
+        {"a": {"b-c": 1}, "a-b": {"c": 2}},
+    ],
+    ids=["labels", "signs", "conditions", "both together"],
+)
+def test_names_that_make_the_same_file_are_refused(conditions):
+    runs = {c: {label: scenario(seed=seed) for label, seed in labels.items()} for c, labels in conditions.items()}
+    with pytest.raises(smc.ScenarioError, match="same file name"):
+        smc.Scene(title="T", conditions=runs)
+
+
+# (l) signals of one's own
+
+
+@dataclasses.dataclass(frozen=True)
+class Ramp(smc.Signal):
+    """A user's signal."""
+
+    slope: float = 0.1
+
+    @staticmethod
+    def value(t, p):
+        """A ramp."""
+        return p.slope * t, p.slope, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Sine(smc.Signal):
+    """A user's signal that is named as one of the library, with other parameters and another shape."""
+
+    amplitude: float
+    omega: float
+    phase: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        """No sine."""
+        return p.amplitude, 0.0, 0.0
+
+
+@pytest.mark.parametrize("field", ["reference", "disturbance"])
+@pytest.mark.parametrize("kind", [Ramp(0.3), Sine(0.2, 5.0)], ids=lambda s: type(s).__name__)
+def test_a_trace_of_a_signal_of_one_s_own_comes_back_as_it_was_where_its_class_is(field, kind, tmp_path):
+    trace = smc.run(scenario(**{field: kind}))
+    loaded = smc.load(trace.save(tmp_path / "a.npz"))
+    assert loaded.scenario == trace.scenario
+    assert same(smc.run(loaded.scenario), trace)
+
+
+@pytest.mark.parametrize("field", ["reference", "disturbance"])
+@pytest.mark.parametrize("kind", [Ramp(0.3), Sine(0.2, 5.0)], ids=lambda s: type(s).__name__)
+def test_a_trace_of_a_signal_that_is_gone_loads_and_compares_and_is_refused_only_when_run(
+    field, kind, tmp_path, monkeypatch
+):
+    trace = smc.run(scenario(**{field: kind}))
+    path = trace.save(tmp_path / "a.npz")
+    monkeypatch.setattr(type(kind), "__module__", "a_module_that_is_gone")
+    loaded = smc.load(path)
+    assert same(loaded, trace)
+    assert smc.score(loaded) == smc.score(trace)
+    assert loaded.scenario == smc.load(path).scenario
+    assert hash(loaded.scenario) == hash(smc.load(path).scenario)
+    assert loaded.scenario != trace.scenario
+    assert loaded.scenario != scenario(**{field: smc.Sine(0.2, 5.0)})
+    assert smc.load(loaded.save(tmp_path / "b.npz")).scenario == loaded.scenario
+    assert dataclasses.replace(loaded.scenario, seed=1).seed == 1
+    with pytest.raises(smc.ScenarioError, match=type(kind).__name__):
+        smc.run(loaded.scenario)
+    repaired = dataclasses.replace(loaded.scenario, **{field: kind})
+    assert same(smc.run(repaired), trace)
+
+
+def test_signals_of_one_name_are_different_signals():
+    assert Sine(0.2, 5.0) != smc.Sine(0.2, 5.0)
+    mine, theirs = smc.run([scenario(disturbance=Sine(0.2, 5.0)), scenario(disturbance=smc.Sine(0.2, 5.0))])
+    assert (mine.d == 0.2).all()
+    np.testing.assert_allclose(theirs.d[:, 0], 0.2 * np.sin(5.0 * theirs.t), atol=1e-15)
+
+
+# (m) checked mappings
+
+WHOLE = scenario(
+    smc.law("classical", k=2.0), mismatch={"M": 1.1, "alpha": 0.9}, jump=smc.Jump(0.01, {"M": 2.0, "alpha": 3.0})
+)
+MAPPINGS = {
+    "gains": lambda s: s.law.gains,
+    "mismatch": lambda s: s.mismatch,
+    "factors": lambda s: s.jump.factors,
+    "parameters": lambda s: s.plant.parameters,
+}
+CHANGES = {
+    "set": lambda m, key: m.__setitem__(key, -1.0),
+    "new": lambda m, key: m.__setitem__("new", -1.0),
+    "delete": lambda m, key: m.__delitem__(key),
+    "update": lambda m, key: m.update({key: -1.0}),
+    "or": lambda m, key: m.__ior__({key: -1.0}),
+    "setdefault": lambda m, key: m.setdefault("new", -1.0),
+    "pop": lambda m, key: m.pop(key),
+    "popitem": lambda m, key: m.popitem(),
+    "clear": lambda m, key: m.clear(),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("mapping", MAPPINGS)
+def test_a_mapping_that_was_checked_cannot_be_changed(mapping, change):
+    held = MAPPINGS[mapping](WHOLE)
+    before = dict(held)
+    with pytest.raises(TypeError):
+        CHANGES[change](held, next(iter(held)))
+    assert dict(held) == before
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
+def test_a_scenario_hashes_and_comes_back_equal_and_unchangeable(copied):
+    again = copied(WHOLE)
+    assert again == WHOLE
+    assert hash(again) == hash(WHOLE)
+    assert len({again, WHOLE, dataclasses.replace(WHOLE, seed=1)}) == 2
+    for held in MAPPINGS.values():
+        with pytest.raises(TypeError):
+            held(again)["k"] = 1.0
+
+
+def test_scenarios_that_are_equal_hash_alike_in_whatever_order_their_factors_were_written():
+    a, b = scenario(mismatch={"M": 1.1, "alpha": 0.9}), scenario(mismatch={"alpha": 0.9, "M": 1.1})
+    assert a == b
+    assert hash(a) == hash(b)
+
+
+# (n) channels
+
+MECHANISM = """
+<mujoco>
+  <worldbody><body><joint name="j" type="{joint}" axis="{axis}"/><geom size="0.1"/></body></worldbody>
+  <tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
+  <actuator><motor name="u" {drive}/></actuator>
+  <sensor><jointpos joint="j"/><jointvel joint="j"/></sensor>
+</mujoco>
+"""
+
+
+def mechanism(drive: str, joint: str = "slide", axis: str = "1 0 0") -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(MECHANISM.format(drive=drive, joint=joint, axis=axis))
+
+
+@pytest.mark.parametrize("joint", ["slide", "hinge"])
+def test_a_motor_of_gear_1_on_a_joint_makes_a_channel(joint):
+    assert channels(mechanism('joint="j"', joint)).shape == (1, 14)
+
+
+@pytest.mark.parametrize(
+    "drive", ['tendon="t"', 'joint="j" gear="2"', 'joint="j" gear="-1"', 'joint="j" gear="0"', 'jointinparent="j"']
+)
+def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(drive):
+    with pytest.raises(smc.ScenarioError, match="'u' does not drive a joint with gear 1"):
+        channels(mechanism(drive))
+
+
+def test_a_joint_along_no_world_axis_is_refused():
+    with pytest.raises(smc.ScenarioError, match="axis"):
+        channels(mechanism('joint="j"', axis="1 1 0"))
+
+
+# (o) infinite disturbances
+
+
+@dataclasses.dataclass(frozen=True)
+class Infinite(smc.Signal):
+    """Infinite from a sample on."""
+
+    start: float
+
+    @staticmethod
+    def value(t, p):
+        """Compiled."""
+        return (1e308 * 10.0 if t >= p.start * (1.0 - 1e-12) else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class InfiniteInPython(smc.Signal):
+    """The same, in the plain loop."""
+
+    start: float
+
+    @staticmethod
+    def value(t, p):
+        """Not compiled."""
+        json.dumps(t)
+        return (1e308 * 10.0 if t >= p.start * (1.0 - 1e-12) else 0.0), 0.0, 0.0
+
+
+TOO_MUCH = {
+    "compiled": Infinite,
+    "plain": InfiniteInPython,
+    "sum": lambda start: [smc.Step(1e308, start), smc.Step(1e308, start)],
+}
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler"])
+@pytest.mark.parametrize("start", [0.0, 0.005, 0.007])
+@pytest.mark.parametrize("kind", TOO_MUCH)
+def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integrator):
+    with contextlib.nullcontext() if kind != "plain" else pytest.warns(smc.PlainLoopWarning):
+        trace = smc.run(scenario("none", disturbance=TOO_MUCH[kind](start), integrator=integrator))
+    assert trace.diverged_at == pytest.approx(start, abs=1e-9)
+    assert "disturbance became NaN or inf" in trace.failure
+    k = round(start / 1e-3)
+    assert np.isfinite(trace.x[:k]).all()
+    assert np.isfinite(trace.d[:k]).all()
+    assert np.isnan(trace.x[k:]).all()
+
+
+# (p) the cache on disk, memory, forks and Ctrl-C
+
+FRESH = """
+from added import added
+from numba import types
+from smc_mujoco.common.jit import compiled
+made = compiled(types.float64(types.float64), added, cache=True)
+assert made.ctypes(1.0) == 3.0
+print(made.cache_hits)
+"""
+
+
+def hits(folder: Path) -> str:
+    """How often a new process takes the compiled function from the cache in a folder, "0" or "1"."""
+    (folder / "added.py").write_text("def added(x):\n    return x + 2.0\n")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(folder)])}
+    done = subprocess.run(
+        [sys.executable, "-c", FRESH], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+def flipped(data: bytes) -> bytes:
+    """With one bit changed, in what is compiled or in the index' names."""
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
+
+
+def test_a_damaged_cache_is_written_anew(tmp_path):
+    assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+    damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
+    for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
+        for path in (tmp_path / "__pycache__").glob(name):
+            path.write_bytes(damage(path.read_bytes()))
+        assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    def doubled(x):
+        return 2.0 * x
+
+    assert compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_forked_while_another_thread_compiles_can_compile():
+    compiling = threading.Event()
+
+    def compiles():
+        with global_compiler_lock:
+            compiling.set()
+            time.sleep(0.3)
+
+    thread = threading.Thread(target=compiles)
+    thread.start()
+    assert compiling.wait(60)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        signal.alarm(20)  # a child that hangs dies of it
+        os._exit(0 if global_compiler_lock.is_locked() is False and global_compiler_lock._lock.acquire() else 3)
+    thread.join()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert not global_compiler_lock.is_locked()
+
+
+def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeypatch):
+    done = []
+
+    class Pressed:
+        """What numba's compiler loses an interrupt in, such as a finaliser."""
+
+        def compile(self):
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                return
+            done.append(True)
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(compiled_module, "CFunc", lambda *arguments: Pressed())
+    with pytest.raises(KeyboardInterrupt):
+        compiled(numba.types.float64(numba.types.float64), math.sin)
+    assert done == [True]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("std::bad_alloc"),
+        mujoco.FatalError("Could not allocate memory"),
+        ValueError("Could not allocate memory"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch):
+    def runs_out(*arguments):
+        raise error
+
+    monkeypatch.setattr(RUN, "Chunk", runs_out)
+    with pytest.raises(smc.ScenarioError, match=r"no memory for 2 runs at once, about \d+ MiB"):
+        smc.run([scenario(), scenario(seed=1)])
+    monkeypatch.setattr(reference, "run", runs_out)
+    with pytest.raises(smc.ScenarioError, match="no memory for 1 run at once"):
+        plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0))))
+
+
+@pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])
+def test_another_error_is_not_taken_for_memory_that_ran_out(error):
+    with pytest.raises(type(error), match="sour"), RUN.memory_for([scenario()]):
+        raise error
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")
+def test_many_runs_leave_no_memory_behind():
+    """Without giving it back they leave 45 to 100 kB each."""
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+    many = [scenario(seed=seed, duration=0.002) for seed in range(600)]
+    for _ in smc.stream(many[:64]):
+        pass
+    before = resident()
+    for _ in smc.stream(many):
+        pass
+    assert resident() - before < 10_000 * len(many)
+
+
+def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
+    here = run_key.key(scenario())
+    assert run_key.described(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
+    monkeypatch.setattr(fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0))
+    monkeypatch.setattr(
+        importlib.import_module("smc_mujoco.simulation.serialise"), "arithmetic", fingerprint.arithmetic.__wrapped__
+    )
+    versions = importlib.import_module("smc_mujoco.simulation.serialise")._versions
+    versions.cache_clear()
+    try:
+        assert run_key.key(scenario()) != here
+    finally:
+        versions.cache_clear()

@@ -1,0 +1,530 @@
+"""Signals: their formulas, their statistics, what they refuse, and that what is compiled computes what is written."""
+
+import copy
+import ctypes
+import dataclasses
+import gc
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.simulation import native, reference, serialise
+from smc_mujoco.simulation.references import MinimumJerk, Ramp
+from smc_mujoco.simulation.signals import (
+    TERMS,
+    BandLimited,
+    Constant,
+    Gust,
+    Impulse,
+    OrnsteinUhlenbeck,
+    Pulse,
+    Recorded,
+    Signal,
+    Sine,
+    Step,
+)
+from smc_mujoco.simulation.time_series import TimeSeries
+
+FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
+NOISE = BandLimited(0.3, 5.0, 15.0)
+UNEVEN = TimeSeries([0.1, 0.2, 0.25, 0.7, 1.3], [1.0, -2.0, 0.5, 0.0, 3.0])
+EVERY = [
+    Constant(1.5),
+    Sine(0.7, 11.0, 0.3),
+    Step(1.5, 0.3),
+    Pulse(-2.0, 0.3, 0.2),
+    Impulse(0.02, 0.3),
+    Gust(2.0, 0.3, 0.7),
+    OrnsteinUhlenbeck(0.5, 0.1),
+    NOISE,
+    UNEVEN,
+    Ramp(2.0, 0.3),
+    MinimumJerk(1.0, 0.2, 0.5),
+]
+LED = [signal for signal in EVERY if not (signal.random or signal.cartesian)]  # what a reference may be
+
+
+def scenario(**fields):
+    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.2} | fields)
+
+
+def written(signal, times, seed=3, channel=1, stream=2):
+    """Its values and derivatives at some times, (K, 3), by the Python function that it is."""
+    memory, value = np.zeros(max(signal.memory, 1)), type(signal).value
+    state = (memory, seed, channel, stream) if signal.random else (signal.data,) if signal.series else ()
+    return np.array([value(float(t), signal, *state) for t in times])
+
+
+def compiled(signal, times, seed=3, channel=1, stream=2):
+    """The same, by the C function that the callback calls."""
+    function = native.of_signal(signal)
+    call = FUNCTION(function.address)
+    inputs, values = np.array([0.0, seed, channel, stream]), np.array([*native.values_of(signal), 0.0])
+    memory, outputs, found = np.zeros(max(signal.memory, 1)), np.empty(3), []
+    for t in times:
+        inputs[0] = t
+        assert call(*(array.ctypes.data for array in (inputs, values, memory, outputs))) == 0
+        found.append(outputs.copy())
+    return np.array(found)
+
+
+def path(signal, times, **key):
+    return written(signal, times, **key)[:, 0]
+
+
+def refused(make, *parts):
+    """The error's one sentence, which names the parts."""
+    with pytest.raises(smc.ScenarioError) as caught:
+        make()
+    message = str(caught.value)
+    assert "\n" not in message
+    assert len(message) < 400
+    for part in parts:
+        assert str(part) in message, message
+    return message
+
+
+def test_every_kind_of_the_library_is_tested_here():
+    kinds = {kind for kind in serialise._kinds(Signal).values() if kind.__module__.startswith("smc_mujoco.")}
+    assert kinds - {Recorded} == {type(signal) for signal in EVERY}
+
+
+@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
+    edges = np.array([0.1, 0.2, 0.25, 0.3, 0.305, 0.5, 0.7, 1.0, 1.3])
+    times = np.sort(np.concatenate([np.arange(0.0, 1.6, 1e-3), edges, np.nextafter(edges, 2), np.nextafter(edges, 0)]))
+    np.testing.assert_array_equal(compiled(signal, times), written(signal, times))
+
+
+@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+def test_a_signal_disturbs_alike_in_both_loops(signal):
+    made = scenario(plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4)
+    fast, slow = smc.run(made), reference.run(made)
+    assert fast.failure is None
+    for name in ("x", "v", "u", "d"):
+        np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
+
+
+def test_a_time_series_is_followed_alike_in_both_loops():
+    fast, slow = (run(scenario(reference=UNEVEN)) for run in (smc.run, reference.run))
+    np.testing.assert_array_equal(fast.x, slow.x)
+    np.testing.assert_array_equal(fast.r[:, 0], path(UNEVEN, fast.t))
+
+
+@pytest.mark.parametrize("signal", [Gust(1.0, 0.0, 1.0), NOISE], ids=lambda s: type(s).__name__)
+def test_a_force_and_a_noise_are_no_references(signal):
+    refused(lambda: scenario(reference=signal), "reference", type(signal).__name__)
+
+
+# gusts and blows
+
+
+def test_a_gust_is_a_smooth_bump():
+    gust, w = Gust(2.0, 0.3, 0.7), 2 * math.pi / 0.7
+    inside = np.linspace(0.3, 1.0, 101)
+    np.testing.assert_allclose(path(gust, inside), 1.0 - np.cos(w * (inside - 0.3)), atol=1e-14)
+    assert path(gust, [0.65]) == 2.0
+    for t in (0.0, 0.2999, 1.0001, 1e9):
+        assert written(gust, [t]).tolist() == [[0.0, 0.0, 0.0]]
+    assert path(gust, [0.3, 1.0, 0.3001, 0.9999]).max() < 1e-6  # it begins and ends without a kink
+
+
+def test_a_gust_gives_a_free_mass_its_impulse():
+    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0, M=1.3)
+    gust = Gust(2.0, 0.05, 0.1)
+    trace = smc.run(scenario(plant=free, law="none", x0=0.0, disturbance=gust))
+    assert trace.v[-1, 0] == pytest.approx(0.5 * 2.0 * 0.1 / 1.3, rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, -1.0, math.pi / 2, 2.5])
+@pytest.mark.parametrize("name", ["inverted_pendulum", "pendulum_network", "inverted_pendulum_network"])
+def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
+    """Against the same force on the joint, times l cos x at the start: the step is short, the angle stays."""
+    size = {"n": 3} if smc.plant(name).n > 1 else {}
+    common = {"plant": smc.plant(name, **size), "law": "none", "x0": angle, "duration": 1e-3, "physics_step": 1e-5}
+    base, gust, push = (
+        smc.run(scenario(**common, disturbance=d)).v[-1]
+        for d in (None, Gust(2.0, -1.0, 2.002), Constant(2.0 * math.cos(angle)))
+    )
+    length = smc.plant(name).parameters["l"]
+    np.testing.assert_allclose(gust - base, length * (push - base), rtol=1e-3, atol=1e-7)
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-4, 2.5e-4, 1e-4])
+@pytest.mark.parametrize("time", [0.0, 0.007, 0.1, 0.123, 1.001])
+def test_an_impulse_has_its_integral_under_every_step(step, time):
+    times = np.arange(round(2.0 / step)) * step
+    assert path(Impulse(-0.3, time), times).sum() * step == pytest.approx(-0.3, rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
+def test_an_impulse_changes_the_momentum_by_itself(integrator):
+    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0, M=1.3)
+    common = {"plant": free, "law": "none", "v0": 0.1, "integrator": integrator, "physics_step": 1e-3}
+    trace = smc.run(scenario(**common, disturbance=Impulse(0.26, 0.1)))
+    assert trace.v[99, 0] == pytest.approx(0.1, rel=1e-12)
+    assert trace.v[-1, 0] == pytest.approx(0.1 + 0.26 / 1.3, rel=1e-9)
+
+
+def test_an_impulse_too_short_for_its_force_is_refused():
+    refused(lambda: Impulse(1e300, 0.0, 1e-300), "Impulse's force")
+
+
+# band-limited noise
+
+
+def test_band_limited_noise_has_its_variance_over_time():
+    d = path(NOISE, np.arange(0.0, 4000.0, 0.0173))
+    assert np.mean(d**2) == pytest.approx(0.09, rel=0.01)
+    assert abs(np.mean(d)) < 1e-3
+
+
+def test_band_limited_noise_has_its_variance_over_seeds_and_channels():
+    """In 4000 paths: to 3 standard errors of a Gaussian's mean, variance and kurtosis."""
+    d = np.array([path(NOISE, [0.37], seed=s, channel=c)[0] for s in range(1000) for c in range(4)])
+    assert abs(np.mean(d)) < 3 * 0.3 / math.sqrt(4000)
+    assert np.mean(d**2) == pytest.approx(0.09, rel=3 * math.sqrt(2 / 4000))
+    assert np.mean(d**4) / np.mean(d**2) ** 2 == pytest.approx(3.0 - 3.0 / (2 * TERMS), abs=3 * math.sqrt(24 / 4000))
+
+
+def test_band_limited_noise_has_no_power_outside_its_band():
+    h, n = 5e-3, 40_000
+    window = np.blackman(n)
+    power = np.abs(np.fft.rfft(window * path(NOISE, h * np.arange(n)))) ** 2
+    f = np.fft.rfftfreq(n, h)
+    assert power[(f < 4.9) | (f > 15.1)].sum() < 1e-9 * power.sum()
+    quarters = [power[(f >= a) & (f < a + 2.5)].sum() / power.sum() for a in (5.0, 7.5, 10.0, 12.5)]
+    np.testing.assert_allclose(quarters, 0.25, atol=0.04)  # a spectral line may sit on a border
+
+
+def test_the_frequencies_of_band_limited_noise_share_the_band_out():
+    memory = np.zeros(NOISE.memory)
+    BandLimited.value(0.0, NOISE, memory, 3, 0, 1)
+    part = (memory[:TERMS] / (2 * math.pi) - 5.0) / 10.0 * TERMS
+    assert np.floor(part).tolist() == list(range(TERMS))
+    assert np.std(part % 1.0) > 0.2
+    assert np.all((memory[TERMS:] >= 0.0) & (memory[TERMS:] < 2 * math.pi))
+
+
+def test_band_limited_noise_is_a_function_of_time_alone():
+    times = np.random.default_rng(0).uniform(0.0, 10.0, 200)
+    alone = [path(NOISE, [t])[0] for t in times]
+    np.testing.assert_array_equal(path(NOISE, times), alone)
+    common = {"law": "none", "disturbance": NOISE, "control_period": 1e-3}
+    coarse, fine = (smc.run(scenario(**common, physics_step=h)).d for h in (1e-3, 2.5e-4))
+    np.testing.assert_allclose(coarse, fine, atol=1e-12)  # sums of decimal times differ by an ulp
+
+
+@pytest.mark.parametrize("other", [{"seed": 4}, {"channel": 2}, {"stream": 3}], ids=str)
+def test_band_limited_noise_is_independent_in_seeds_channels_and_streams(other):
+    times = np.arange(0.0, 2000.0, 0.05)
+    assert abs(np.corrcoef(path(NOISE, times), path(NOISE, times, **other))[0, 1]) < 0.02
+
+
+def test_every_channel_has_band_limited_noise_of_its_own():
+    trace = smc.run(scenario(plant=smc.plant("pendulum_network", n=3), disturbance=[NOISE, NOISE], duration=1.0))
+    assert np.linalg.matrix_rank(trace.d) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        ((-0.1, 1.0, 2.0), ("sigma", "-0.1")),
+        ((0.1, -1.0, 2.0), ("low", "-1")),
+        ((0.1, 2.0, 2.0), ("high", "2 Hz")),
+        ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz")),
+    ],
+)
+def test_a_band_that_is_none_is_refused(arguments, parts):
+    refused(lambda: BandLimited(*arguments), "BandLimited", *parts)
+
+
+def test_a_band_may_begin_at_zero_and_have_no_power():
+    assert not path(BandLimited(0.0, 0.0, 1.0), [0.0, 1.0]).any()
+
+
+# time series
+
+
+def test_a_time_series_is_straight_between_its_points_and_zero_outside():
+    rng = np.random.default_rng(1)
+    for n in (2, 3, 4, 7, 100):
+        times, values = np.cumsum(rng.exponential(size=n)), rng.normal(size=n)
+        at = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
+        expected = np.interp(at, times, values, left=0.0, right=0.0)
+        np.testing.assert_allclose(path(TimeSeries(times, values), at), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
+    found = written(UNEVEN, UNEVEN.times)
+    assert found[:-1, 0].tolist() == list(UNEVEN.values[:-1])
+    assert found[-1, 0] == pytest.approx(UNEVEN.values[-1], rel=1e-15)
+    slopes = np.diff(UNEVEN.values) / np.diff(UNEVEN.times)
+    assert found[:, 1].tolist() == [*slopes, slopes[-1]]
+    assert not found[:, 2].any()
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2e-3, 5e-3, 1e-2])
+def test_a_recorded_run_is_all_there_wherever_decimal_times_put_its_end(dt):
+    for start, count in ((3, 7), (10, 100), (0, 999), (70, 30)):
+        series = TimeSeries([float(f"{i * dt:.6g}") for i in range(start, start + count)], [1.0] * count)
+        on = [k for k in range(start + count + 3) if path(series, [k * dt])[0]]
+        assert on == list(range(start, start + count))
+
+
+def test_a_time_series_lives_as_long_as_its_scenario():
+    def made(k):
+        t = np.linspace(0.0, 0.2, 201)
+        return scenario(law="none", disturbance=TimeSeries(t, k * np.sin(20.0 * t)))
+
+    many = [made(k) for k in range(20)]
+    gc.collect()
+    for k, trace in enumerate(smc.run(many)):
+        np.testing.assert_allclose(trace.d[:, 0], k * np.sin(20.0 * trace.t), atol=1e-12)
+
+
+@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(
+    "again",
+    [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s)), dataclasses.replace],
+    ids=["copy", "deepcopy", "pickle", "replace"],
+)
+def test_a_copy_of_a_signal_is_equal_and_runs_alike(signal, again):
+    other = again(signal)
+    assert other == signal
+    assert hash(other) == hash(signal)
+    times = np.linspace(0.0, 1.5, 31)
+    np.testing.assert_array_equal(compiled(other, times), compiled(signal, times))
+
+
+def test_time_series_that_differ_in_one_number_are_not_equal():
+    assert dataclasses.replace(UNEVEN, values=[*UNEVEN.values[:-1], 3.1]) != UNEVEN
+    assert dataclasses.replace(UNEVEN, times=[*UNEVEN.times[:-1], 1.4]) != UNEVEN
+    assert scenario(disturbance=UNEVEN) == scenario(disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values)))
+
+
+def test_a_time_series_does_not_change_and_shows_itself_in_a_line():
+    with pytest.raises(ValueError, match="read-only"):
+        copy.deepcopy(UNEVEN).data[1, 0] = 5.0
+    assert repr(UNEVEN) == "TimeSeries(5 points, 0.1 to 1.3 s)"
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "parts"),
+    [
+        ([0.0, 1.0], [1.0], ("2 times", "1 values")),
+        ([0.0], [1.0], ("1 points", "two")),
+        ([], [], ("0 points",)),
+        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], ("item 2", "1 s comes after 1 s")),
+        ([0.0, 2.0, 1.0], [1.0, 2.0, 3.0], ("item 2", "1 s comes after 2 s")),
+        ([0.0, math.nan], [1.0, 2.0], ("times[1]", "nan")),
+        ([0.0, 1.0], [math.inf, 2.0], ("values[0]", "inf")),
+        ([0.0, "1"], [1.0, 2.0], ("times[1]", "'1'")),
+        ([0.0, 1.0], [None, 2.0], ("values[0]", "None")),
+        ([0.0, 1.0], [True, 2.0], ("values[0]", "True")),
+        (5.0, [1.0, 2.0], ("times", "5.0")),
+        ([0.0, 1.0], "12", ("values", "'12'")),
+        (np.eye(2), [1.0, 2.0], ("times[0]", "[1.0, 0.0]")),
+        ([0.0, 1e-300], [0.0, 1e300], ("item 1", "too steep")),
+    ],
+    ids=str,
+)
+def test_numbers_that_are_no_time_series_are_refused(times, values, parts):
+    refused(lambda: TimeSeries(times, values), "TimeSeries", *parts)
+
+
+@dataclasses.dataclass(frozen=True)
+class Held(Signal):
+    """A user's series: the last value, times a gain."""
+
+    gain: float = 2.0
+    series = True
+    data = np.array([[0.0, 0.1], [1.0, 2.0]])
+
+    @staticmethod
+    def value(t, p, data):
+        """A staircase."""
+        return p.gain * (data[1, 1] if t >= data[0, 1] else data[1, 0]), 0.0, 0.0
+
+
+def test_a_user_s_series_has_parameters_beside_its_data():
+    np.testing.assert_array_equal(compiled(Held(), [0.05, 0.15])[:, 0], [2.0, 4.0])
+    made = scenario(law="none", disturbance=Held(3.0))
+    np.testing.assert_array_equal(smc.run(made).d, reference.run(made).d)
+
+
+@pytest.mark.parametrize("data", [np.zeros(3), np.zeros((3, 2)), np.zeros((2, 3), int), np.zeros((3, 2)).T], ids=str)
+def test_data_that_compiled_code_would_misread_are_refused(data, monkeypatch):
+    monkeypatch.setattr(Held, "data", data)
+    refused(lambda: native.values_of(Held()), "Held", data.shape)
+
+
+# CSV files
+
+GOOD = "t,d,e\n0,1,5\n0.1,2,6\n0.2,3,7\n0.3,4,8\n"
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(content, name="wind.csv"):
+        where = tmp_path / name
+        where.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return where
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("content", "asked", "values"),
+    [
+        (GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD, {"column": "e"}, (5.0, 6.0, 7.0, 8.0)),
+        (GOOD.replace("t,", "seconds,"), {"time": "seconds"}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.replace("t,", "seconds,"), {}, (1.0, 2.0, 3.0, 4.0)),
+        ("d,t\n1,0\n2,0.1\n3,0.2\n4,0.3\n", {}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.partition("\n")[2], {}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.replace("\n", "\r\n"), {}, (1.0, 2.0, 3.0, 4.0)),
+        ("\ufeff" + GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.replace(",", " , ") + "\n\n", {}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.replace("t,d,e", "t [s],d [N m],e"), {"column": "d"}, (1.0, 2.0, 3.0, 4.0)),
+        (GOOD.replace("t,d,e", "time [s],d [N],e [m]"), {"column": "e [m]"}, (5.0, 6.0, 7.0, 8.0)),
+        ('"t","d, N"\n0,1\n0.1,2\n0.2,3\n0.3,4e0', {"column": "d, N"}, (1.0, 2.0, 3.0, 4.0)),
+    ],
+    ids=[
+        "header",
+        "column",
+        "time",
+        "first column",
+        "time second",
+        "no header",
+        "CRLF",
+        "BOM",
+        "spaces",
+        "units",
+        "with units",
+        "quotes",
+    ],
+)
+def test_a_csv_file_is_read(content, asked, values, file):
+    series = TimeSeries.from_csv(file(content), **asked)
+    assert series == TimeSeries((0.0, 0.1, 0.2, 0.3), values)
+
+
+@pytest.mark.parametrize(
+    ("content", "asked", "parts"),
+    [
+        (GOOD.replace("2,6", "nan,6"), {}, ("line 3", "d is 'nan'", "finite")),
+        (GOOD.replace("2,6", "inf,6"), {}, ("line 3", "d is 'inf'", "finite")),
+        (GOOD.replace("2,6", ",6"), {}, ("line 3", "d is empty", "fill it in")),
+        (GOOD.replace("0.1,2", ",2"), {}, ("line 3", "t is empty")),
+        (GOOD.replace("0.1,2,6", ",,"), {}, ("line 3", "t is empty")),
+        (GOOD.replace("2,6", "two,6"), {}, ("line 3", "d is 'two'")),
+        ("0,1\n0.1,\n0.2,3\n", {}, ("line 2", "column 2 is empty")),
+        ("0,nan\n0.1,2\n0.2,3\n", {}, ("line 1", "column 2 is 'nan'")),
+        (GOOD.replace("0.1,2,6", "0.1,2"), {}, ("line 3", "2 cells for 3 columns")),
+        (GOOD.replace("0.1,2,6", "0,1,2,6"), {}, ("line 3", "4 cells for 3 columns")),
+        (GOOD.replace("0.2,", "0.1,"), {}, ("line 4", "0.1 s comes after 0.1 s", "increase")),
+        (GOOD.replace("0.2,", "0.05,"), {}, ("line 4", "0.05 s comes after 0.1 s", "increase")),
+        (GOOD + "0.5,1,1\n", {}, ("gap after line 5", "0.3 s to 0.5 s", "0.1 s apart", "fill it in")),
+        (GOOD.replace("0.1,2,6\n", ""), {}, ("gap after line 2", "0 s to 0.2 s")),
+        (GOOD, {"column": "f"}, ("column", "'f'", "d, e, t")),
+        (GOOD, {"column": 1}, ("column", "1", "d, e, t")),
+        (GOOD, {"time": "x"}, ("time column", "'x'", "d, e, t")),
+        (GOOD, {"column": ["d"]}, ("column", "['d']", "d, e, t")),
+        (GOOD.replace("t,", "t [ms],"), {}, ("time column 't [ms]'", "not in seconds", "give times in s")),
+        ("0,1\n0.1,2\n", {"column": "d"}, ("no header", "'d'")),
+        ("0,1\n0.1,2\n", {"time": "s"}, ("no header", "'s'")),
+        ("t,d\n", {}, ("0 points", "two")),
+        ("t,d\n0,1\n", {}, ("1 points", "two")),
+        ("t;d\n0;1\n0,1;2\n", {}, ("one column", "commas")),
+        ("", {}, ("empty",)),
+        ("\n\n", {}, ("empty",)),
+        (b"\x89PNG\r\n\x1a\n\0\0", {}, ("no text", "commas")),
+        (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
+        ('t,d\n0,"1\n', {}, ("CSV", "commas")),
+        ("t,d\n0,0\n1e-300,1e300\n", {}, ("line 3", "too steep")),
+    ],
+)
+def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(content, asked, parts, file):
+    refused(lambda: TimeSeries.from_csv(file(content), **asked), "wind.csv", *parts)
+
+
+@pytest.mark.parametrize("wrong", [None, 5, 1.5, [1.0], b"wind.csv"], ids=str)
+def test_what_is_no_path_is_refused(wrong):
+    refused(lambda: TimeSeries.from_csv(wrong), repr(wrong), "CSV")
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    refused(lambda: TimeSeries.from_csv(tmp_path / "none.csv"), "none.csv", "no file")
+    refused(lambda: TimeSeries.from_csv(tmp_path), tmp_path.name, "directory")
+    refused(lambda: TimeSeries.from_csv("a\0b.csv"), "CSV")
+
+
+def test_an_exported_trace_disturbs_another_run(tmp_path):
+    first = smc.run(scenario(disturbance=Sine(0.3, 20.0)))
+    series = TimeSeries.from_csv(first.export(tmp_path / "a.csv"), column="d")
+    second = smc.run(scenario(disturbance=series))
+    np.testing.assert_allclose(second.d, first.d, atol=1e-12)
+    np.testing.assert_allclose(second.x, first.x, atol=1e-5)  # straight lines between the samples of a sine
+
+
+# as data
+
+
+@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+def test_a_signal_survives_json(signal):
+    made = scenario(disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0])
+    assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
+
+
+def test_a_series_whose_class_is_gone_keeps_its_values(monkeypatch):
+    made = scenario(disturbance=UNEVEN)
+    about = json.loads(json.dumps(serialise.describe(made)))
+    monkeypatch.setattr(TimeSeries, "__module__", "a_module_that_is_gone")
+    again = serialise.restore(about)
+    assert again.disturbance[0].parameters() == {"times": UNEVEN.times, "values": UNEVEN.values}
+    assert hash(again) == hash(serialise.restore(about))
+    assert json.loads(json.dumps(serialise.describe(again))) == about
+    refused(lambda: smc.run(again), "TimeSeries")
+
+
+@dataclasses.dataclass(frozen=True)
+class Sticker(Part):
+    """A user's part, with a tuple and an infinity among its values."""
+
+    levels: tuple[float, ...] = (1.0, 2.0)
+    limit: float = math.inf
+
+
+def test_parts_survive_json():
+    for value in (None, (), Sticker(), (Sticker(), Sticker((3.0,), 5.0))):
+        assert serialise._restore_parts(json.loads(json.dumps(serialise._parts(value)))) == value
+
+
+def test_a_part_that_is_not_at_hand_is_named(monkeypatch):
+    about = serialise._parts((Sticker(),))
+    monkeypatch.setattr(Sticker, "__module__", "a_module_that_is_gone")
+    refused(lambda: serialise._restore_parts(about), "Sticker", "test_signals")
+
+
+def test_a_file_from_before_there_were_parts_loads():
+    about = serialise.describe(scenario())
+    for name in (*serialise.PARTS, "mechanism"):
+        del about[name]
+    assert serialise.restore(about) == scenario()
+
+
+def test_a_realistic_scenario_survives_json():
+    parts = {
+        "friction": (smc.Viscous(0.1), smc.Coulomb(0.05)),
+        "actuator": (smc.Lag(0.01), smc.Backlash(0.02)),
+        "sensor": smc.Encoder(counts=math.inf, dropout=0.1),
+        "contact": smc.Contact("stops", restitution=0.5),
+    }
+    made = scenario(**parts)
+    assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made

@@ -1,0 +1,592 @@
+"""A trace on disk is the trace in memory, to the last bit; what cannot be written or read costs one sentence."""
+
+import contextlib
+import copy
+import csv
+import dataclasses
+import errno
+import json
+import math
+import os
+import pickle
+import re
+import subprocess
+import sys
+import tracemalloc
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+from scipy.io import loadmat
+
+import smc_mujoco as smc
+
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
+FORCES = ("u", "applied", "d", "force", "reaction")
+
+
+@dataclasses.dataclass(frozen=True)
+class Ramp(smc.Signal):
+    """A user's own signal."""
+
+    slope: float = 1.0
+
+    @staticmethod
+    def value(t, p):
+        """p.slope * t."""
+        return p.slope * t, p.slope, 0.0
+
+
+@smc.law_function(gains={"k": 2.0, "c": 1.0}, memory=3)
+def my_law(y, gains, memory):
+    """A user's own law."""
+    memory[2] += y.dt
+    return -gains.k * y.e - gains.c * y.de, memory[2]
+
+
+@smc.law_function(gains={"k": 4.0, "c": 3.0})
+def classical(y, gains, memory):
+    """A user's own law under the name and with the gains of one of the library."""
+    return 0.0, 0.0
+
+
+def scenario(**fields):
+    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.02} | fields)
+
+
+def network(**fields):
+    return scenario(
+        plant=smc.plant("pendulum_network", n=3, m=0.4, kc=0.3),
+        law=smc.law("super_twisting", k1=0.1 + 0.2),
+        velocity=smc.estimator("filtered_difference", tau=1e-2),
+        control_period=2e-3,
+        physics_step=1e-3,
+        x0=(0.1, 0.2, -0.3),
+        v0=1 / 3,
+        reference=smc.Sine(0.1, 2.0, 0.3),
+        disturbance=[
+            smc.Constant(0.1),
+            smc.Step(0.1, 0.005),
+            smc.Pulse(0.1, 0.005, 0.01),
+            smc.OrnsteinUhlenbeck(0.1, 0.1, 2e-3),
+            Ramp(0.5),
+        ],
+        noise=smc.Noise(0.01, 0.05),
+        input_delay=3e-3,
+        mismatch={"mass": 1.3, "kc": 0.5},
+        jump=smc.Jump(0.01, {"b": 2.0}),
+        seed=2**53 - 1,
+        integrator="implicitfast",
+        u_max=math.inf,
+        **fields,
+    )
+
+
+SCENARIOS = {
+    "plain": scenario(),
+    "network": network(),
+    "own law": scenario(law=my_law(k=3.0)),
+    "diverged": scenario(law="none", plant=smc.plant("duffing", alpha=-1e6, beta=0.0)),
+    "diverged at once": scenario(x0=1e6),
+    "numpy": scenario(
+        x0=np.float32(0.3),
+        duration=np.float32(0.02),
+        noise=smc.Noise(np.float32(0.1), np.int64(0)),
+        jump=smc.Jump(np.float32(0.01), {"M": np.float32(1.1)}),
+        mismatch={"delta": np.int64(2)},
+        disturbance=smc.Sine(np.float32(0.1), np.int64(2)),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def traces():
+    return dict(zip(SCENARIOS, smc.run(list(SCENARIOS.values())), strict=True))
+
+
+@pytest.fixture
+def trace(traces):
+    return traces["network"]
+
+
+def identical(a, b) -> bool:
+    return all(
+        getattr(a, name).tobytes() == getattr(b, name).tobytes() and getattr(a, name).shape == getattr(b, name).shape
+        for name in ARRAYS
+    )
+
+
+def refused(act, *words: str):
+    """`act` ends in one sentence that holds every word."""
+    with pytest.raises(smc.ScenarioError) as caught:
+        act()
+    assert "\n" not in str(caught.value)
+    for word in words:
+        assert str(word) in str(caught.value)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+# there and back
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_trace_comes_back_to_the_last_bit(name, traces, tmp_path):
+    trace = traces[name]
+    again = smc.load(trace.save(tmp_path / "a.npz"))
+    assert identical(again, trace)
+    assert (again.diverged_at, again.failure) == (trace.diverged_at, trace.failure)
+    assert names(tmp_path) == ["a.npz"]
+
+
+@pytest.mark.parametrize("name", ["plain", "network", "diverged", "numpy"])
+def test_its_scenario_comes_back_equal_and_gives_the_same_trace(name, traces, tmp_path):
+    trace = traces[name]
+    again = smc.load(trace.save(tmp_path / "a.npz"))
+    assert again.scenario == trace.scenario
+    assert identical(smc.run(again.scenario), trace)
+
+
+@pytest.mark.parametrize("plant", smc.plants())
+def test_every_plant_and_law_comes_back(plant, tmp_path):
+    for law in smc.laws(plant):
+        one = scenario(plant=plant, law=law, model="nominal", duration=2e-3)
+        assert smc.load(smc.run(one).save(tmp_path / "a.npz")).scenario == one
+
+
+def test_a_law_of_one_s_own_keeps_its_name_and_gains_but_not_its_code(traces, tmp_path):
+    again = smc.load(traces["own law"].save(tmp_path / "a.npz")).scenario
+    assert again.law.name == "my_law"
+    assert dict(again.law.gains) == {"k": 3.0, "c": 1.0}
+    assert again.law.memory == 3
+    refused(lambda: smc.run(again), "my_law")
+    assert smc.run(dataclasses.replace(again, law=my_law(**again.law.gains))).diverged_at is None
+
+
+def test_a_law_of_one_s_own_is_never_taken_for_the_library_s(tmp_path):
+    again = smc.load(smc.run(scenario(law=classical())).save(tmp_path / "a.npz")).scenario
+    assert again.law != smc.law("classical")
+    refused(lambda: smc.run(again), "classical")
+
+
+def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
+    mine = smc.estimator_function(gains={"a": 1.0})(lambda y, gains, memory: gains.a * y.v)()
+    again = smc.load(smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")).scenario
+    assert (again.velocity.name, dict(again.velocity.gains)) == (mine.name, {"a": 1.0})
+
+
+def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):
+    for copied in (trace, smc.load(trace.save(tmp_path / "a.npz")), copy.deepcopy(trace), dataclasses.replace(trace)):
+        for name in ARRAYS:
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(copied, name)[0] = 1.0
+
+
+def test_a_trace_survives_a_pickle(traces):
+    trace = traces["plain"]
+    again = pickle.loads(pickle.dumps(trace))
+    assert identical(again, trace)
+    assert again.scenario == trace.scenario
+    assert not again.x.flags.writeable
+
+
+def test_a_trace_shows_what_it_is(traces):
+    assert "pendulum_network" in repr(traces["network"])
+    assert traces["diverged"].failure in repr(traces["diverged"])
+    assert "\n" not in repr(traces["network"])
+
+
+# names
+
+
+def test_a_name_without_an_ending_gets_npz(trace, tmp_path):
+    assert trace.save(tmp_path / "a") == tmp_path / "a.npz"
+    assert trace.save(str(tmp_path / "b")) == tmp_path / "b.npz"
+    assert names(tmp_path) == ["a.npz", "b.npz"]
+
+
+def test_folders_on_the_way_are_made(trace, tmp_path):
+    assert trace.save(tmp_path / "new" / "deep" / "a.npz").is_file()
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.npy", "a.NPZ", "run.v1", "a.npz.bak"])
+def test_a_trace_is_saved_under_npz_only(name, trace, tmp_path):
+    refused(lambda: trace.save(tmp_path / name), name, ".npz")
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.txt", "a", "a.CSV", ".csv", "csv", "a.csv.gz", ""])
+def test_a_trace_is_exported_to_csv_mat_and_parquet_only(name, trace, tmp_path):
+    refused(lambda: trace.export(tmp_path / name if name else ""), ".csv, .mat or .parquet")
+    assert names(tmp_path) == []
+
+
+def test_no_name_is_no_name(trace):
+    refused(lambda: trace.save(""))
+    refused(lambda: trace.save("a\0b.npz"))
+
+
+# exports
+
+
+@pytest.mark.parametrize("name", ["plain", "network", "diverged"])
+def test_csv_holds_every_number_to_the_last_bit(name, traces, tmp_path):
+    trace = traces[name]
+    with open(trace.export(tmp_path / "a.csv"), newline="") as file:
+        rows = [{re.sub(r" \[.*\]", "", head): cell for head, cell in row.items()} for row in csv.DictReader(file)]
+    assert len(rows) == len(trace.t)
+    assert all(cell == repr(float(cell)) for row in rows for cell in row.values())  # no digit more than it takes
+    n = trace.x.shape[1]
+    columns = ["t"] + [f"{name}{i if n > 1 else ''}" for name in ARRAYS[1:] for i in range(n)]
+    assert list(rows[0]) == columns
+    for column, expected in zip(
+        columns, [trace.t, *(getattr(trace, a)[:, i] for a in ARRAYS[1:] for i in range(n))], strict=True
+    ):
+        np.testing.assert_array_equal([float(row[column]) for row in rows], expected)
+
+
+@pytest.mark.parametrize("name", ["plain", "network", "diverged"])
+def test_mat_holds_every_array_and_the_scenario(name, traces, tmp_path):
+    trace = traces[name]
+    data = loadmat(trace.export(tmp_path / "a.mat"))
+    for array in ARRAYS:
+        np.testing.assert_array_equal(data[array].reshape(getattr(trace, array).shape), getattr(trace, array))
+    assert json.loads(str(data["scenario"][0]))["plant"]["name"] == trace.scenario.plant.name
+
+
+def test_every_format_has_the_units_of_each_column(tmp_path):
+    """Of the cart and of its pole, of which one moves in m and the other in rad."""
+    trace = smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", duration=0.01))
+    units = {"t": "s", "x0": "m", "x1": "rad", "v0": "m/s", "v1": "rad/s", "s0": "", "s1": "", "r0": "m", "r1": "rad"}
+    units |= {f"{name}{i}": unit for name in FORCES for i, unit in enumerate(("N", "N m"))}
+    assert {name: trace.units()[name] for name in units} == units
+    assert list(trace.units()) == list(trace.columns())
+    heads = trace.export(tmp_path / "a.csv").read_text().partition("\n")[0].split(",")
+    assert heads == [f"{name} [{units[name]}]" if units[name] else name for name in trace.columns()]
+    schema = parquet.read_schema(trace.export(tmp_path / "a.parquet"))
+    assert {field.name: field.metadata[b"unit"].decode() for field in schema} == units
+    held = loadmat(trace.export(tmp_path / "a.mat"), simplify_cells=True)["units"]
+    assert {name: held[name].tolist() for name in ("x", "v", "u")} == {
+        "x": ["m", "rad"], "v": ["m/s", "rad/s"], "u": ["N", "N m"],
+    }  # fmt: skip
+    single = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+    assert loadmat(single.export(tmp_path / "b.mat"), simplify_cells=True)["units"]["u"] == "N"
+
+
+@pytest.mark.parametrize("name", ["plain", "network", "diverged"])
+def test_parquet_holds_every_number_to_the_last_bit_and_the_scenario(name, traces, tmp_path):
+    trace = traces[name]
+    table = parquet.read_table(trace.export(tmp_path / "a.parquet"))
+    assert table.column_names == list(trace.columns())
+    for column, expected in trace.columns().items():
+        np.testing.assert_array_equal(table[column].to_numpy(), expected)
+    assert json.loads(table.schema.metadata[b"scenario"])["plant"]["name"] == trace.scenario.plant.name
+
+
+# what is no trace
+
+
+def test_a_missing_file_is_named(tmp_path):
+    refused(lambda: smc.load(tmp_path / "none.npz"), tmp_path / "none.npz")
+
+
+def test_a_folder_is_no_trace(tmp_path):
+    refused(lambda: smc.load(tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"PK\3\4" + bytes(100), b"hello", bytes(1000), b"\x93NUMPY"], ids=repr)
+def test_what_is_no_archive_is_no_trace(content, tmp_path):
+    (tmp_path / "a.npz").write_bytes(content)
+    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
+
+
+def test_a_bare_array_is_no_trace(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros(3))
+    refused(lambda: smc.load(tmp_path / "a.npy"), "a.npy")
+
+
+def test_another_archive_is_no_trace(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.zeros(3))
+    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
+
+
+def test_pickled_objects_are_not_loaded(tmp_path):
+    np.savez(tmp_path / "a.npz", about=np.array([{"a": 1}], dtype=object))
+    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_no_trace(part, trace, tmp_path):
+    path = trace.save(tmp_path / "a.npz")
+    path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
+    refused(lambda: smc.load(path), "a.npz")
+
+
+def test_a_file_with_a_flipped_byte_is_no_trace_or_the_same_one(trace, tmp_path):
+    path = trace.save(tmp_path / "a.npz")
+    good = path.read_bytes()
+    for at in range(0, len(good), len(good) // 100):
+        path.write_bytes(good[:at] + bytes([good[at] ^ 0xFF]) + good[at + 1 :])
+        with contextlib.suppress(smc.ScenarioError):
+            assert identical(smc.load(path), trace)
+
+
+def tampered(trace, folder, about=None, **arrays) -> Path:
+    """The file of a trace, with another description or other arrays."""
+    path = trace.save(folder / "a.npz")
+    with np.load(path) as file:
+        held = dict(file)
+    np.savez(
+        path,
+        **held | {"about": np.array(json.dumps(about(json.loads(str(held["about"])))))} if about else held | arrays,
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    "about",
+    [
+        lambda about: [],
+        lambda about: 1,
+        lambda about: {},
+        lambda about: {"diverged_at": None, "failure": None},
+        *(
+            lambda about, key=key: {k: v for k, v in about.items() if k != key}
+            for key in ("law", "plant", "noise", "x0", "failure")
+        ),
+        *(
+            lambda about, key=key: about | {key: 5}
+            for key in ("law", "plant", "reference", "disturbance", "mismatch", "jump")
+        ),
+        lambda about: about | {"noise": {"colour": 1.0}},
+        lambda about: about | {"plant": {"name": "dufing"}},
+        lambda about: about | {"duration": -1.0},
+        lambda about: about | {"reference": {"kind": "Sinus"}},
+    ],
+)
+def test_a_description_that_makes_no_sense_is_no_trace(about, trace, tmp_path):
+    path = tampered(trace, tmp_path, about)
+    refused(lambda: smc.load(path))
+
+
+@pytest.mark.parametrize(
+    "array",
+    [np.zeros(3), np.zeros((11, 2)), np.zeros((11, 3), int), np.zeros((11, 3), "U1"), np.zeros((12, 3)), np.array(0.0)],
+)
+def test_arrays_of_the_wrong_shape_are_no_trace(array, trace, tmp_path):
+    assert trace.x.shape == (11, 3)
+    path = tampered(trace, tmp_path, x=array)
+    refused(lambda: smc.load(path), "a.npz")
+
+
+def with_member(trace, folder, name: str, content: bytes) -> Path:
+    """The file of a trace, one member of which has other bytes."""
+    path = trace.save(folder / "a.npz")
+    with zipfile.ZipFile(path) as old:
+        held = {member: old.read(member) for member in old.namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        for member, data in (held | {f"{name}.npy": content}).items():
+            new.writestr(member, data)
+    return path
+
+
+def array(header: str, data: bytes = b"") -> bytes:
+    """A .npy file with such a header."""
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + data
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "kind"), [("x", (11, 3 * 10**6), "<f8"), ("t", (10**12,), "<f8"), ("about", (), "<U400000000")]
+)
+def test_an_array_too_large_is_refused_before_it_is_read(name, shape, kind, trace, tmp_path):
+    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}}}"
+    path = with_member(trace, tmp_path, name, array(header, bytes(10**8)))
+    tracemalloc.start()
+    try:
+        refused(lambda: smc.load(path), "a.npz", f"its {name} is")
+        assert tracemalloc.get_traced_memory()[1] < 10**7
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (11,"),  # TokenError
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (1e999,)}"),
+        array(f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**30},)}}"),  # OverflowError
+        array(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {'(' * 300 + ')' * 300}}}"),
+        array("{'descr': 5, 'fortran_order': False, 'shape': (11, 3)}"),
+        array("{'descr': '<f8', 'fortran_order': False, 'shape': (11, 3)}", bytes(11 * 3 * 8 + 1)),
+        b"\x93NUMPY\x09\x00" + bytes(20),
+    ],
+    ids=lambda content: repr(content[:60]),
+)
+def test_a_member_that_is_no_array_is_no_trace(content, trace, tmp_path):
+    path = with_member(trace, tmp_path, "x", content)
+    refused(lambda: smc.load(path), "a.npz")
+
+
+@pytest.mark.parametrize("about", ["[" * 10**5, "{", "NaN", "9" * 5000, '"\ud800"'], ids=lambda about: about[:9])
+def test_a_description_that_is_no_json_is_no_trace(about, trace, tmp_path):
+    text = np.array(about)
+    header = f"{{'descr': '{text.dtype.str}', 'fortran_order': False, 'shape': ()}}"
+    path = with_member(trace, tmp_path, "about", array(header, text.tobytes()))
+    refused(lambda: smc.load(path), "a.npz")
+
+
+def test_a_file_that_is_encrypted_or_packed_in_another_way_is_no_trace(trace, tmp_path):
+    path = trace.save(tmp_path / "a.npz")
+    good = path.read_bytes()
+    for offset, value in ((6, 1), (8, 99)):  # of a local header; 8 and 10 of the directory's
+        at = good.index(b"PK\1\2") + offset + 2
+        path.write_bytes(good[:at] + bytes([value]) + good[at + 1 :])
+        refused(lambda: smc.load(path), "a.npz")
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a"])
+def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path):
+    os.mkfifo(tmp_path / "a.npz")
+    refused(lambda: smc.load(tmp_path / name), "it is no regular file")
+
+
+def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch):
+    monkeypatch.setattr("smc_mujoco.simulation.trace.MOST_TEXT", 100)
+    refused(lambda: trace.save(tmp_path / "a.npz"), "give it shorter time series")
+    assert names(tmp_path) == []
+
+
+# disks
+
+
+WRITERS = {
+    "npz": lambda trace, path: trace.save(path),
+    "csv": lambda trace, path: trace.export(path),
+    "mat": lambda trace, path: trace.export(path),
+    "parquet": lambda trace, path: trace.export(path),
+}
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_where_a_file_stands_in_the_way_of_a_folder_one_sentence_says_so(ending, trace, tmp_path):
+    (tmp_path / "file").write_text("")
+    refused(lambda: WRITERS[ending](trace, tmp_path / "file" / f"a.{ending}"), f"a.{ending}")
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_where_a_folder_stands_in_the_way_of_a_file_nothing_is_left(ending, trace, tmp_path):
+    (tmp_path / f"a.{ending}").mkdir()
+    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}")
+    assert names(tmp_path) == [f"a.{ending}"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root writes everywhere")
+@pytest.mark.parametrize("ending", WRITERS)
+def test_a_folder_that_cannot_be_written_is_named(ending, trace, tmp_path):
+    tmp_path.chmod(0o500)
+    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}")
+
+
+def test_a_name_too_long_is_refused(trace, tmp_path):
+    refused(lambda: trace.save(tmp_path / ("a" * 400 + ".npz")))
+
+
+FULL = """
+import resource, sys
+import smc_mujoco as smc
+ending, samples, room, path = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=samples * 1e-3))
+write = trace.save if ending == "npz" else trace.export
+write(path)
+old = open(path, "rb").read()
+resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+try:
+    write(path)
+except smc.ScenarioError as error:
+    sys.stdout.write(f"{error}\\n")
+assert open(path, "rb").read() == old
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="resource")
+@pytest.mark.parametrize("ending", WRITERS)
+@pytest.mark.parametrize(("samples", "room"), [(20, 300), (3000, 9000)], ids=["at the end", "in the middle"])
+def test_a_disk_that_is_full_leaves_the_old_file_and_no_other(ending, samples, room, tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+    command = [sys.executable, "-B", "-c", FULL, ending, str(samples), str(room), str(tmp_path / f"a.{ending}")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.stderr == ""
+    assert done.stdout.startswith(f"cannot write {tmp_path / f'a.{ending}'}: {os.strerror(errno.EFBIG)}")
+    assert done.stdout.count("\n") == 1
+    assert names(tmp_path) == [f"a.{ending}"]
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+@pytest.mark.parametrize(
+    "error", [OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), OSError("cable pulled"), KeyboardInterrupt()]
+)
+def test_a_write_that_breaks_off_leaves_the_old_file_and_no_other(ending, error, trace, traces, tmp_path, monkeypatch):
+    path = tmp_path / f"a.{ending}"
+    WRITERS[ending](traces["plain"], path)
+    old = path.read_bytes()
+
+    def breaks(*args, **kwargs):
+        raise error
+
+    monkeypatch.setattr(os, "replace", breaks)
+    if isinstance(error, OSError):
+        refused(lambda: WRITERS[ending](trace, path), f"a.{ending}", error.strerror or error)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            WRITERS[ending](trace, path)
+    assert names(tmp_path) == [f"a.{ending}"]
+    assert path.read_bytes() == old
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_an_existing_file_is_replaced(ending, trace, traces, tmp_path):
+    path = tmp_path / f"a.{ending}"
+    WRITERS[ending](traces["plain"], path)
+    old = path.read_bytes()
+    WRITERS[ending](trace, path)
+    assert path.read_bytes() != old
+    assert names(tmp_path) == [f"a.{ending}"]
+
+
+REAL = """
+import smc_mujoco as smc
+scenario = smc.Scenario(
+    plant="duffing", law="classical", duration=0.01, contact="floor", mechanism="springs",
+    sensor=smc.Encoder(delay=0.001),
+    friction=(smc.Viscous(0.1), smc.Coulomb(0.1), smc.LuGre(0.1, 0.2, 0.05)),
+    actuator=(smc.DCMotor(), smc.Backlash(0.01)),
+    disturbance=(smc.Gust(1.0, 0.0, 0.1), smc.BandLimited(0.1, 1.0, 5.0), smc.TimeSeries((0.0, 1.0), (0.0, 1.0))),
+)
+"""
+
+
+def test_a_file_of_a_real_mechanism_loads_in_a_fresh_process(tmp_path):
+    for code in (REAL + "smc.run(scenario).save('a')", "import smc_mujoco as smc; print(smc.load('a.npz').scenario)"):
+        environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert "LuGre" in done.stdout
+
+
+def test_a_file_of_the_first_version_loads_with_what_its_actuator_gave(traces, tmp_path):
+    trace = traces["plain"]
+    with np.load(trace.save(tmp_path / "a.npz")) as file:
+        held = {name: file[name] for name in file if name not in ("force", "reaction")}
+    about = json.loads(str(held.pop("about")))
+    for name in ("mechanism", "friction", "contact", "actuator", "sensor", "left_out"):
+        del about[name]
+    np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
+    old = smc.load(tmp_path / "old.npz")
+    np.testing.assert_array_equal(old.force, trace.applied)
+    assert not old.reaction.any()

@@ -1,0 +1,23 @@
+"""Which laws a board of all laws ranks."""
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.gain_sets import FORMS
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.studies.paper.general_laws import general_laws
+
+
+def test_every_general_law_is_ranked_and_no_law_beside_itself():
+    found = general_laws(smc.paper.PLANTS, "default")
+    assert len(found) >= 35
+    assert not set(found) & {"none", "hierarchical", "swing_up", *FORMS}
+    assert {"adaptive_leak", "observer_free", "pid"} <= set(found)
+    assert all(name in found for name, law in catalogue().items() if not law.plants and name not in ("none", *FORMS))
+
+
+def test_a_law_without_gains_in_the_set_on_one_of_the_plants_is_left_out():
+    assert set(general_laws(["duffing"], "study")) <= set(smc.paper.GAINS["duffing"]) | {"conditioned_super_twisting"}
+    with pytest.raises(ScenarioError, match="set of gains"):
+        general_laws(["duffing"], "best")

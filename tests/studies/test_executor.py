@@ -1,0 +1,328 @@
+"""Where runs are computed makes no difference to what a study finds."""
+
+import json
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies import cluster, executor, run_key
+from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.study import study
+
+ROOT = Path(__file__).parents[2]
+
+
+def mixed() -> list[smc.Scenario]:
+    return grid(["duffing", "pendulum_network"], ["classical", "none"], ["nominal", "coulomb"], 3, "study", 0.05)
+
+
+@smc.law_function(gains={"when": 0.02})
+def fails_late(y, gains, memory):
+    return (math.nan if y.t > gains.when else -y.e), y.e
+
+
+@smc.law_function
+def slow(y, gains, memory):
+    return -float(str(y.e)), y.e  # numba knows no such float
+
+
+# batches
+
+
+@pytest.mark.parametrize("steps", [1, 200, 10**9])
+def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, steps):
+    monkeypatch.setattr(executor, "STEPS", steps)
+    scenarios = mixed()
+    found = list(executor.batches(scenarios, threads=2))
+    assert sorted(map(id, scenarios)) == sorted(id(s) for batch in found for s in batch)
+    for batch in found:
+        assert len({(s.plant.name, s.integrator, s.physics_step) for s in batch}) == 1
+        assert len(batch) == 1 or sum(s.work for s in batch) <= 2 * steps
+
+
+def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():
+    scenarios = [paper.scenario("duffing", "classical", seed=seed) for seed in range(400)]
+    assert max(len(batch) for batch in executor.batches(scenarios, threads=512)) <= executor.LOG_STEPS / 10_000
+
+
+def test_what_does_not_compile_goes_in_small_batches():
+    scenarios = [smc.Scenario(plant="duffing", law=slow(), seed=seed) for seed in range(4)]
+    assert [len(batch) for batch in executor.batches(scenarios, threads=2)] == [1, 1, 1, 1]
+
+
+def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
+    batch = [smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05) for w in (1.0, 0.01, 0.02)]
+    together = [executor.outcome(trace) for trace in executor.simulated(batch, 2)]
+    assert together == [executor.outcome(trace) for s in batch for trace in executor.simulated([s], 1)]
+    assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
+
+
+def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_heard():
+    batches = list(executor.batches(mixed(), threads=1))
+    finished = []
+    executor.local(batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces])))
+    assert [batch for batch, _ in finished] == [done for _, done in finished] == batches
+
+    for doomed in (batches[0], batches[-1]):
+
+        def full(batch, traces, doomed=doomed):
+            if batch is doomed:
+                raise smc.ScenarioError("no room")
+
+        with pytest.raises(smc.ScenarioError, match="no room"):
+            executor.local(batches, 1, full)
+
+
+# addresses
+
+
+@pytest.mark.parametrize(
+    "name", ["ray", "dask", "dask://", "dask://host", "dask://host:port", "dask://a:99999", None, 3, np.zeros(2)]
+)
+def test_an_executor_that_there_is_not_is_one_sentence(name):
+    with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"):
+        executor.checked(name)
+
+
+def test_without_the_package_the_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(smc.ScenarioError, match=r"pip install 'smc-mujoco\[cluster\]'"):
+        study(mixed(), tmp_path, executor="dask://localhost:1")
+
+
+# any Executor
+
+
+class Elsewhere(ThreadPoolExecutor):
+    """Workers that get bytes, as those of another process do; from task `last` on they come to an end."""
+
+    tasks, last = 0, 10**9
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks += 1
+        if self.tasks >= self.last:
+            return self.end()
+        fn, args, kwargs = pickle.loads(pickle.dumps((fn, args, kwargs)))
+        return super().submit(fn, *args, **kwargs)
+
+
+def died() -> Future:
+    future = Future()
+    future.set_exception(BrokenExecutor("a worker was killed"))
+    return future
+
+
+def cancelled() -> Future:
+    future = Future()
+    future.cancel()
+    future.set_running_or_notify_cancel()
+    return future
+
+
+def refused() -> Future:
+    raise RuntimeError("cannot schedule new futures after shutdown")
+
+
+def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
+    monkeypatch.setattr(executor, "STEPS", 200)
+    with Elsewhere(2) as pool:
+        study(mixed(), tmp_path / "elsewhere", executor=pool)
+        assert pool.submit(abs, -1).result() == 1  # it stays open
+    study(mixed(), tmp_path / "local")
+    tables = [(tmp_path / where / "results.parquet").read_bytes() for where in ("elsewhere", "local")]
+    assert pool.tasks > 4
+    assert tables[0] == tables[1]
+
+
+def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
+    monkeypatch.setattr(executor, "UNDER_WAY", 2)
+    finished = []
+    with Elsewhere(1) as pool:
+
+        def batches():
+            for scenario in mixed():
+                assert pool.tasks - len(finished) <= 2
+                yield [scenario]
+
+        executor.remote(batches(), pool, lambda batch, outcomes: finished.append(batch[0]))
+    assert sorted(map(repr, finished)) == sorted(map(repr, mixed()))
+
+
+@pytest.mark.parametrize("end", [died, cancelled, refused])
+def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(end, tmp_path, monkeypatch):
+    monkeypatch.setattr(executor, "STEPS", 200)
+    monkeypatch.setattr(executor, "UNDER_WAY", 1)
+    with Elsewhere(1) as pool:
+        pool.last, pool.end = 4, end
+        with pytest.raises(
+            smc.ScenarioError, match=r"^the executor has stopped \(.+\): start it and the study again to go on$"
+        ):
+            study(mixed(), tmp_path, executor=pool)
+    assert len(list((tmp_path / "parts").glob("*.parquet"))) == 3
+
+
+def test_what_ended_well_is_kept_before_an_error_is_told(monkeypatch):
+    batches, kept = [[scenario] for scenario in mixed()[:6]], []
+    ends = [died(), *(Future() for _ in batches[1:])]
+    for future in ends[1:]:
+        future.set_result([])
+    pool = Elsewhere(1)
+    pool.last, pool.end = 1, iter(ends).__next__
+    with pool, pytest.raises(smc.ScenarioError, match="a worker was killed"):
+        executor.remote(batches, pool, lambda batch, outcomes: kept.append(batch))
+    assert len(kept) == 5
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            ("smc_mujoco.studies.run_key.key", lambda scenario: "other"),
+            "a worker has other code for .*: install the same",
+        ),
+        (("pickle.loads", lambda data: smc.nowhere), "a worker says .*: put your laws in a module"),
+    ],
+)
+def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, monkeypatch):
+    batch = mixed()[:1]
+    keys = [run_key.key(s) for s in batch]
+    packed = pickle.dumps(batch)
+    monkeypatch.setattr(*change)
+    with pytest.raises(smc.ScenarioError, match=said):
+        executor.work(packed, keys)
+
+
+def test_a_law_without_a_module_cannot_be_sent():
+    law = smc.law_function(lambda y, gains, memory: (0.0, y.e))()
+    with Elsewhere(1) as pool, pytest.raises(smc.ScenarioError, match="define it at the top of a module"):
+        executor.remote([[smc.Scenario(plant="duffing", law=law)]], pool, lambda *found: None)
+
+
+# a cluster
+
+CLIENT = """
+import sys
+from pathlib import Path
+import smc_mujoco as smc
+from smc_mujoco.studies import cluster, executor
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.study import study
+
+out, address, executor.STEPS, cluster.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
+scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)
+try:
+    study(scenarios, out / "remote", executor=address)
+except smc.ScenarioError as error:
+    sys.exit(str(error))
+study(scenarios, out / "local")
+print((out / "remote" / "results.parquet").read_bytes() == (out / "local" / "results.parquet").read_bytes())
+"""
+
+
+def start(*arguments: str, log: Path) -> subprocess.Popen[str]:
+    with log.open("w") as file:
+        return subprocess.Popen(
+            [sys.executable, *arguments],
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=file,
+            text=True,
+        )
+
+
+def wait(there: Callable[[], object]) -> None:
+    end = time.monotonic() + 300
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def dask(tmp_path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """The address of a scheduler; its process, and those of its two workers."""
+    file = tmp_path / "scheduler.json"
+    common = "--no-dashboard", "--scheduler-file", str(file)
+    scheduler = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common]
+    worker = ["-m", "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *common]
+    worker += ["--local-directory", str(tmp_path)]
+    running = [start(*scheduler, log=tmp_path / "scheduler.log")]
+    try:
+        running += [start(*worker, log=tmp_path / f"worker{i}.log") for i in range(2)]
+        wait(lambda: file.exists() and file.stat().st_size)
+        yield json.loads(file.read_text())["address"].replace("tcp://", "dask://"), running
+    finally:
+        for process in running:
+            process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
+    """A study whose first parts the cluster has written."""
+    client = start("-c", CLIENT, str(tmp_path), dask[0], "60", log=tmp_path / "client.log")
+    parts = tmp_path / "remote" / "parts"
+    try:
+        wait(lambda: client.poll() is not None or len(list(parts.glob("*.parquet"))) >= 3)
+        assert client.poll() is None, (tmp_path / "client.log").read_text()
+        assert not (tmp_path / "remote" / "results.parquet").exists()  # there is work left
+        yield client
+    finally:
+        client.kill()
+        client.communicate()
+
+
+def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
+    _, (_, *workers) = dask
+    workers[0].send_signal(signal.SIGKILL)
+    said, _ = half_done.communicate(timeout=300)
+    assert (said, half_done.returncode) == ("True\n", 0), (tmp_path / "client.log").read_text()
+    assert (workers[0].poll(), workers[1].poll()) == (-signal.SIGKILL, None)
+
+
+def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
+    _, (scheduler, *_) = dask
+    scheduler.send_signal(signal.SIGKILL)
+    half_done.communicate(timeout=300)
+    log = (tmp_path / "client.log").read_text()
+    assert half_done.returncode == 1, log
+    assert "Traceback" not in log
+    assert log.splitlines()[-1].startswith(("the executor has stopped (dask", "no dask at ")), log
+    assert len(list((tmp_path / "remote" / "parts").glob("*.parquet"))) >= 3
+
+
+def test_without_a_scheduler_there_the_sentence_says_so(tmp_path):
+    client = start("-c", CLIENT, str(tmp_path), "dask://127.0.0.1:9", "0.5", log=tmp_path / "client.log")
+    client.communicate(timeout=300)
+    said = (tmp_path / "client.log").read_text().splitlines()[-1]
+    assert said.startswith("no dask at dask://127.0.0.1:9")
+    assert said.endswith("start `dask scheduler` and `dask worker` there")
+
+
+def test_a_result_that_comes_after_its_study_has_ended_is_dropped():
+    class Late:
+        def submit(self, fn, *args, **kwargs):
+            return self
+
+        def add_done_callback(self, told):
+            self.told = told
+
+        def result(self):
+            return 1
+
+    client = Late()
+    found = cluster._Workers(client).submit(abs, -1)
+    assert found.cancel()
+    client.told(client)
+    assert found.cancelled()

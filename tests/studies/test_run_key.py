@@ -1,0 +1,218 @@
+"""What tells runs apart: equal ones have one key, and whatever decides what a run does changes it."""
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import fingerprint, source
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.study import condition, key
+
+ROOT = Path(__file__).parents[2]
+
+
+def scenario(law: smc.Law, **fields) -> smc.Scenario:
+    return smc.Scenario(**({"plant": "duffing", "law": law, "duration": 0.05} | fields))
+
+
+@pytest.mark.parametrize("plant", scenarios.PLANTS)
+def test_every_condition_is_known_by_its_name(plant):
+    made = grid([plant], ["observer_free"], list(scenarios.CONDITIONS), 2, "study")
+    assert [condition(s) for s in made[::2]] == [condition(s) for s in made[1::2]] == list(scenarios.CONDITIONS)
+
+
+def test_a_condition_that_the_paper_has_not_is_told_by_what_differs():
+    assert condition(scenario(smc.law("classical"), u_max=4.0, seed=3)) == "u_max=4.0"
+    assert condition(scenario(smc.law("classical"), friction=smc.Coulomb(0.2))) == "friction=(Coulomb(level=0.2),)"
+    many = {"noise": smc.Noise(0.1, 0.2), "disturbance": (smc.Sine(0.1, 2.0), smc.Pulse(2.0, time=0.01, width=0.1))}
+    names = [condition(scenario(smc.law("classical"), input_delay=delay, **many)) for delay in (0.001, 0.002)]
+    assert len(set(names)) == 2
+    assert max(map(len, names)) < 80
+
+
+def test_equal_scenarios_have_one_key_and_others_another():
+    s = scenario(smc.law("classical"))
+    same = scenario(smc.law("classical"), physics_step=1e-3, integrator="RK4", x0=s.x0)
+    assert same == s
+    assert key(same) == key(s)
+    others = [
+        scenario(smc.law("classical", k=3.0)),
+        scenario(smc.law("adaptive")),
+        scenario(smc.law("classical"), seed=1),
+        scenario(smc.law("classical"), duration=0.06),
+        scenario(smc.law("classical"), plant=smc.plant("duffing", alpha=0.5)),
+    ]
+    assert len({key(s), *map(key, others)}) == 1 + len(others)
+
+
+def test_other_versions_are_other_runs(monkeypatch):
+    before = key(scenario(smc.law("classical")))
+    described = serialise.describe
+    monkeypatch.setattr(serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}})
+    assert key(scenario(smc.law("classical"))) != before
+
+
+LAW = """
+import math
+import smc_mujoco as smc
+from numba import njit
+GAIN = {constant}
+
+@njit
+def helper(x):
+    return {helper}
+
+@smc.law_function(gains={{"k": 1.0}})
+def mine(y, gains, memory):
+    return {law}, y.e
+
+class Push(smc.Signal):
+    amplitude: float = 1.0
+
+    @staticmethod
+    def value(t, p):
+        return {signal}, 0.0, 0.0
+"""
+
+
+def written(law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", signal="p.amplitude", before="") -> str:
+    """The key of a run under a law of the user's."""
+    space: dict = {"__name__": "written"}
+    text = before + LAW.format(law=law, helper=helper, constant=constant, signal=signal)
+    exec(compile(text, "written", "exec"), space)
+    return key(scenario(space["mine"](), disturbance=space["Push"]()))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        {"law": "-2.0 * gains.k * helper(y.e)"},
+        {"law": "gains.k * helper(y.e)"},
+        {"helper": "GAIN * math.tanh(x)"},
+        {"constant": "3.0"},
+        {"signal": "2.0 * p.amplitude"},
+    ],
+    ids=["constant of the law", "sign", "helper", "global constant", "signal"],
+)
+def test_an_edited_law_is_another_run(edit):
+    assert written() != written(**edit)
+
+
+def test_a_comment_or_a_line_more_is_no_edit():
+    assert written() == written() == written(before="# a comment\n\n")
+
+
+def test_a_key_does_not_depend_on_the_process():
+    made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"from smc_mujoco import grid; from smc_mujoco.studies.study import key; print(key({made}))",
+        ],
+        env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
+
+
+def test_a_function_that_reaches_itself_has_a_fingerprint():
+    def loop(n):
+        return loop(n - 1) if n else 0
+
+    assert fingerprint.of(loop) == fingerprint.of(loop)
+
+
+def test_an_object_that_is_called_is_told_by_what_it_holds():
+    class Policy:
+        def __init__(self, weights):
+            self.weights = weights
+
+        def __call__(self, y, gains, memory):
+            return float(self.weights @ [y.e, y.de]), y.e
+
+    one, same, other = (Policy(np.array(w)) for w in ([1.0, 2.0], [1.0, 2.0], [1.0, 3.0]))
+    assert fingerprint.of(one) == fingerprint.of(same) != fingerprint.of(other)
+
+
+class Weighted:
+    """Has methods that may be laws."""
+
+    def __init__(self, weight: float):
+        self.weight = weight
+
+    def law(self, y, gains, memory):
+        return self.weight * y.e, y.e
+
+
+def reaching(value: object, text: str = "THING(y.e)", before: str = "") -> Callable:
+    """A law that calls something global."""
+    space: dict = {"__name__": "written", "THING": value, "functools": functools}
+    exec(f"{before}\ndef law(y, gains, memory): return {text}, y.e", space)
+    return space["law"]
+
+
+def package(factor: float) -> ModuleType:
+    """A package with a module in it."""
+    inner, outer = ModuleType("mine.inner"), ModuleType("mine")
+    exec(f"def helper(x): return {factor} * x", vars(inner))
+    vars(outer)["inner"] = inner
+    return outer
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda k: Weighted(k).law,
+        lambda k: functools.partial(Weighted.law, weight=k),
+        lambda k: reaching(functools.partial(max, k)),
+        lambda k: reaching(np.vectorize(lambda x: k * x)),
+        lambda k: reaching(np.poly1d([k, 1.0])),
+        lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
+        lambda k: reaching(type("Table", (), {"values": (k, 1.0)}), "THING.values[0]"),
+        lambda k: reaching(None, "helper(y.e)", f"@functools.cache\ndef helper(x): return {k} * x"),
+    ],
+    ids=["method", "partial", "global partial", "vectorized", "object", "package", "class", "kept results"],
+)
+def test_what_a_law_reaches_in_any_way_tells_it_from_others(made):
+    assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
+
+
+def test_an_object_that_changed_is_another():
+    policy = Weighted(1.0)
+    before = fingerprint.of(policy)
+    policy.weight = 2.0
+    assert fingerprint.of(policy) != before
+
+
+def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(monkeypatch, tmp_path):
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=1.0)
+    package = tmp_path / "smc_mujoco"
+    shutil.copytree(source.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains"))
+    monkeypatch.setattr(source, "PACKAGE", package)
+
+    def now() -> str:
+        source.code.cache_clear()
+        return key(scenario)
+
+    same = now()
+    (package / "report" / "words.py").write_text("# other words")
+    (package / "claims" / "abstract.py").write_text("# other claims")
+    assert now() == same
+    (package / "harness.py").write_text("# another loop")
+    assert now() != same
+    source.code.cache_clear()

@@ -1,0 +1,311 @@
+"""Every shipped scene asks its question and runs; the paper's study has its conditions and its numbers."""
+
+import ast
+import contextlib
+import dataclasses
+import io
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import show
+from smc_mujoco.studies import scene as scenes
+
+FOLDER = Path(smc.__file__).parents[1] / "scenes"
+FILES = sorted(FOLDER.glob("*.py"))
+EVERY = pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+TEN = {
+    "inverted_pendulum",
+    "van_der_pol",
+    "duffing",
+    "pendulum_network",
+    "vdp_nominal",
+    "vdp_noise",
+    "vdp_disturbance",
+    "control_signals",
+    "delay",
+    "parameter_jump",
+}
+LAWS = ["observer_free", "classical", "adaptive", "super_twisting"]
+
+
+def shortened(scenario: smc.Scenario, duration: float = 0.1) -> smc.Scenario:
+    """The scenario over 0.1 s, a jump still at half time."""
+    jump = scenario.jump and dataclasses.replace(scenario.jump, time=duration / 2)
+    return dataclasses.replace(scenario, duration=duration, jump=jump)
+
+
+def docstring(path: Path) -> str:
+    return ast.get_docstring(ast.parse(path.read_text())) or ""
+
+
+# the scenes
+
+
+def test_the_ten_scenes_of_the_study_are_there_and_are_found_by_name():
+    assert set(scenes.scenes()) >= TEN
+    assert set(scenes.scenes()) == {path.stem for path in FILES}
+    assert all(scenes.find(name).samefile(FOLDER / f"{name}.py") for name in TEN)
+
+
+@EVERY
+def test_a_scene_asks_one_question_and_says_what_to_look_for(path):
+    question, *paragraphs = docstring(path).split("\n\n")
+    assert question.splitlines()[0].endswith("?")
+    assert question.count("?") == 1
+    assert sum(paragraph.startswith("Look for: ") for paragraph in paragraphs) == 1
+    assert scenes.question(path) == question.splitlines()[0]
+
+
+@EVERY
+def test_a_scene_is_15_to_40_lines(path):
+    assert 15 <= len(path.read_text().splitlines()) <= 40
+
+
+@EVERY
+def test_a_scene_uses_public_names_only(path):
+    tree = ast.parse(path.read_text())
+    nodes = list(ast.walk(tree))
+    imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert [ast.unparse(node) for node in imports] == ["import smc_mujoco as smc"]
+    used = {n.attr for n in nodes if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "smc"}
+    assert used <= set(dir(smc))
+    of_paper = {n.attr for n in nodes if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "smc.paper"}
+    assert not [name for name in of_paper if name.startswith("_") or not hasattr(smc.paper, name)]
+
+
+@EVERY
+def test_a_scene_runs_from_its_declaration_to_its_files(path, tmp_path):
+    declared = scenes.read(path)
+    scene = dataclasses.replace(
+        declared,
+        conditions={
+            condition: {label: shortened(scenario) for label, scenario in runs.items()}
+            for condition, runs in declared.conditions.items()
+        },
+    )
+    with contextlib.redirect_stdout(io.StringIO()):  # its progress bar
+        traces = show.simulate(scene, threads=None)
+    assert {c: list(runs) for c, runs in traces.items()} == {c: list(runs) for c, runs in declared.conditions.items()}
+    for condition, runs in traces.items():
+        for label, trace in runs.items():
+            assert trace.scenario == scene.conditions[condition][label]
+            assert trace.failure is None
+            assert trace.t[-1] == pytest.approx(0.1)
+    saved, drawn = show.save(traces, tmp_path), show.figures(scene, traces, tmp_path)
+    assert len(saved) == sum(map(len, traces.values()))
+    assert [smc.load(file).scenario for file in saved] == [scenario for _, _, scenario in scene.runs()]
+    assert len(drawn) == 2 * (1 if scene.figure == "signals" else len(traces))
+    assert all(file.stat().st_size > 1000 for file in drawn)
+    assert set(tmp_path.iterdir()) == {*saved, *drawn}
+
+
+@pytest.mark.parametrize("name", sorted(TEN))
+def test_a_scene_of_the_study_compares_all_laws_of_the_paper_under_the_same_conditions(name):
+    for runs in scenes.read(FOLDER / f"{name}.py").conditions.values():
+        assert [scenario.law.name for scenario in runs.values()] == LAWS
+        first, *others = runs.values()
+        for scenario in others:
+            assert dataclasses.replace(scenario, law=first.law) == first
+
+
+def test_a_seed_reaches_every_run_of_a_scene():
+    scene = scenes.read(FOLDER / "vdp_noise.py").seeded(7)
+    assert {scenario.seed for _, _, scenario in scene.runs()} == {7}
+
+
+# the study's conditions
+
+SINE = (smc.Sine(amplitude=0.2, omega=5.0),)
+CONDITIONS = {
+    "nominal": {},
+    "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
+    "sine": {"disturbance": SINE},
+    "constant": {"disturbance": (smc.Constant(0.2),)},
+    "step": {"disturbance": (smc.Step(0.2, time=5.0),)},
+    "pulse": {"disturbance": (smc.Pulse(2.0, time=5.0, width=0.1),)},
+    "process_noise": {"disturbance": (smc.OrnsteinUhlenbeck(sigma=0.2, tau=0.1),)},
+    "delay_1ms": {"input_delay": 0.001},
+    "delay_5ms": {"input_delay": 0.005},
+    "delay_10ms": {"input_delay": 0.01},
+    "delay_20ms": {"input_delay": 0.02},
+    "delay_50ms": {"input_delay": 0.05},
+    "light": {"mismatch": {"mass": 0.7}},
+    "heavy": {"mismatch": {"mass": 1.3}},
+    "period_10ms": {"control_period": 0.01, "physics_step": 0.001},
+    "period_20ms": {"control_period": 0.02, "physics_step": 0.001},
+    "period_50ms": {"control_period": 0.05, "physics_step": 0.001},
+    "differenced_5ms": {"velocity": smc.estimator("filtered_difference", tau=0.005)},
+    "differenced_5ms_noise": {
+        "velocity": smc.estimator("filtered_difference", tau=0.005),
+        "noise": smc.Noise(position=0.01, velocity=0.0),
+    },
+}
+JUMPS = {
+    "jump_mild": {
+        "inverted_pendulum": {"mass": 2.0},
+        "pendulum_network": {"mass": 2.0},
+        "inverted_pendulum_network": {"mass": 2.0},
+        "van_der_pol": {"mu": 3.0},
+        "duffing": {"alpha": 3.0},
+    },
+    "jump_hard": {
+        "inverted_pendulum": {"mass": 25.912},
+        "pendulum_network": {"mass": 11.062},
+        "inverted_pendulum_network": {"mass": 22.681},
+        "van_der_pol": {"mu": 9.0},
+        "duffing": {"alpha": 27.684},
+    },
+}
+COMMON = {
+    "duration": 10.0,
+    "control_period": 0.001,
+    "physics_step": 0.001,
+    "u_max": 6.0,
+    "integrator": "RK4",
+    "seed": 0,
+    "reference": smc.Constant(0.0),
+    "disturbance": (),
+    "noise": smc.Noise(),
+    "input_delay": 0.0,
+    "velocity": smc.estimator("measured"),
+    "mismatch": {},
+    "jump": None,
+}
+PLANTS = {
+    "inverted_pendulum": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81}, (0.5,)),
+    "van_der_pol": ({"M": 1.0, "mu": 1.0, "k": 1.0}, (2.0,)),
+    "duffing": ({"M": 1.0, "delta": 0.2, "alpha": -1.0, "beta": 1.0}, (1.5,)),
+    "pendulum_network": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5}, (0.8, -0.4, 0.6, -0.2, 0.5)),
+    "inverted_pendulum_network": (
+        {"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},
+        (0.8, -0.4, 0.6, -0.2, 0.5),
+    ),
+}
+GAINS = {
+    "inverted_pendulum": {
+        "observer_free": {"lam": 4.364, "k1": 9.708},
+        "classical": {"k": 1.945, "c": 12.0},
+        "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
+        "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
+        "adaptive_leak": {"gamma": 20.31, "c": 12.0, "leak": 8.865, "deadzone": 0.2114, "k0": 0.0},
+        "super_twisting": {"k1": 2.489, "k2": 16.92, "c": 10.04, "w_max": 6.0},
+    },
+    "van_der_pol": {
+        "observer_free": {"lam": 6.0, "k1": 1.976},
+        "classical": {"k": 6.0, "c": 2.849},
+        "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
+        "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
+        "adaptive_leak": {"gamma": 7.738, "c": 2.821, "leak": 0.9379, "deadzone": 0.03367, "k0": 0.0},
+        "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16, "w_max": 6.0},
+    },
+    "duffing": {
+        "observer_free": {"lam": 6.0, "k1": 3.076},
+        "classical": {"k": 3.91, "c": 3.576},
+        "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
+        "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
+        "adaptive_leak": {"gamma": 13.87, "c": 4.256, "leak": 2.979, "deadzone": 0.009447, "k0": 0.0},
+        "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061, "w_max": 6.0},
+    },
+    "pendulum_network": {
+        "observer_free": {"lam": 2.922, "k1": 6.19},
+        "classical": {"k": 0.9747, "c": 5.944},
+        "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
+        "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
+        "adaptive_leak": {"gamma": 24.32, "c": 9.468, "leak": 9.259, "deadzone": 0.3184, "k0": 0.0},
+        "super_twisting": {"k1": 1.87, "k2": 1.145, "c": 6.256, "w_max": 6.0},
+    },
+    "inverted_pendulum_network": {
+        "observer_free": {"lam": 3.961, "k1": 9.362},
+        "classical": {"k": 1.73, "c": 11.11},
+        "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
+        "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
+        "adaptive_leak": {"gamma": 28.47, "c": 11.36, "leak": 11.46, "deadzone": 0.153, "k0": 0.0},
+        "super_twisting": {"k1": 1.95, "k2": 1.057, "c": 9.086, "w_max": 6.0},
+    },
+}
+
+
+def stated(plant: str, condition: str) -> dict:
+    """The fields of a scenario of the study, but for its plant and law."""
+    if condition in JUMPS:
+        return COMMON | {"disturbance": SINE, "jump": smc.Jump(time=5.0, factors=JUMPS[condition][plant])}
+    return COMMON | CONDITIONS[condition]
+
+
+def test_the_study_has_these_conditions_and_no_other():
+    assert set(smc.paper.CONDITIONS) == {*CONDITIONS, *JUMPS, *smc.paper.REALISTIC}
+
+
+@pytest.mark.parametrize("condition", [*CONDITIONS, *JUMPS])
+@pytest.mark.parametrize("plant", PLANTS)
+def test_a_condition_of_the_study_has_its_numbers_and_changes_nothing_else(plant, condition):
+    comparison = smc.paper.comparison(plant, condition)
+    assert list(comparison) == LAWS
+    for name, scenario in comparison.items():
+        fields = {field: getattr(scenario, field) for field in COMMON}
+        assert fields == stated(plant, condition)
+        assert (scenario.law.name, dict(scenario.law.gains)) == (name, GAINS[plant][name])
+        parameters, x0 = PLANTS[plant]
+        assert (scenario.plant.name, dict(scenario.plant.parameters)) == (plant, parameters)
+        assert (scenario.x0, set(scenario.v0)) == (x0, {0.0})
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_study_has_gains_for_six_laws_and_the_baseline(plant):
+    for law, gains in GAINS[plant].items():
+        assert smc.paper.scenario(plant, law).law == smc.law(law, **gains)
+    assert smc.paper.scenario(plant, "none").law == smc.law("none")
+    assert set(smc.paper.GAINS[plant]) == set(GAINS[plant])
+    assert set(smc.paper.GAINS) == set(PLANTS) == {name for name in smc.plants() if not smc.plant(name).free}
+
+
+@pytest.mark.parametrize(
+    ("names", "near"),
+    [
+        (("dufing", "classical", "nominal"), "'duffing'"),
+        (("duffing", "clasical", "nominal"), "'classical'"),
+        (("duffing", "classical", "noize"), "'noise'"),
+    ],
+)
+def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names, near):
+    with pytest.raises(smc.ScenarioError, match=near):
+        smc.paper.scenario(*names)
+
+
+@pytest.mark.parametrize(
+    ("scene", "conditions"),
+    [
+        ("vdp_nominal", {"nominal": "nominal"}),
+        ("vdp_noise", {"noise": "noise"}),
+        ("vdp_disturbance", {"sine": "sine"}),
+        ("control_signals", {"nominal": "nominal", "noise": "noise", "sine": "sine"}),
+    ],
+)
+def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
+    declared = scenes.read(FOLDER / f"{scene}.py").conditions
+    assert declared == {name: smc.paper.comparison("van_der_pol", given) for name, given in conditions.items()}
+
+
+def test_the_delay_scene_delays_by_10_20_and_50_ms():
+    declared = scenes.read(FOLDER / "delay.py").conditions
+    delays = [{scenario.input_delay for scenario in runs.values()} for runs in declared.values()]
+    assert delays == [{0.01}, {0.02}, {0.05}]
+
+
+def test_the_jump_scene_jumps_mildly_and_hard_at_half_time():
+    declared = scenes.read(FOLDER / "parameter_jump.py").conditions
+    jumps = {name: {scenario.jump for scenario in runs.values()} for name, runs in declared.items()}
+    assert jumps == {"mild": {smc.Jump(5.0, {"mass": 2.0})}, "hard": {smc.Jump(5.0, {"mass": 25.912})}}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_what_happens_once_happens_at_half_time(plant):
+    for duration in (10.0, 4.0):
+        jumping = smc.paper.scenario(plant, "observer_free", "jump_mild", duration=duration)
+        assert jumping.jump is not None
+        assert jumping.jump.time == duration / 2
+        for condition in ("step", "pulse", "contact"):
+            (signal,) = smc.paper.scenario(plant, "observer_free", condition, duration=duration).disturbance
+            assert signal.time == duration / 2

@@ -1,0 +1,323 @@
+"""A study loses nothing: whatever befalls it, it ends with the same table, bit for bit."""
+
+import dataclasses
+import math
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli.commands.bench import bench
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.model import check_starts
+from smc_mujoco.studies import executor, keep, run_key, store
+from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.study import condition, study
+from smc_mujoco.studies.table import Table
+
+ROOT = Path(__file__).parents[2]
+
+
+def small(seeds: int = 2, conditions: tuple[str, ...] = ("nominal", "noise"), duration: float = 0.05) -> list:
+    return grid(["duffing"], ["observer_free", "classical"], conditions, seeds, "study", duration)
+
+
+def scenario(law: smc.Law, **fields) -> smc.Scenario:
+    return smc.Scenario(**({"plant": "duffing", "law": law, "duration": 0.05} | fields))
+
+
+def bytes_of(out: Path) -> bytes:
+    return (out / "results.parquet").read_bytes()
+
+
+@pytest.fixture
+def none_runs(monkeypatch):
+    """From now on a run is an error."""
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a finished run is run again")
+
+    return lambda: monkeypatch.setattr(executor, "simulated", refuse)
+
+
+@smc.law_function(gains={"k": 1.0, "when": 0.02})
+def fails_late(y, gains, memory):
+    return (math.nan if y.t > gains.when else -gains.k * y.e), y.e
+
+
+@smc.law_function
+def raises(y, gains, memory):
+    return 1.0 / (y.t - y.t), y.e
+
+
+# the grid
+
+
+def test_the_grid_is_every_combination_in_order():
+    made = grid(["duffing", "van_der_pol"], ["classical", "adaptive"], ["nominal", "noise"], 2, "study", duration=1.0)
+    names = [(s.plant.name, condition(s), s.law.name, s.seed) for s in made]
+    assert names == [
+        (plant, name, law, seed)
+        for plant in ("duffing", "van_der_pol")
+        for name in ("nominal", "noise")
+        for law in ("classical", "adaptive")
+        for seed in (0, 1)
+    ]
+
+
+def test_seed_0_is_the_papers_own_scenario():
+    (made,) = grid(["pendulum_network"], ["classical"], ["noise"], 1, "study")
+    assert made == paper.scenario("pendulum_network", "classical", "noise")
+
+
+def test_a_seed_starts_every_law_in_every_condition_alike_and_within_a_fifth_of_the_papers_start():
+    made = grid(["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study")
+    starts = {s.seed: {t.x0 for t in made if t.seed == s.seed} for s in made}
+    assert all(len(found) == 1 for found in starts.values())
+    home = np.array(made[0].plant.x0)
+    for seed, (x0,) in starts.items():
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(home.size)]
+        assert np.allclose(x0, home * (1.0 + 0.2 * np.array(z)))
+    assert starts[3] != starts[4]
+
+
+def test_no_start_lies_beyond_a_stop():
+    made = grid(paper.PLANTS, ["none"], ["contact"], 6, "study", duration=10.0)
+    assert all(0.8 <= x / home <= 1.0 for s in made if s.plant.n == 1 for x, home in zip(s.x0, s.plant.x0, strict=True))
+    assert len({(s.plant.name, s.x0) for s in made}) == len(paper.PLANTS) * 6
+    for plant in paper.PLANTS:
+        check_starts([s for s in made if s.plant.name == plant])
+
+
+def test_laws_may_come_with_gains_of_their_own():
+    law = smc.law("classical", k=2.5)
+    assert [s.law for s in grid(["duffing"], [law], ["nominal"], 1)] == [law]
+    assert [s.law for s in grid(["duffing"], [raises], ["nominal"], 1)] == [raises()]
+
+
+def test_whatever_can_be_gone_through_once_makes_the_grid():
+    names = [["duffing", "van_der_pol"], ["classical", "adaptive"], ["nominal", "noise"]]
+    once = grid(*map(iter, names), np.int64(2), "study")  # pyright: ignore[reportArgumentType]
+    assert once == grid(*names, np.arange(2), "study")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"plants": ["dufing"]}, "did you mean 'duffing'"),
+        ({"laws": ["clasical"]}, "did you mean 'classical'"),
+        ({"conditions": ["noisy"]}, "unknown condition"),
+        ({"seeds": 0}, "seeds is 0"),
+        ({"seeds": [-1]}, "seed is -1"),
+        ({"plants": 3}, "plants is 3: give several"),
+        ({"plants": [3]}, "plant is 3"),
+        ({"gains": "best"}, "unknown set of gains"),
+        ({"conditions": []}, "give several"),
+        ({"seeds": None}, "seeds is None: give a whole number"),
+        ({"plants": paper.PLANTS, "seeds": 10**6}, "5,000,000 runs: give fewer seeds"),
+    ],
+)
+def test_what_the_grid_cannot_make_is_one_sentence(change, said):
+    arguments = {"plants": ["duffing"], "laws": ["classical"], "conditions": ["noise"], "seeds": 1, "gains": "study"}
+    with pytest.raises(smc.ScenarioError, match=said) as error:
+        grid(**(arguments | change))
+    assert "\n" not in str(error.value)
+
+
+def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
+    with pytest.raises(smc.ScenarioError, match="cannot study 3"):
+        study([*small(), 3], tmp_path / "a")
+    with pytest.raises(smc.ScenarioError, match="unknown choice of traces"):
+        study(small(), tmp_path / "a", traces="some")
+    with pytest.raises(smc.ScenarioError, match="executor is 'ray'"):
+        study(small(), tmp_path / "a", executor="ray")
+    with pytest.raises(smc.ScenarioError, match="out is None: give the path"):
+        study(small(), None)  # pyright: ignore[reportArgumentType]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(smc.ScenarioError, match="cannot use"):
+        study(small(), tmp_path / "file")
+    assert not (tmp_path / "a").exists()
+
+
+def test_the_command_takes_no_names_for_none(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        bench(laws=",", out=tmp_path / "a")
+    assert "laws is []: give several" in capsys.readouterr().err
+
+
+# failures
+
+
+def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path, monkeypatch):
+    runs = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
+    study(runs, tmp_path / "together")
+    monkeypatch.setattr(executor, "STEPS", 1)
+    table = study(runs, tmp_path / "alone")
+    assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
+    said = table.column("failure")
+    assert ["returned" in said[i] for i in range(3)] == [True] * 3
+    assert "ZeroDivision" in said[3]
+    assert said[4:].tolist() == [None] * 4
+    assert np.allclose(table.column("diverged_at")[:4], [0.011, 0.021, 0.031, 0.0])
+    assert np.isnan(table.column("itae")).tolist() == [True] * 4 + [False] * 4
+
+
+# resuming
+
+
+def test_a_finished_study_runs_nothing_and_ends_with_the_same_bytes(tmp_path, none_runs):
+    study(small(), tmp_path)
+    before = bytes_of(tmp_path)
+    none_runs()
+    study(small(), tmp_path)
+    assert bytes_of(tmp_path) == before
+
+
+def test_a_study_says_how_many_runs_were_there(tmp_path, capsys):
+    study(small(seeds=2), tmp_path, progress=True)
+    assert capsys.readouterr().err == ""
+    study(small(seeds=3), tmp_path, progress=True)
+    assert capsys.readouterr().err == f"8 of 12 runs are in {tmp_path / 'parts'}\n"
+
+
+def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
+    study(small(seeds=2), tmp_path)
+    ran = []
+    honest = executor.simulated
+    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    study(small(seeds=3), tmp_path)
+    assert sorted(s.seed for s in ran) == [2] * 4
+    study(small(seeds=3), tmp_path / "anew")
+    assert bytes_of(tmp_path) == bytes_of(tmp_path / "anew")
+
+
+def test_without_resume_everything_is_run_anew_and_foreign_files_stay(tmp_path, monkeypatch):
+    study(small(), tmp_path)
+    (tmp_path / "parts" / "mine.parquet").write_text("not a part")
+    ran = []
+    honest = executor.simulated
+    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    study(small(), tmp_path, resume=False)
+    assert len(ran) == len(small())
+    assert (tmp_path / "parts" / "mine.parquet").exists()
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def foreign(path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"hash": ["a"]}), path)
+
+
+def other_scores(path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    pq.write_table(pq.read_table(path).replace_schema_metadata({"scores": "other"}), path)
+
+
+@pytest.mark.parametrize("harm", [cut, foreign, other_scores, lambda path: path.write_bytes(b"")])
+def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
+    monkeypatch.setattr(executor, "STEPS", 50)
+    study(small(), tmp_path)
+    before, parts = bytes_of(tmp_path), sorted((tmp_path / "parts").iterdir())
+    assert len(parts) > 3
+    harm(parts[1])
+    ran = []
+    honest = executor.simulated
+    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    study(small(), tmp_path)
+    assert 0 < len(ran) < len(small())
+    assert bytes_of(tmp_path) == before
+
+
+def test_a_byte_that_changed_in_a_part_never_reaches_the_table(tmp_path, monkeypatch):
+    import pyarrow.parquet as pq
+
+    study(small(), tmp_path)
+    before, (part,) = bytes_of(tmp_path), (tmp_path / "parts").iterdir()
+    whole, group = part.read_bytes(), pq.read_metadata(part).row_group(0)
+    columns = [group.column(i) for i in range(0, group.num_columns, 4)]
+    starts = [c.dictionary_page_offset or c.data_page_offset for c in columns]
+    values = [start + c.total_compressed_size - 1 for start, c in zip(starts, columns, strict=True)]  # the last of each
+    for position in [*np.linspace(0, len(whole) - 1, 6).astype(int), *values]:
+        part.write_bytes(whole[:position] + bytes([whole[position] ^ 0x55]) + whole[position + 1 :])
+        study(small(), tmp_path)
+        assert bytes_of(tmp_path) == before
+
+
+def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
+    study(small(), tmp_path)
+    described = serialise.describe
+    monkeypatch.setattr(serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}})
+    table = study(small(), tmp_path)
+    assert set(table.column("versions")) == {'{"mujoco": "99"}'}
+
+
+def test_what_a_kill_left_half_written_is_cleared_away_in_time(tmp_path):
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    old, new = parts / ".a.parquet", parts / ".b.parquet"
+    for path in (old, new):
+        path.write_text("half")
+    os.utime(old, (0.0, 0.0))
+    study(small(1), tmp_path)
+    assert not old.exists()
+    assert new.exists()  # of a study that may still run
+
+
+def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
+    scenarios = small(seeds=4)
+    study(scenarios, tmp_path / "one")
+    monkeypatch.setattr(executor, "STEPS", 1)
+    monkeypatch.setattr(store, "PARTS_HELD", 1)
+    shuffled = [scenarios[i] for i in np.random.default_rng(0).permutation(len(scenarios))]
+    study(shuffled, tmp_path / "two")
+    study(scenarios, tmp_path / "two")
+    assert bytes_of(tmp_path / "one") == bytes_of(tmp_path / "two")
+    monkeypatch.setattr(store, "GROUP", 3)
+    assert study(scenarios, tmp_path / "two").rows() == Table.read(tmp_path / "one").rows()
+
+
+# traces
+
+
+def test_the_worst_trace_of_each_plant_and_condition_is_saved(tmp_path):
+    scenarios = [*small(), scenario(fails_late())]
+    table = study(scenarios, tmp_path, traces="worst")
+    traces = [smc.load(path) for path in sorted((tmp_path / "traces").iterdir())]
+    assert [trace.failure is not None for trace in traces] == [False, True]  # noise, nominal
+    noisy = table.select(condition="noise")
+    assert smc.score(traces[0])["ultimate_bound"] == noisy.column("ultimate_bound").max()
+
+
+def test_what_failed_is_worst_then_what_never_settles_then_the_largest_bound_or_without_one_the_largest_overshoot():
+    columns = {
+        "plant": np.array(["pole"] * 3 + ["arm"] * 3 + ["cart"] * 2),
+        "condition": np.array(["nominal"] * 8),
+        "failure": np.array([None] * 7 + ["it fell"]),
+        "settling_time": np.array([4.0, np.inf, 1.0, np.inf, np.inf, 2.0, np.inf, np.nan]),
+        "ultimate_bound": np.array([0.0045, 0.0007, 0.1, *[np.nan] * 3, 9.0, np.nan]),
+        "overshoot": np.array([1.0, 1.0, 1.0, 5.0, 20.0, 90.0, 1.0, np.nan]),
+    }
+    assert keep.worst(SimpleNamespace(column=columns.get)) == [1, 4, 7]
+
+
+def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
+    study(small(), tmp_path / "a", traces="all")
+    assert len(list((tmp_path / "a" / "traces").iterdir())) == len(small())
+    none_runs()
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()}
+    study(small(), tmp_path / "a", traces="all")
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()} == before
+    row = run_key.row(small()[0])
+    file = keep.path(tmp_path / "a" / "traces", row)
+    assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"
+    assert dataclasses.replace(smc.load(file).scenario) == small()[0]

@@ -1,0 +1,152 @@
+"""The table of a study: its rows are the runs' scores, and from each its run can be made again."""
+
+import json
+import math
+import os
+from collections.abc import Iterator
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.store import Store
+from smc_mujoco.studies.study import condition, key, study
+from smc_mujoco.studies.table import Table, content
+
+
+def small(seeds: int = 2) -> list[smc.Scenario]:
+    return grid(["duffing"], ["observer_free", "classical"], ["nominal", "noise"], seeds, "study", duration=0.05)
+
+
+@smc.law_function(gains={"when": 0.02})
+def fails_late(y, gains, memory):
+    return (math.nan if y.t > gains.when else -y.e), y.e
+
+
+def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
+    scenarios = small()
+    table = study(scenarios, tmp_path)
+    for s, row in zip(scenarios, table.rows(), strict=True):
+        assert row["hash"] == key(s)
+        scores = smc.score(smc.run(s))
+        assert {name: row[name] for name in scores} == scores
+        assert (row["plant"], row["law"], row["condition"]) == (s.plant.name, s.law.name, condition(s))
+        assert (row["seed"], row["duration"], json.loads(row["gains"])) == (s.seed, s.duration, dict(s.law.gains))
+        assert (row["failure"], row["diverged_at"], row["spread_bound"]) == (None, None, None)
+
+
+def test_equal_runs_are_one_row_where_the_first_stands(tmp_path):
+    one, two, *_ = small(seeds=1)
+    table = study([two, one, two, one], tmp_path)
+    assert table.column("hash").tolist() == [key(two), key(one)]
+
+
+def test_a_table_is_read_back_selected_and_run_again(tmp_path):
+    scenarios = small()
+    study(scenarios, tmp_path)
+    table = Table.read(tmp_path / "results.parquet")
+    assert table.rows() == Table.read(tmp_path).rows()
+    chosen = table.select(law="classical", condition=["noise"])
+    assert set(zip(chosen.column("law"), chosen.column("condition"), strict=True)) == {("classical", "noise")}
+    i = len(chosen) - 1
+    assert chosen.scenario(i) == scenarios[-1]
+    assert np.array_equal(chosen.trace(i).x, smc.run(scenarios[-1]).x)
+    assert smc.score(chosen.trace(-1))["itae"] == chosen.column("itae")[-1]
+    assert np.isnan(table.column("spread_bound")).all()
+    with pytest.raises(smc.ScenarioError, match="did you mean 'classical'"):
+        table.select(law="clasical")
+    with pytest.raises(smc.ScenarioError, match="unknown plant of this table 3"):
+        table.select(plant=3)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(smc.ScenarioError, match="unknown column"):
+        table.column("itea")
+    with pytest.raises(smc.ScenarioError, match="has no row 8"):
+        table.scenario(8)
+
+
+def test_what_is_no_table_is_one_sentence(tmp_path):
+    with pytest.raises(smc.ScenarioError, match="no table at"):
+        Table.read(tmp_path)
+    (tmp_path / "results.parquet").write_text("nothing")
+    with pytest.raises(smc.ScenarioError, match="is no table"):
+        Table.read(tmp_path)
+
+
+def flipped(data: bytes, bits: int) -> Iterator[bytes]:
+    """The data with one bit flipped, so many times, all over it."""
+    for i in range(bits):
+        bit = i * (8 * len(data)) // bits + i % 7
+        yield data[: bit // 8] + bytes([data[bit // 8] ^ 1 << bit % 8]) + data[bit // 8 + 1 :]
+
+
+def test_no_bit_that_flips_makes_a_table_of_other_rows(tmp_path):
+    right = repr(study(small(), tmp_path).rows())
+    path, refused = tmp_path / "results.parquet", 0
+    for damaged in flipped(path.read_bytes(), 300):
+        path.write_bytes(damaged)
+        try:
+            assert repr(Table.read(path).rows()) == right
+        except smc.ScenarioError:
+            refused += 1
+    assert refused > 100
+
+
+def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
+    right = repr(study(small(), tmp_path).rows())
+    (path,) = (tmp_path / "parts").glob("*.parquet")
+    lost = 0
+    for damaged in flipped(path.read_bytes(), 300):
+        path.write_bytes(damaged)
+        store = Store(tmp_path)
+        store.open(resume=True)
+        if not store.where:
+            lost += 1
+            continue
+        assert len(store.where) == len(small())
+        store.collect([key(s) for s in small()])
+        assert repr(Table.read(tmp_path).rows()) == right
+    assert lost > 100
+
+
+def test_a_table_without_a_digest_is_read_and_a_part_without_one_is_computed_again(tmp_path):
+    rows = study(small(), tmp_path).rows()
+    paths = [tmp_path / "results.parquet", *(tmp_path / "parts").glob("*.parquet")]
+    for path in paths:  # as version 0.1 wrote them
+        old = pq.read_table(path)
+        pq.write_table(old.replace_schema_metadata({"scores": old.schema.metadata[b"scores"]}), path)
+    assert Table.read(tmp_path).rows() == rows
+    store = Store(tmp_path)
+    store.open(resume=True)
+    assert not store.where
+
+
+def test_a_digest_of_other_rows_is_refused_and_a_copy_of_some_rows_is_a_table(tmp_path):
+    table = study(small(), tmp_path)
+    path = tmp_path / "results.parquet"
+    metadata = {"digest": pq.ParquetFile(path).metadata.metadata[b"digest"]}
+    pq.write_table(table.data.slice(1).replace_schema_metadata(metadata), path)
+    with pytest.raises(smc.ScenarioError, match="it is damaged, or was changed, since it was written"):
+        Table.read(path)
+    pq.write_table(table.data.slice(1), path)
+    assert Table.read(path).rows() == table.rows()[1:]
+
+
+def test_null_and_nan_are_not_the_same_content():
+    columns = ([1.0, None], [1.0, math.nan], [None, 1.0])
+    assert len({content(pa.table({"x": pa.array(column)})) for column in columns}) == 3
+
+
+def test_a_pipe_is_no_table(tmp_path):
+    os.mkfifo(tmp_path / "results.parquet")
+    with pytest.raises(smc.ScenarioError, match="it is no regular file"):
+        Table.read(tmp_path)
+
+
+def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
+    s = smc.Scenario(plant="duffing", law=fails_late(when=1.0), duration=0.05)
+    table = study([s], tmp_path)
+    assert smc.score(table.trace(0)) == smc.score(smc.run(s))
+    with pytest.raises(smc.ScenarioError, match="came from a file without its code"):
+        Table.read(tmp_path).trace(0)

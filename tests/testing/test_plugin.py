@@ -1,0 +1,547 @@
+"""The pytest plugin: what a user's tests on step responses say when they pass, fail, are recorded and are mistaken."""
+
+import contextlib
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.testing import golden, report
+from smc_mujoco.testing.limits import Limit, Value
+from smc_mujoco.testing.response import respond
+
+ROOT = Path(__file__).parents[2]
+INSTALLED = bool(importlib.metadata.entry_points(group="pytest11", name="smc_mujoco"))
+PLUGIN = ("-p", "no:cacheprovider", *(() if INSTALLED else ("-p", "smc_mujoco.testing.plugin")))
+
+
+# settles a step of 0.2 rad in 0.422 s, and with phi = 2 not at all
+HEAD = """
+import pytest
+import smc_mujoco as smc
+
+def pendulum(step_response, phi=0.3, **fields):
+    law = smc.law("boundary_layer", k=6.0, c=8.0, phi=phi)
+    return step_response("inverted_pendulum", law, step=0.2, **{"duration": 1.0} | fields)
+
+"""
+BAD = """
+def test_it_settles(step_response):
+    r = pendulum(step_response, phi=2.0)
+    assert r.overshoot < 20
+    assert r.settling_time < 0.6 and r.tv_rate < 10
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    """What a session in this process would import is imported before it, for it is forgotten after it."""
+    response = respond("inverted_pendulum", smc.law("boundary_layer"), 0.2, "nominal", {"duration": 0.01})
+    assert response.max_u > 0
+
+
+@pytest.fixture(autouse=True)
+def at_a_terminal(monkeypatch):
+    """pytest cuts its summary short there, and does not where CI is set."""
+    monkeypatch.delenv("CI", raising=False)
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures cost half a second each; here only their names count."""
+    monkeypatch.setattr(report, "_figure", lambda traces, path, title: path)
+
+
+@pytest.fixture
+def session(pytester, undrawn):
+    """Run a test file, given as text, in a folder of its own; what pytest printed. outcomes: how many tests of each."""
+
+    def run(text: str, *options: str, **outcomes: int) -> str:
+        pytester.makepyfile(test_my_laws=HEAD + text)
+        done = pytester.runpytest_inprocess(*PLUGIN, *options)
+        done.assert_outcomes(**outcomes)
+        return done.stdout.str()
+
+    return run
+
+
+# pass and fail
+
+
+def test_a_good_law_passes(session):
+    session(
+        """
+def test_it_settles(step_response):
+    r = pendulum(step_response, friction=smc.Coulomb(0.05))
+    assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
+    r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))
+""",
+        passed=1,
+    )
+
+
+def test_a_bad_law_fails_with_a_table_of_metric_value_and_limit(session):
+    said = session(BAD, failed=1)
+    assert "assert (inf < 0.6" in said
+    assert "inverted_pendulum under boundary_layer(k=6, c=8, phi=2), step 0.2 rad" in said
+    rows = {line.split()[0]: re.split(r"  +", line) for line in said.splitlines() if re.match(r"\w+ {2,}\S", line)}
+    assert rows["metric"] == ["metric", "value", "limit", "ok"]
+    assert rows["settling_time"] == ["settling_time", "never", "< 0.6", "NO"]
+    assert rows["overshoot"][2:] == ["< 20", "yes"]
+    assert rows["steady_error"][1].endswith(" rad")
+    assert "tv_rate" in rows
+    assert "stick_time" not in rows  # no friction, nothing sticks
+
+
+def test_check_tells_all_limits_that_were_missed_at_once(session):
+    said = session(
+        "def test(step_response): pendulum(step_response, phi=2).check(settling_time=1, overshoot=5, max_u=6)", failed=1
+    )
+    assert "AssertionError: settling_time is never, not <= 1; overshoot is 11.3" in said
+    told = [re.split(r"  +", line[1:].strip()) for line in said.splitlines() if re.match(r"E +\w+  ", line)]
+    assert [(line[0], line[-1]) for line in told] == [
+        ("metric", "ok"),
+        ("settling_time", "NO"),
+        ("overshoot", "NO"),
+        ("max_u", "yes"),
+    ]
+
+
+def test_the_frames_of_this_package_stay_out_of_a_failure(session):
+    said = session(
+        """
+def test_check(step_response): pendulum(step_response, phi=2).check(settling_time=1)
+def test_plant(step_response): step_response("duffin", "classical", step=0.2)
+def test_metric(step_response): pendulum(step_response).check(setling_time=1)
+def test_limit(step_response): pendulum(step_response).check(settling_time="1 s")
+def test_failed(step_response): pendulum(step_response, mismatch={"mass": 1e-9}).settling_time
+""",
+        failed=5,
+    )
+    assert set(re.findall(r"^(\S+\.py):\d+: ", said, re.MULTILINE)) == {"test_my_laws.py"}
+    assert len(re.findall(r"^E +smc_mujoco.common.errors.ScenarioError: ", said, re.MULTILINE)) == 4
+
+
+def test_a_run_that_fails_says_why(session):
+    said = session(
+        "def test(step_response): pendulum(step_response, mismatch={'mass': 1e-9}).check(overshoot=5)", failed=1
+    )
+    assert re.search(
+        r"^E +AssertionError: inverted_pendulum under .*: the plant left the finite world", said, re.MULTILINE
+    )
+    assert "failed: the plant left the finite world" in said
+
+
+def test_a_test_that_passes_reports_nothing(session):
+    assert "step responses" not in session("def test(step_response): pendulum(step_response)", "-rA", passed=1)
+
+
+def test_a_report_has_the_responses_of_its_own_test_alone(session):
+    one = "(step_response): pendulum(step_response, phi=2).check(overshoot=(0.5, 1.0))"
+    said = session(f"def test_first{one}\ndef test_second{one}", failed=2)
+    assert len(re.findall(r"^overshoot +11\.3\d* % +0\.5 \.\. 1 +NO$", said, re.MULTILINE)) == 2
+    assert len(re.findall(r"^overshoot ", said, re.MULTILINE)) == 2
+
+
+def test_tests_that_share_a_response_have_limits_of_their_own(session):
+    said = session(
+        """
+@pytest.fixture(scope="module")
+def r(step_response): return pendulum(step_response)
+def test_first(r): assert r.settling_time < 0.6
+def test_second(r): assert r.overshoot < 0.1
+""",
+        failed=1,
+        passed=1,
+    )
+    assert re.search(r"^overshoot +1\.5\d* % +< 0\.1 +NO$", said, re.MULTILINE)
+    assert re.search(r"^settling_time +0\.42\d* s$", said, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        ("'duffing', 'clasical', step=1", "unknown law 'clasical': did you mean 'classical'?"),
+        ("'duffing', 'classical', step=0", "step is 0: give the height of the step"),
+        ("'duffing', 'classical', step='1'", "step is '1': give a number"),
+        (
+            "'duffing', 'classical', step=1, frction=1",
+            "unknown field of a Scenario 'frction': did you mean 'friction'?",
+        ),
+        (
+            "'duffing', 'classical', step=1, condition='noisy'",
+            "unknown condition 'noisy': did you",
+        ),
+        ("'cart_pole', 'none', step=1, condition='jump_mild'", "'jump_mild' has no numbers for plant 'cart_pole'"),
+        ("'duffing', 'classical', step=1, reference=smc.Step(2)", "leave it out, for it is the step of 1"),
+        ("'duffing', lambda y, g, m: (0.0, 0.0), step=1", "put @smc.law_function(gains={...}) above the function"),
+    ],
+)
+def test_a_mistake_is_one_sentence(step_response, call, sentence):
+    with pytest.raises(smc.ScenarioError) as said:
+        eval(f"step_response({call})", {"smc": smc, "step_response": step_response})
+    assert sentence in str(said.value)
+    assert "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize(
+    ("limits", "sentence"),
+    [
+        ({}, "check has no limits"),
+        ({"overshot": 5}, "unknown metric 'overshot': did you mean 'overshoot'?"),
+        ({"spread_bound": 5}, "spread_bound compares channels and duffing has one"),
+        ({"overshoot": (5, 1)}, "give the lower one first"),
+        ({"overshoot": (1, 2, 3)}, "give the most, or (least, most)"),
+    ],
+)
+def test_a_limit_that_is_none_is_one_sentence(step_response, limits, sentence):
+    r = step_response("duffing", "none", step=1, duration=0.01)
+    with pytest.raises(smc.ScenarioError, match=re.escape(sentence)):
+        r.check(**limits)
+
+
+# what a response is
+
+
+def test_a_response_starts_at_rest_at_zero_and_has_every_metric(step_response):
+    r = step_response("pendulum_network", "super_twisting", step=0.3, duration=0.05)
+    assert (r.trace.x[0] == 0).all()
+    assert (r.trace.v[0] == 0).all()
+    assert (r.trace.r == 0.3).all()
+    assert {name: float(value) for name, value in r.metrics.items()} == smc.score(r.trace)
+    assert all(getattr(r, name) is value for name, value in r.metrics.items())
+    assert set(r.metrics) <= set(dir(r))
+    with pytest.raises(AttributeError, match="unknown metric 'overshot': did you mean 'overshoot'"):
+        r.overshot  # noqa: B018
+    assert "\n" not in repr(r)
+
+
+@pytest.fixture
+def pole(step_response):
+    return step_response("cart_pole", "hierarchical", step=0.3, model="nominal", duration=1.0)
+
+
+def test_a_pole_on_a_cart_has_metrics_of_its_own_in_its_own_unit(pole):
+    assert (pole.trace.r == [0.3, 0.0]).all()
+    assert {name: float(value) for name, value in pole.scores["free"].items()} == smc.scores(pole.trace)["free"]
+    assert pole.metrics.keys() == pole.scores["driven"].keys() == smc.score(pole.trace).keys()
+    assert pole.scores["free"]["peak"] > 1e-4
+    assert not pole.scores["free"]["peak"] < 1e-4
+    peak = next(line for line in pole.table().splitlines() if line.startswith("free peak "))
+    assert peak.split()[3:] == ["rad", ">", "0.0001,", "<", "0.0001", "NO"]
+    assert pole.unit("peak") == "m"
+    with pytest.raises(AttributeError, match="spread_bound compares channels and cart_pole has one of a kind"):
+        pole.spread_bound  # noqa: B018
+
+
+def test_check_takes_metrics_of_a_group_by_its_name(pole):
+    pole.check(**{"free peak": 1.0, "free settling_time": 1.0})
+    with pytest.raises(AssertionError, match=r"^free peak is .* rad, not"):
+        pole.check(**{"free peak": 1e-6})
+    with pytest.raises(smc.ScenarioError, match="unknown metric 'free max_u'"):
+        pole.check(**{"free max_u": 1.0})
+
+
+def test_a_golden_metric_that_there_is_no_longer_is_told_with_its_cure(pole, tmp_path):
+    golden.record(tmp_path / "a.json", "test", pole, None, {"free peak": 0.1})
+    text = (tmp_path / "a.json").read_text().replace("free peak", "hinge peak")
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(
+        smc.ScenarioError, match=r"a\.json, test: unknown metric 'hinge peak'.*; or run pytest --smc-update"
+    ):
+        golden.compare(tmp_path / "a.json", "test", pole, None, {})
+
+
+def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
+    golden.record(tmp_path / "a.json", "test", pole, None, {})
+    golden.compare(tmp_path / "a.json", "test", pole, None, {})
+    text = (tmp_path / "a.json").read_text()
+    assert '"free peak"' in text
+    held = f'"value": {float(pole.scores["free"]["peak"])!r}'
+    assert text.count(held) == 1
+    (tmp_path / "a.json").write_text(text.replace(held, '"value": 9.0'))
+    with pytest.raises(AssertionError, match=r"^free peak is .* rad, golden 9 ±"):
+        golden.compare(tmp_path / "a.json", "test", pole, None, {})
+
+
+def test_a_condition_sets_its_fields_and_the_test_s_own_go_before_them(step_response):
+    r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, seed=7)
+    assert (r.scenario.noise, r.scenario.seed) == (smc.Noise(0.01, 0.05), 7)
+    r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, noise=smc.Noise(0.5))
+    assert r.scenario.noise == smc.Noise(0.5)
+
+
+def test_a_value_is_the_number_and_notes_what_it_was_compared_with():
+    noted = []
+    value = Value(0.5, "overshoot", noted)
+    assert value == 0.5
+    assert value < 0.6
+    assert not value < 0.4
+    assert value >= 0.1
+    assert max(value, Value(0.7, "overshoot", noted)) == 0.7
+    assert noted == [
+        Limit("overshoot", "< 0.6", True),
+        Limit("overshoot", "< 0.4", False),
+        Limit("overshoot", ">= 0.1", True),
+    ]
+
+
+# figure and film
+
+
+def test_a_failing_test_attaches_its_figure_and_with_smc_video_its_film(pytester, monkeypatch):
+    pytester.makepyfile(test_my_laws=HEAD + BAD.replace("phi=2.0", "phi=2.0, duration=0.1"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *sys.path]))
+    # in a process of its own: a renderer that this one forgets would be opened twice
+    said = pytester.runpytest_subprocess(*PLUGIN, "--smc-video").stdout.str()
+    (figure,) = re.findall(r"^figure: (.*)$", said, re.MULTILINE)
+    assert Path(figure).read_bytes().startswith(b"\x89PNG")
+    assert "smc_mujoco" in Path(figure).parts  # a folder in pytest's temporary one
+    films = re.findall(r"^film: (.*)$", said, re.MULTILINE)
+    assert len(films) == (gl.missing() is None)
+    assert all(Path(film).stat().st_size > 1000 for film in films)
+    assert list(pytester.path.glob("*.png")) == []
+
+
+def test_figures_go_where_smc_out_says_one_for_each_plant(session, pytester):
+    said = session(
+        """
+def test_a(step_response):
+    for plant in ("duffing", "van_der_pol", "duffing"):
+        step_response(plant, "none", step=0.1, duration=0.1)
+    assert False
+""",
+        "--smc-out=out",
+        failed=1,
+    )
+    names = [f"test_my_laws.py_test_a-{plant}.png" for plant in ("duffing", "van_der_pol")]
+    assert re.findall(r"^figure: (.*)$", said, re.MULTILINE) == [str(pytester.path / "out" / name) for name in names]
+
+
+def test_a_figure_that_cannot_be_drawn_hides_nothing(session, monkeypatch):
+    monkeypatch.setattr(report, "_figure", lambda traces, path, title: 1 / 0)
+    said = session(BAD, failed=1)
+    assert re.findall(r"^(?:no )?figure.*$", said, re.MULTILINE) == ["no figure: division by zero"]
+    assert "assert (inf < 0.6" in said
+
+
+def test_without_a_renderer_smc_video_is_one_sentence(session, monkeypatch):
+    monkeypatch.setattr(gl, "missing", lambda: "no film: nothing renders here")
+    said = session(BAD, "--smc-video", failed=1)
+    assert re.findall(r"^(?:no )?film.*$", said, re.MULTILINE) == ["no film: nothing renders here"]
+
+
+# golden metrics
+
+GOLDEN = """
+def test_as_ever(step_response, golden):
+    r = pendulum(step_response, phi=PHI)
+    golden(r, settling_time=0.001, overshoot=0.5)
+    golden(r)
+"""
+
+
+def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
+    good, other = GOLDEN.replace("PHI", "0.3"), GOLDEN.replace("PHI", "0.35")
+    said = session(good, failed=1)
+    assert (
+        "test_my_laws.golden.json has no golden settling_time, overshoot of test_as_ever: run pytest --smc-update"
+        in said
+    )
+    said = session(good, "--smc-update", passed=1)
+    assert f"golden metrics recorded in {pytester.path / 'test_my_laws.golden.json'}" in said
+    session(good, passed=1)
+    said = session(other, failed=1)
+    assert set(re.findall(r"^(\S+\.py):\d+: ", said, re.MULTILINE)) == {"test_my_laws.py"}
+    assert re.search(r"^E +AssertionError: settling_time is 0\.\d+ s, golden 0\.422 ± 0\.001 \(", said, re.MULTILINE)
+    assert "if it is meant, run pytest --smc-update)" in said
+    assert re.search(r"^E +overshoot +1\.\d+ % +1\.\d+ ± 0\.5 +yes$", said, re.MULTILINE)
+    session(other, "--smc-update", passed=1)
+    session(other, passed=1)
+
+
+def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
+    session(GOLDEN.replace("PHI", "2.0"), "--smc-update", passed=1)
+    held = json.loads((pytester.path / "test_my_laws.golden.json").read_text(), parse_constant=pytest.fail)
+    assert list(held) == ["test_as_ever", "test_as_ever 2"]
+    assert held["test_as_ever"]["settling_time"] == {"value": "Infinity", "tolerance": 0.001, "unit": "s"}
+    assert len(held["test_as_ever 2"]) > 10
+    assert "stick_time" not in held["test_as_ever 2"]
+    session(GOLDEN.replace("PHI", "2.0"), passed=1)  # "never" is as golden as a number
+
+
+def test_recording_one_test_keeps_the_others(session, pytester):
+    both = "".join(f"def test_{x}(step_response, golden): golden(pendulum(step_response), overshoot=1)\n" for x in "ab")
+    session(both, "--smc-update", passed=2)
+    before = (pytester.path / "test_my_laws.golden.json").read_bytes()
+    session(both, "--smc-update", "-k", "test_b", passed=1, deselected=1)
+    assert (pytester.path / "test_my_laws.golden.json").read_bytes() == before
+    assert list(json.loads(before)) == ["test_a", "test_b"]
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"test": 3}'])
+def test_a_broken_golden_file_is_one_sentence(tmp_path, text):
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(smc.ScenarioError, match=r"a\.json cannot be read .*: delete it and run pytest --smc-update"):
+        golden.read(tmp_path / "a.json")
+
+
+def test_where_nothing_can_be_recorded_is_one_sentence(step_response, tmp_path, monkeypatch):
+    def refuse(_):
+        raise PermissionError(13, "Permission denied")
+
+    response = step_response("duffing", "none", step=0.1, duration=0.01)
+    monkeypatch.setattr(golden, "replacing", refuse)  # nothing is forbidden to root
+    with pytest.raises(smc.ScenarioError, match=r"a\.json cannot be written \(Permission denied\): record"):
+        golden.record(tmp_path / "a.json", "test", response, None, {"overshoot": 1.0})
+    for put in (golden.record, golden.compare):
+        with pytest.raises(smc.ScenarioError, match=r"golden is given 0\.5: give what step_response returned"):
+            put(tmp_path / "a.json", "test", 0.5, None, {})
+
+
+@pytest.mark.parametrize(
+    ("rel", "tolerances", "off"),
+    [(None, {}, False), (1e-6, {}, True), (None, {"tv": 9}, False), (1e-6, {"tv": 9}, True), (None, {"tv": 0}, True)],
+)
+def test_what_a_test_says_goes_before_the_tolerances_of_the_file(step_response, tmp_path, rel, tolerances, off):
+    runs = [step_response("duffing", smc.law("boundary_layer", k=k), step=0.1, duration=0.5) for k in (3.0, 3.001)]
+    golden.record(tmp_path / "a.json", "test", runs[0], None, {})
+    try:
+        golden.compare(tmp_path / "a.json", "test", runs[1], rel, tolerances)
+    except AssertionError:
+        assert off
+    else:
+        assert not off
+
+
+@pytest.mark.parametrize(("recorded", "off"), [(1e-12, False), (1e-6, True)])
+def test_of_a_metric_that_is_zero_no_share_is_asked_but_more_than_rounding_is_told(
+    step_response, tmp_path, recorded, off
+):
+    response, file = step_response("duffing", "none", step=0.1, duration=0.01), tmp_path / "a.json"
+    assert response.overshoot == 0
+    golden.record(file, "test", response, None, {"overshoot": 1.0})
+    file.write_text(file.read_text().replace('"value": 0.0', f'"value": {recorded}'))
+    with pytest.raises(AssertionError, match="overshoot is 0 %") if off else contextlib.nullcontext():
+        golden.compare(file, "test", response, 0.01, {})
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no lock there")
+def test_tests_that_record_at_once_lose_nothing(step_response, tmp_path):
+    response = step_response("duffing", "none", step=0.1, duration=0.01)
+    assert response.overshoot == 0
+
+    def put(test: int) -> None:
+        golden.record(tmp_path / "a.json", f"test {test}", response, None, {"overshoot": 1.0})
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(put, range(40)))
+    assert len(json.loads((tmp_path / "a.json").read_text())) == 40
+
+
+# the marker
+
+
+def test_the_marker_makes_a_test_for_each_plant_and_condition(session):
+    said = session(
+        """
+@pytest.mark.smc(plants=["duffing", "van_der_pol"], conditions=["nominal", "noise"])
+def test_both(step_response, plant, condition):
+    r = step_response(plant, "none", step=0.1, condition=condition, duration=0.01)
+    assert (r.scenario.plant.name, bool(r.scenario.noise.position)) == (plant, condition == "noise")
+
+@pytest.mark.smc
+def test_all(plant): assert plant in smc.paper.GAINS
+
+@pytest.mark.smc(conditions="sine")
+def test_one(condition): assert condition == "sine"
+
+def test_with_a_plant_of_its_own(plant): assert plant == 3
+
+@pytest.fixture
+def plant(): return 3
+""",
+        "-rA",
+        "--strict-markers",
+        passed=4 + len(smc.paper.GAINS) + 2,
+    )
+    assert "test_both[duffing-noise]" in said or "test_both[noise-duffing]" in said
+
+
+@pytest.mark.parametrize(
+    ("marker", "arguments", "sentence"),
+    [
+        ("plants=['dufing']", "plant", "unknown plant 'dufing': did you mean 'duffing'?"),
+        ("conditions=['noisy']", "condition", "unknown condition 'noisy': did you mean 'noise'?"),
+        ("plant=['duffing']", "plant", "unknown argument of marker smc 'plant': did you mean 'plants'?"),
+        ("plants=[]", "plant", "plants of marker smc is []: give names, as in @pytest.mark.smc("),
+        ("['duffing']", "plant", "marker smc is given ['duffing']: name its arguments"),
+        ("plants=['duffing']", "condition", "marker smc gives plants and the test takes no plant: add the argument"),
+        ("", "", "marker smc is on a test that takes neither plant nor condition: add the arguments"),
+    ],
+)
+def test_a_wrong_marker_is_one_sentence(session, marker, arguments, sentence):
+    said = session(f"@pytest.mark.smc({marker})\ndef test_it({arguments}): pass", errors=1)
+    assert f"test_my_laws.py::test_it: {sentence}" in said
+    assert "Traceback" not in said
+    assert "raise " not in said
+
+
+# what it costs who does not use it
+
+UNUSED = """
+import os, sys
+def test_nothing_is_loaded():
+    assert not {"numpy", "mujoco", "numba", "matplotlib"} & set(sys.modules)
+    assert WISH in (None, os.environ["MUJOCO_GL"])
+def test_used_later_it_chooses_a_renderer_as_ever():
+    USE
+    assert "mujoco" in sys.modules
+    assert os.environ.get("MUJOCO_GL")
+"""
+
+
+@pytest.mark.parametrize(
+    ("wish", "use"),
+    [
+        (None, "from smc_mujoco.mechanisms.plant import plant"),
+        ("glfw", "import smc_mujoco; smc_mujoco.mechanisms.plant"),
+    ],
+)
+def test_unused_it_imports_nothing_heavy_and_keeps_the_renderer_that_was_wished_for(tmp_path, wish, use):
+    (tmp_path / "test_user.py").write_text(UNUSED.replace("WISH", repr(wish)).replace("USE", use))
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "MUJOCO_GL"))}
+    variables = clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "100"} | ({"MUJOCO_GL": wish} if wish else {})
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *PLUGIN, "test_user.py"],
+        cwd=tmp_path,
+        env=variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {path.name for path in tmp_path.iterdir()} - {"__pycache__"} == {"test_user.py"}
+
+
+def test_blocked_it_is_not_missed(pytester):
+    pytester.makepyfile("def test(request): assert not request.config.pluginmanager.hasplugin('smc_mujoco')")
+    pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:smc_mujoco").assert_outcomes(passed=1)
+
+
+def test_what_the_readme_shows_passes(pytester, undrawn):
+    text = (ROOT / "README.md").read_text()
+    (block,) = [
+        b for b in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL) if "step_response" in b
+    ]
+    pytester.makepyfile(test_my_laws=block)
+    outcomes = pytester.runpytest_inprocess(*PLUGIN).parseoutcomes()
+    assert set(outcomes) - {"warning", "warnings"} == {"passed"}  # pytest warns where it loads the plugin itself
