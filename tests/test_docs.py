@@ -30,7 +30,8 @@ def test_the_contents_name_every_page_once():
 
 def test_the_reference_names_every_public_name_where_it_is_defined():
     named = re.findall(r"^::: smc_mujoco\.(\S+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
-    homes = {home if name == home == "paper" else f"{home}.{name}" for name, home in smc._HOME.items()}
+    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {smc._MODULES["paper"]}
+    homes = {home.removeprefix("smc_mujoco.") for home in homes}
     assert homes <= set(named)
     assert len(named) == len(set(named))
     assert {name for name in set(named) - homes if not name.startswith(("pytest_plugin.", "testing."))} == set()

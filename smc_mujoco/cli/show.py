@@ -11,13 +11,12 @@ from rich.console import Console
 from smc_mujoco.cli import tables
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import catalogue as plants
-from smc_mujoco.simulation.batch import contents
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import scene
@@ -90,10 +89,7 @@ def _title(scene: Scene, condition: str) -> str:
 def compile_laws(scene: Scene) -> None:
     """Compile what the scene's runs name, ahead of running them; what does not compile runs in the plain loop."""
     for _, _, scenario in scene.runs():
-        try:
-            contents(scenario)
-        except NotCompilable:
-            continue
+        prepare(scenario)
 
 
 def simulate(scene: Scene, threads: int | None) -> Traces:

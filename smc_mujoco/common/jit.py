@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from llvmlite import ir
-from numba import njit, types
+from numba import from_dtype, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
@@ -53,6 +53,20 @@ def _pointer_to(kind: types.Type) -> Callable:
 
 pointer = _pointer_to(types.float64)  # an address as a pointer to float64
 integers = _pointer_to(types.int64)  # an address as a pointer to int64
+
+
+def record_at(dtype: Any) -> Callable:
+    """A compiled function that reads the address of a NumPy record of this dtype as that record."""
+    record = from_dtype(dtype)
+
+    @intrinsic
+    def at(typingctx, address):
+        def codegen(context, builder, signature, args):
+            return builder.inttoptr(args[0], context.get_value_type(record))
+
+        return record(types.intp), codegen
+
+    return at
 
 
 @intrinsic

@@ -10,3 +10,28 @@ def modules(package: str) -> Iterator[ModuleType]:
     """Every module of a package, imported."""
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         yield importlib.import_module(f"{package}.{info.name}")
+
+
+# Where the modules of this package that files name were when the files were written -> where they are.
+FORMER_PLACES = {
+    "smc_mujoco.actuators": "smc_mujoco.mechanisms.hardware.drives",
+    "smc_mujoco.backlash": "smc_mujoco.mechanisms.hardware.backlash",
+    "smc_mujoco.contact": "smc_mujoco.mechanisms.hardware.contact",
+    "smc_mujoco.friction": "smc_mujoco.mechanisms.hardware.friction",
+    "smc_mujoco.sensors": "smc_mujoco.mechanisms.hardware.encoder",
+    "smc_mujoco.plants": "smc_mujoco.mechanisms.plants",
+    "smc_mujoco.laws": "smc_mujoco.control.laws",
+    "smc_mujoco.surfaces": "smc_mujoco.control.surfaces",
+    "smc_mujoco.estimators": "smc_mujoco.control.estimators",
+    "smc_mujoco.signals": "smc_mujoco.simulation.signals",
+    "smc_mujoco.references": "smc_mujoco.simulation.references",
+    "smc_mujoco.series": "smc_mujoco.simulation.time_series",
+}
+
+
+def present_place(module: str) -> str:
+    """The name that a module, named in a file, has now."""
+    for former, present in FORMER_PLACES.items():
+        if module == former or module.startswith(f"{former}."):
+            return present + module.removeprefix(former)
+    return module

@@ -21,7 +21,6 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.core import Setting
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.channels import V_SENSOR, X_SENSOR
 from smc_mujoco.simulation.guarded import Failure
 
 
@@ -72,8 +71,8 @@ class Agent:
         if k == 0:
             self.forget()
         x, v = _positions_and_velocities(observation, n)
-        loop.data.sensordata[loop.table[:, X_SENSOR]] = x
-        loop.data.sensordata[loop.table[:, V_SENSOR]] = v
+        loop.data.sensordata[loop.channels["x_sensor"]] = x
+        loop.data.sensordata[loop.channels["v_sensor"]] = v
         try:
             with np.errstate(all="ignore"):
                 u, loop.s = loop.decide(*loop.measure(loop.data, k), k)

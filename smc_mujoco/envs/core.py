@@ -23,8 +23,8 @@ from smc_mujoco.mechanisms.plant import Plant, ready
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as assembly
-from smc_mujoco.simulation.channels import CTRL, QPOS, QVEL, channels
-from smc_mujoco.simulation.controller import HUGE, WORLD
+from smc_mujoco.simulation.channels import channels
+from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.guarded import Failure, signalled
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -157,19 +157,21 @@ class Setting:
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Whether x, v (..., n) are outside the finite world, where an episode ends without reward."""
-        return ~(np.vecdot(x, x) + np.vecdot(v, v) < WORLD**2)
+        return ~(np.vecdot(x, x) + np.vecdot(v, v) < MAX_STATE**2)
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:
     """An observation from outside the finite world, the last of its episode, as numbers that end there."""
-    return np.clip(np.nan_to_num(observation, nan=WORLD, posinf=WORLD, neginf=-WORLD), -WORLD, WORLD)
+    return np.clip(
+        np.nan_to_num(observation, nan=MAX_STATE, posinf=MAX_STATE, neginf=-MAX_STATE), -MAX_STATE, MAX_STATE
+    )
 
 
 def _culprit(action: Any, a: np.ndarray, shape: tuple[int, ...]) -> str:
     """A refused action in words: of many copies the first one that is not finite."""
     if a.shape != shape or a.ndim < 2:
         return shown(action)
-    i = int(np.argmin(np.abs(a).max(axis=-1) < HUGE))
+    i = int(np.argmin(np.abs(a).max(axis=-1) < MAX_CONTROL))
     return f"{shown(a[i].tolist())} for copy {i}"
 
 
@@ -235,9 +237,9 @@ def _built(scenario: Scenario, task: Task, spread: Pair, edit: Callable[[mujoco.
         task=task,
         scenario=scenario,
         model=model,
-        qpos=table[:, QPOS],
-        qvel=table[:, QVEL],
-        ctrl=table[: scenario.plant.driven, CTRL],
+        qpos=table["qpos"],
+        qvel=table["qvel"],
+        ctrl=table["ctrl"][: scenario.plant.driven],
         rotors=np.array(rotors, int).reshape(-1, 3).T,
         which=task.which(scenario.plant),
         low=spread[0],

@@ -21,7 +21,7 @@ from smc_mujoco.common.extras import extra
 from smc_mujoco.envs import registration
 from smc_mujoco.envs.core import Setting, bounded, setting
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.controller import WORLD
+from smc_mujoco.simulation.controller import MAX_STATE
 
 with extra("rl", "smc_mujoco.envs.gymnasium_env"):
     import gymnasium
@@ -38,9 +38,9 @@ def action_space(found: Setting) -> spaces.Box:
 
 def observation_space(found: Setting) -> spaces.Box:
     """The finite world; for r, r', r'' as much more as they take."""
-    high = np.full(found.size, WORLD)
+    high = np.full(found.size, MAX_STATE)
     if found.task.moving:
-        high[-3:] = np.maximum(WORLD, np.abs(found.references).max(axis=0))
+        high[-3:] = np.maximum(MAX_STATE, np.abs(found.references).max(axis=0))
     return spaces.Box(-high, high, dtype=np.float64)
 
 

@@ -1,10 +1,10 @@
-"""The harness as MuJoCo's control callback: one C function for every simulation of the process.
+"""MuJoCo's control callback: one C function for every simulation of the process.
 
     with installed():
         batch.step(nstep=1000)
 
 The callback is global to the process: `installed` holds a lock, and puts back what was there before. Simulations
-whose userdata hold no row of ours are left alone.
+whose userdata hold no record of ours are left alone.
 """
 
 # pyright: reportCallIssue=false
@@ -16,59 +16,68 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
-from numba import carray, types
+from numba import types
 
 from smc_mujoco.common.jit import compiled, integers, pointer
 from smc_mujoco.common.mjcb import held, uninstalled
 from smc_mujoco.simulation import offsets
-from smc_mujoco.simulation.controller import control as run_row
-from smc_mujoco.simulation.state import HEADER, IS_ROW
+from smc_mujoco.simulation.controller import Arrays
+from smc_mujoco.simulation.controller import control as run_simulation
+from smc_mujoco.simulation.state import simulation_at
 
 with uninstalled():  # this import compiles a model: done here, before a run of ours that it would have to wait for
     import mujoco.batch
 
+USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simulation's record
+
 
 @functools.cache
-def mark() -> float:
-    """What a row of ours begins with: changes with any of our modules, so that no cached harness reads a newer row."""
-    sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+def magic() -> float:
+    """Magic number that marks our userdata.
+
+    A hash of the sources, so that a stale compiled callback ignores a record written by newer code.
+    """
+    rooms = Path(__file__).parent, Path(__file__).parents[1] / "common", Path(__file__).parents[1] / "control"
+    sources = b"".join(path.read_bytes() for room in rooms for path in sorted(room.glob("*.py")))
     return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 
 
 @functools.cache
-def harness():
+def callback():
     """The compiled callback void(const mjModel*, mjData*), from numba's cache on disk where there is one."""
-    at, ours = offsets.offsets(), mark()
-    nuserdata, qpos, qvel, ctrl, applied, xfrc, userdata, sensors, tips, anchors, actuators, constraints = at
+    at, ours = offsets.offsets(), magic()
+    nuserdata, userdata = at.nuserdata, at.userdata
+    qpos, qvel, ctrl, xfrc, qfrc = at.qpos, at.qvel, at.ctrl, at.xfrc_applied, at.qfrc_applied
+    sensors, xipos, xanchor = at.sensordata, at.xipos, at.xanchor
+    actuators, constraints = at.actuator_force, at.qfrc_constraint
 
     def control(model, data):
-        if integers(model + nuserdata)[0] < HEADER:
+        if integers(model + nuserdata)[0] < USERDATA:
             return
-        base = integers(data + userdata)[0]
-        row = carray(pointer(base), (1 << 40,))
-        if row[IS_ROW] != ours:
+        ours_or_not = pointer(integers(data + userdata)[0])
+        if ours_or_not[0] != ours:
             return
-        run_row(
-            base,
-            row,
-            carray(pointer(integers(data + qpos)[0]), (1 << 40,)),
-            carray(pointer(integers(data + qvel)[0]), (1 << 40,)),
-            carray(pointer(integers(data + ctrl)[0]), (1 << 40,)),
-            carray(pointer(integers(data + xfrc)[0]), (1 << 40,)),
-            carray(pointer(integers(data + sensors)[0]), (1 << 40,)),
-            carray(pointer(integers(data + tips)[0]), (1 << 40,)),
-            carray(pointer(integers(data + anchors)[0]), (1 << 40,)),
-            carray(pointer(integers(data + actuators)[0]), (1 << 40,)),
-            carray(pointer(integers(data + constraints)[0]), (1 << 40,)),
-            carray(pointer(integers(data + applied)[0]), (1 << 40,)),
+        address = int(ours_or_not[1])
+        arrays = Arrays(
+            pointer(integers(data + qpos)[0]),
+            pointer(integers(data + qvel)[0]),
+            pointer(integers(data + ctrl)[0]),
+            pointer(integers(data + xfrc)[0]),
+            pointer(integers(data + qfrc)[0]),
+            pointer(integers(data + sensors)[0]),
+            pointer(integers(data + xipos)[0]),
+            pointer(integers(data + xanchor)[0]),
+            pointer(integers(data + actuators)[0]),
+            pointer(integers(data + constraints)[0]),
         )
+        run_simulation(address, simulation_at(address), arrays)
 
     return compiled(types.void(types.intp, types.intp), control, cache=True)
 
 
 @functools.cache
 def silence():
-    """A C function that prints nothing: MuJoCo's warnings name no run, and the harness marks each that diverges."""
+    """A C function that prints nothing: MuJoCo's warnings name no run, and the controller marks each that diverges."""
 
     def silent(message):
         return
@@ -78,9 +87,9 @@ def silence():
 
 @contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
-    """Install the harness, or another control callback, for the length of a with block; other threads wait."""
+    """Install our control callback, or another, for the length of a with block; other threads wait."""
     with uninstalled():
-        function, silent = harness().ctypes if control is None else control, silence().ctypes
+        function, silent = callback().ctypes if control is None else control, silence().ctypes
         before = mujoco.get_mju_user_warning()
         with held(function):
             try:

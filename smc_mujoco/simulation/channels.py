@@ -1,26 +1,38 @@
-"""The channels of a compiled model: where each actuated degree of freedom lies in mjData."""
+"""The channels of a compiled model: where each degree of freedom that a law sees lies in mjData."""
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import record_at
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import DIRECTLY
 
-# Columns of the channel table: addresses into qpos, qvel, sensordata (twice), ctrl and actuator_force; address into
-# xfrc_applied of a generalised force d and the sign with which it enters there; the same of a horizontal force on the
-# body, the components of xipos and xanchor between which its lever arm lies (-1 for a slide), and the address into
-# actuator_force of a friction (-1 without one); and where disturbances act on the joint itself, as in own models, the
-# address into qfrc_applied (else -1). CTRL and FORCE are -1 where the channel has no actuator.
-QPOS, QVEL, X_SENSOR, V_SENSOR, CTRL, FORCE, XFRC, SIGN, PUSH, PUSH_SIGN, TIP, ANCHOR, FRICTION, DIRECT = range(14)
-COLUMNS = 14
-_SENSORS = {X_SENSOR: mujoco.mjtSensor.mjSENS_JOINTPOS, V_SENSOR: mujoco.mjtSensor.mjSENS_JOINTVEL}
+# Where a channel lies: addresses into qpos, qvel, sensordata (position, velocity), ctrl and actuator_force (-1 without
+# an actuator). `xfrc` is the address into xfrc_applied of a generalised force d, which enters there with `sign`; `push`
+# and `push_sign` are the same of a horizontal force on the body, whose lever arm lies between the components `tip` of
+# xipos and `anchor` of xanchor (-1 for a slide). `friction` is the address into actuator_force of a friction (-1
+# without one). `direct` is the address into qfrc_applied where disturbances act on the joint itself, as in models of
+# users (else -1).
+CHANNEL = np.dtype(
+    [
+        (name, "i8")
+        for name in (
+            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "xfrc", "sign", "push", "push_sign", "tip",
+            "anchor", "friction", "direct",
+        )
+    ]
+)  # fmt: skip
+CHANNEL_SIZE = CHANNEL.itemsize
+channel_at = record_at(CHANNEL)  # how compiled code reads one
+
+_SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
 # Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis.
 _LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
-    """The channel table, (n, 14) int64: a row per actuator that takes commands, then one per joint only measured.
+    """The channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each joint only measured.
 
     A disturbance d acts on the body that carries the joint, as a force along a slide's axis or a torque about a
     hinge's, so that its generalised force is d; a horizontal one acts on its centre of mass.
@@ -34,13 +46,14 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     for i in drive_ids(model):
         if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
             raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
-    every, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
-    drives += [-1] * (len(every) - len(drives))
-    rows = [_row(model, data, drive, joint) for drive, joint in zip(drives, every, strict=True)]
-    return np.array(rows, np.int64)
+    joints, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
+    drives += [-1] * (len(joints) - len(drives))
+    found = [_channel(model, data, drive, joint) for drive, joint in zip(drives, joints, strict=True)]
+    return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in found], CHANNEL)
 
 
-def _row(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> list[int]:
+def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
+    """The fields of a CHANNEL; `drive` is -1 for a joint that is only measured."""
     body = int(model.jnt_bodyid[joint])
     name = f"actuator {model.actuator(drive).name!r}" if drive >= 0 else f"sensor of joint {model.joint(joint).name!r}"
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
@@ -51,22 +64,29 @@ def _row(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> 
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))
-    row = [0] * COLUMNS
-    row[QPOS], row[QVEL] = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-    row[CTRL] = model.actuator_ctrladr[drive] if drive >= 0 else -1
-    row[FORCE] = model.actuator_outadr[drive] if drive >= 0 else -1
-    row[XFRC], row[SIGN] = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
-    row[PUSH], row[PUSH_SIGN], row[TIP], row[ANCHOR] = row[XFRC], row[SIGN], -1, -1
-    if hinge:
-        direction, arm, sign = _LEVERS[component]
-        row[PUSH], row[PUSH_SIGN] = 6 * body + direction, sign * row[SIGN]
-        row[TIP], row[ANCHOR] = 3 * body + arm, 3 * joint + arm
-    row[DIRECT] = model.jnt_dofadr[joint] if direct else -1
     friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
-    row[FRICTION] = -1 if friction < 0 else model.actuator_outadr[friction]
-    for column, kind in _SENSORS.items():
-        found = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
-        if not len(found):
+    xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
+    found = {
+        "qpos": model.jnt_qposadr[joint],
+        "qvel": model.jnt_dofadr[joint],
+        "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
+        "force": model.actuator_outadr[drive] if drive >= 0 else -1,
+        "xfrc": xfrc,
+        "sign": sign,
+        "push": xfrc,
+        "push_sign": sign,
+        "tip": -1,
+        "anchor": -1,
+        "friction": -1 if friction < 0 else model.actuator_outadr[friction],
+        "direct": model.jnt_dofadr[joint] if direct else -1,
+    }
+    if hinge:
+        direction, arm, turn = _LEVERS[component]
+        found |= {"push": 6 * body + direction, "push_sign": turn * sign, "tip": 3 * body + arm}
+        found["anchor"] = 3 * joint + arm
+    for field, kind in _SENSORS.items():
+        there = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
+        if not len(there):
             raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
-        row[column] = model.sensor_adr[found[0]]
-    return row
+        found[field] = model.sensor_adr[there[0]]
+    return found

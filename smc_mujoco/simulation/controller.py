@@ -1,246 +1,316 @@
-"""The harness: what the control callback does in one simulation, as its row names it.
+"""The controller: what the control callback does in one simulation, as its record says.
 
 At the first stage of a control sample, per channel:
 
-    sensors -> noise, encoder -> velocity estimator -> law -> saturation -> ring of commands
+    sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
 and at every stage: the command whose delay has passed -> ctrl, of two drives in series through the first; and
 disturbance(t) -> xfrc_applied. The forces that acted since the sample before, on average, are logged with each. Time
 counts in calls: RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again,
 so the clock alone cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is
-marked in its row and gets no more control; the simulations beside it go on.
+marked in its record and gets no more control; the simulations beside it go on.
 """
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import math
+from typing import NamedTuple
 
-from numba import carray, njit
+from numba import njit
 
-from smc_mujoco.common.jit import call, integers, pointer
-from smc_mujoco.simulation import channels as column
+from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.simulation import philox
-from smc_mujoco.simulation import state as slot
-from smc_mujoco.simulation.forces import clear, disturb, disturbance, weigh
+from smc_mujoco.simulation import state as record
+from smc_mujoco.simulation.channels import CHANNEL_SIZE, channel_at
+from smc_mujoco.simulation.state import LOG_SIZE, SIGNAL_SIZE, STATE_SIZE, log_at, signal_at, state_at
 
-WORLD = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
-LEFT = 1.0 - 1e-8  # of a step: the last stage of RK4 looks at its end from the left, before a jump that happens there
-HUGE = 1e10  # MuJoCo drops every control where one is larger
+MAX_STATE = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
+LAST_STAGE = 1.0 - 1e-8  # of a step: RK4's last stage looks at its end from the left, before a jump that happens there
+MAX_CONTROL = 1e10  # MuJoCo drops every control where one is larger
 
 
-@njit(inline="always")
-def _at(base, row, name):
-    """Address of the slice whose offset stands in a header slot."""
-    return base + 8 * int(row[name])
+class Arrays(NamedTuple):
+    """Arrays of one mjData, as pointers to their numbers."""
+
+    qpos: object
+    qvel: object
+    ctrl: object
+    xfrc_applied: object
+    qfrc_applied: object
+    sensordata: object
+    xipos: object
+    xanchor: object
+    actuator_force: object
+    qfrc_constraint: object
+
+
+@njit(error_model="numpy")
+def control(at, sim, data):
+    """One callback of one simulation.
+
+    Args:
+      at: the address of its record.
+      sim: the record.
+      data: Arrays of its mjData.
+    """
+    calls = sim.calls
+    sim.calls = calls + 1
+    if sim.failure != record.FINE:
+        return
+    stages, steps = sim.stages, sim.steps
+    step, stage = calls // stages, calls % stages
+    k, within = step // steps, step % steps
+    failure = record.FINE
+    if stage == 0:
+        _sum_forces(sim, data)
+        if _escaped(sim, data):
+            failure = record.DIVERGED
+        elif within == 0:
+            failure = _measure(at, sim, data, k)
+            if failure == record.FINE:
+                failure = _decide(at, sim, k)
+        _actuate(sim, data, step)
+    if sim.signal_count != 0 and failure == record.FINE:
+        fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
+        failure = _disturb(at, sim, data, k * sim.period + (within + fraction) * sim.step)
+    if failure != record.FINE:
+        sim.failure, sim.failed_step = failure, step
+        _release(sim, data)
+    elif stage == 0 and within == 0:
+        _log(sim, data, k)
 
 
 @njit(error_model="numpy", inline="always")
-def _escaped(row, qpos, qvel):
-    for i in range(int(row[slot.POSITIONS])):
-        if not abs(qpos[i]) < WORLD:
+def _escaped(sim, data):
+    """Whether the mechanism has left the finite world."""
+    for i in range(sim.nq):
+        if not abs(data.qpos[i]) < MAX_STATE:
             return True
-    for i in range(int(row[slot.VELOCITIES])):  # noqa: SIM110  # numba knows no generator
-        if not abs(qvel[i]) < WORLD:
+    for i in range(sim.nv):  # noqa: SIM110  # numba knows no generator
+        if not abs(data.qvel[i]) < MAX_STATE:
             return True
     return False
 
 
 @njit(error_model="numpy", inline="always")
-def _read(row, i, x, v, j, hinge):
+def _read(sim, state, i, x, v, j, hinge):
     """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
-    if row[slot.SIGMA_X] != 0.0 or row[slot.SIGMA_V] != 0.0:
-        z = philox.normals(row[slot.SEED], i, philox.MEASUREMENT, j)
-        x, v = x + row[slot.SIGMA_X] * z[0], v + row[slot.SIGMA_V] * z[1]
-    if row[slot.BIAS] != 0.0:
-        x += row[slot.BIAS]
-    if row[slot.COUNTS] != 0.0:
-        quantum = (2.0 * math.pi if hinge else 1.0) / row[slot.COUNTS]
+    if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
+        z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
+        x, v = x + sim.sigma_x * z[0], v + sim.sigma_v * z[1]
+    if sim.bias != 0.0:
+        x += sim.bias
+    if sim.counts != 0.0:
+        quantum = (2.0 * math.pi if hinge else 1.0) / sim.counts
         x = quantum * math.floor(x / quantum + 0.5)
-    held = int(row[slot.HELD]) + 2 * i
-    if row[slot.LOST] != 0.0:
-        if j > 0 and philox.uniform(row[slot.SEED], i, philox.DROPOUT, j) < row[slot.LOST]:
-            return row[held], row[held + 1]
-        row[held], row[held + 1] = x, v
+    if sim.dropout != 0.0:
+        if j > 0 and philox.uniform(sim.seed, i, philox.DROPOUT, j) < sim.dropout:
+            return state.held_x, state.held_v
+        state.held_x, state.held_v = x, v
     return x, v
 
 
 @njit(error_model="numpy")
-def _measure(base, row, table, sensors, k):
-    """Measured position and estimated velocity of every channel into the row's state; a failure code."""
-    n, at, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]) + 2, int(row[slot.INPUT]), int(row[slot.OUTPUT])
-    j = k
-    if row[slot.READ_PERIOD] != 0.0:
-        j = max(0, math.floor((k * row[slot.PERIOD] - row[slot.READ_DELAY]) / row[slot.READ_PERIOD] + 1e-6))
-    for i in range(n):
-        x, v = sensors[table[i, column.X_SENSOR]], sensors[table[i, column.V_SENSOR]]
-        x, v = _read(row, i, x, v, j, table[i, column.TIP] >= 0)
-        row[at - 2], row[given], row[given + 1], row[given + 2] = i, row[slot.PERIOD], x, v
-        memory = _at(base, row, slot.ESTIMATOR_MEMORY) + 8 * i * int(row[slot.ESTIMATOR_STRIDE])
-        gains = _at(base, row, slot.ESTIMATOR_GAINS)
-        if call(int(row[slot.ESTIMATOR]), base + 8 * given, gains, memory, base + 8 * out) != 0:
-            return slot.ESTIMATOR_RAISED
-        row[at + i], row[at + n + i], row[at + 2 * n + i] = x, row[out], row[out + 1]
-    return slot.FINE
+def _measure(at, sim, data, k):
+    """Measured position, estimated velocity and acceleration of every channel at sample k; a failure code."""
+    j, x, v, a = k, pointer(sim.x), pointer(sim.v), pointer(sim.a)
+    if sim.read_period != 0.0:
+        j = max(0, math.floor((k * sim.period - sim.read_delay) / sim.read_period + 1e-6))
+    reading, estimate, estimator = sim.reading, sim.estimate, sim.estimator
+    reading.dt = sim.period
+    for i in range(sim.n):
+        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
+        position, velocity = data.sensordata[channel.x_sensor], data.sensordata[channel.v_sensor]
+        reading.x, reading.v = _read(sim, state, i, position, velocity, j, channel.tip >= 0)
+        pointer(sim.joints)[0] = i
+        memory = estimator.memory + i * estimator.stride
+        if call(estimator.address, at + record.READING_AT, estimator.parameters, memory, at + record.ESTIMATE_AT) != 0:
+            return record.ESTIMATOR_RAISED
+        x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
+    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _nominal(base, row, i):
-    """Nominal f and g of channel i into the row's outputs; not 0 where the model raised."""
-    state = int(row[slot.STATE])
-    row[state], row[state + 1] = i, row[slot.CHANNELS]
-    return call(
-        int(row[slot.NOMINAL]),
-        base + 8 * state,
-        _at(base, row, slot.NOMINAL_VALUES),
-        0,
-        _at(base, row, slot.OUTPUT),
-    )
+def _ask_model(at, sim, i):
+    """Nominal f and g of channel i, into the record; not 0 where the model raised."""
+    pointer(sim.joints)[0] = i
+    return call(sim.nominal.address, sim.joints, sim.nominal.parameters, 0, at + record.MODEL_AT)
 
 
 @njit(error_model="numpy", inline="always")
-def _limit(row, i):
-    """Bound on |u| of driven channel i."""
-    return row[slot.LIMIT] if row[slot.LIMITS] == 0.0 else row[int(row[slot.LIMITS]) + i]
+def _inform(at, sim, y, i, partner):
+    """What the law of channel i is told, into y; a failure code.
 
-
-@njit(error_model="numpy", inline="always")
-def _inform(base, row, y, i, partner):
-    """What the law of channel i is told, y; `partner` moves with it without an actuator (0: none). A failure code."""
-    n, state, given, out = int(row[slot.CHANNELS]), int(row[slot.STATE]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
-    x, v, a = state + 2, state + 2 + n, state + 2 + 2 * n
-    y[17], y[18], y[19], y[20] = 0.0, 0.0, 0.0, 0.0
+    Channel `partner` moves with it and has no actuator; 0 for none.
+    """
+    x, v, a = pointer(sim.x), pointer(sim.v), pointer(sim.a)
+    y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     if partner > 0:
-        if _nominal(base, row, partner) != 0:
-            return slot.NOMINAL_RAISED
-        y[17], y[18], y[19], y[20] = row[x + partner], row[v + partner], row[out], row[out + 1]
-    if _nominal(base, row, i) != 0:
-        return slot.NOMINAL_RAISED
-    y[9], y[10] = row[out], row[out + 1]
-    y[2], y[3] = row[x + i], row[v + i]
-    y[4], y[5] = y[2] - y[6], y[3] - y[7]
-    y[11] = y[8] if math.isnan(row[a + i]) else row[a + i]  # none is estimated: as the reference asks
-    y[12], y[13], y[14], y[15], y[16] = _limit(row, i), row[slot.MODEL], 0.0, 0.0, 0.0
-    if row[slot.SURFACE] != 0.0:
-        memory = _at(base, row, slot.SURFACE_MEMORY) + 8 * i * int(row[slot.SURFACE_STRIDE])
-        gains = _at(base, row, slot.SURFACE_GAINS)
-        if call(int(row[slot.SURFACE]), base + 8 * given, gains, memory, base + 8 * out) != 0:
-            return slot.SURFACE_RAISED
-        y[14], y[15], y[16] = 1.0, row[out], row[out + 1]
-    return slot.FINE
+        if _ask_model(at, sim, partner) != 0:
+            return record.NOMINAL_RAISED
+        y.q, y.dq, y.fq, y.gq = x[partner], v[partner], sim.model.f, sim.model.g
+    if _ask_model(at, sim, i) != 0:
+        return record.NOMINAL_RAISED
+    y.f, y.g = sim.model.f, sim.model.g
+    y.x, y.v = x[i], v[i]
+    y.e, y.de = y.x - y.r, y.v - y.dr
+    y.a = y.ddr if math.isnan(a[i]) else a[i]  # none is estimated: as the reference asks
+    y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
+    y.surfaced, y.s, y.eq = 0.0, 0.0, 0.0
+    surface = sim.surface
+    if surface.address != 0:
+        memory = surface.memory + i * surface.stride
+        if call(surface.address, at + record.Y, surface.parameters, memory, at + record.SLIDING_AT) != 0:
+            return record.SURFACE_RAISED
+        y.surfaced, y.s, y.eq = 1.0, sim.sliding.s, sim.sliding.v_eq
+    return record.FINE
 
 
 @njit(error_model="numpy")
-def _decide(base, row, table, log, k):
-    """The law of every driven channel: its command into the ring, u and s into the log; a failure code."""
-    n, given, out = int(row[slot.CHANNELS]), int(row[slot.INPUT]), int(row[slot.OUTPUT])
-    ring = int(row[slot.RING]) + (k % int(row[slot.RINGS])) * n
-    y = row[given : given + 21]
-    y[0], y[1], y[2] = k * row[slot.PERIOD], 0.0, 0.0
-    if call(int(row[slot.REFERENCE]), base + 8 * given, _at(base, row, slot.REFERENCE_VALUES), 0, base + 8 * out) != 0:
-        return slot.REFERENCE_RAISED
-    y[1], y[6], y[7], y[8] = row[slot.PERIOD], row[out], row[out + 1], row[out + 2]
-    driven = _driven(table, n)
+def _decide(at, sim, k):
+    """The law of every driven channel at sample k: its command into the delay buffer, u, s and r into the log.
+
+    A failure code.
+    """
+    y, instant, asked, law = sim.y, sim.instant, sim.control, sim.law
+    instant.t = k * sim.period
+    reference = sim.reference
+    if call(reference.address, at + record.INSTANT_AT, reference.parameters, 0, at + record.MOTION_AT) != 0:
+        return record.REFERENCE_RAISED
+    y.t, y.dt = instant.t, sim.period
+    y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
+    n, driven, last = sim.n, sim.driven, pointer(sim.u)
+    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     for i in range(n):
+        sample = log_at(sim.log + (k * n + i) * LOG_SIZE)
         if i >= driven:  # only measured
-            row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = 0.0, 0.0, 0.0, 0.0
+            buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
             continue
-        failure = _inform(base, row, y, i, i + driven if i + driven < n else 0)
-        if failure != slot.FINE:
+        failure = _inform(at, sim, y, i, i + driven if i + driven < n else 0)
+        if failure != record.FINE:
             return failure
-        memory = _at(base, row, slot.LAW_MEMORY) + 8 * i * int(row[slot.LAW_STRIDE])
-        if call(int(row[slot.LAW]), base + 8 * given, _at(base, row, slot.GAINS), memory, base + 8 * out) != 0:
-            return slot.LAW_RAISED
-        limit = _limit(row, i)
-        u = min(max(row[out], -limit), limit)
-        asked = abs(u) * max(1.0, row[slot.SCALE])
-        if not (math.isfinite(row[out]) and math.isfinite(row[out + 1]) and asked < HUGE):
-            return slot.NOT_FINITE
-        row[ring + i], log[2, k, i], log[4, k, i], log[6, k, i] = u, u, row[out + 1], y[6]
-        row[int(row[slot.STATE]) + 2 + 3 * n + i] = u
-    return slot.FINE
+        if call(law.address, at + record.Y, law.parameters, law.memory + i * law.stride, at + record.CONTROL_AT) != 0:
+            return record.LAW_RAISED
+        limit = pointer(sim.limits)[i]
+        u = min(max(asked.u, -limit), limit)
+        if not (math.isfinite(asked.u) and math.isfinite(asked.s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+            return record.NOT_FINITE
+        buffer[i], sample.u, sample.s, sample.r = u, u, asked.s, y.r
+        last[i] = u
+    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _driven(table, n):
-    """How many of the channels have an actuator: the first ones."""
-    count = 0
-    for i in range(n):
-        count += table[i, column.CTRL] >= 0
-    return count
-
-
-@njit(error_model="numpy", inline="always")
-def _apply(row, table, ctrl, step):
+def _actuate(sim, data, step):
     """The command whose delay has passed at a physics step, where one arrives, to the actuators."""
-    n, past, first = int(row[slot.CHANNELS]), step - int(row[slot.DELAY]), int(row[slot.FIRST])
-    if past >= 0 and past % int(row[slot.STEPS]) == 0:
-        ring = int(row[slot.RING]) + (past // int(row[slot.STEPS]) % int(row[slot.RINGS])) * n
-        for i in range(n):
-            if first > 0:
-                row[first + 2 * i] = row[ring + i]
-            elif table[i, column.CTRL] >= 0:
-                ctrl[table[i, column.CTRL]] = row[slot.SCALE] * row[ring + i]
-    if first > 0:
-        _pass_on(row, table, ctrl, n, first)
+    past = step - sim.delay
+    if past >= 0 and past % sim.steps == 0:
+        buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
+        for i in range(sim.n):
+            state_at(sim.states + i * STATE_SIZE).arrived = buffer[i]
+            if sim.tandem == 0 and i < sim.driven:
+                data.ctrl[channel_at(sim.channels + i * CHANNEL_SIZE).ctrl] = sim.scale * buffer[i]
+    if sim.tandem != 0:
+        for i in range(sim.driven):
+            state = state_at(sim.states + i * STATE_SIZE)
+            u, first = state.arrived, state.first
+            asked = sim.scale * (u + sim.tandem_held * (first - u))
+            data.ctrl[channel_at(sim.channels + i * CHANNEL_SIZE).ctrl] = asked
+            state.first = u + sim.tandem_left * (first - u)
 
 
 @njit(error_model="numpy", inline="always")
-def _pass_on(row, table, ctrl, n, first):
-    """Of two drives the first: what it asks of the second over a physics step, and its output at the end."""
-    for i in range(n):
-        if table[i, column.CTRL] >= 0:
-            u, a = row[first + 2 * i], row[first + 2 * i + 1]
-            ctrl[table[i, column.CTRL]] = row[slot.SCALE] * (u + row[slot.FIRST_HELD] * (a - u))
-            row[first + 2 * i + 1] = u + row[slot.FIRST_LEFT] * (a - u)
+def _release(sim, data):
+    """Take commands and disturbances away."""
+    for i in range(sim.n):
+        channel = channel_at(sim.channels + i * CHANNEL_SIZE)
+        _calm(data, channel)
+        if channel.ctrl >= 0:
+            data.ctrl[channel.ctrl] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
-def _applied(row, table, ctrl, i):
-    """The command that reached the drive of channel i."""
-    if table[i, column.CTRL] < 0:
-        return 0.0
-    if row[slot.FIRST] > 0.0:
-        return row[int(row[slot.FIRST]) + 2 * i]
-    return ctrl[table[i, column.CTRL]] / row[slot.SCALE]
+def _calm(data, channel):
+    """Take a channel's disturbances away."""
+    data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.push] = 0.0, 0.0
+    if channel.direct >= 0:
+        data.qfrc_applied[channel.direct] = 0.0
 
 
 @njit(error_model="numpy")
-def control(base, row, qpos, qvel, ctrl, xfrc, sensors, tips, anchors, actuators, constraints, joints):
-    """One callback of one simulation."""
-    calls, n = int(row[slot.CALLS]), int(row[slot.CHANNELS])
-    row[slot.CALLS] = calls + 1
-    if row[slot.FAILURE] != slot.FINE:
-        return
-    step, stage = calls // int(row[slot.STAGES]), calls % int(row[slot.STAGES])
-    table = carray(integers(int(row[slot.TABLE])), (n, column.COLUMNS))
-    k, within = step // int(row[slot.STEPS]), step % int(row[slot.STEPS])
-    log = carray(pointer(int(row[slot.LOG])), (slot.LOGS, int(row[slot.SAMPLES]), n))
-    sampling = stage == 0 and within == 0
-    failure = slot.FINE
-    if stage == 0:
-        weigh(row, table, actuators, constraints)
-    if stage == 0 and _escaped(row, qpos, qvel):
-        failure = slot.DIVERGED
-    elif sampling:
-        failure = _measure(base, row, table, sensors, k)
-        if failure == slot.FINE:
-            failure = _decide(base, row, table, log, k)
-    if stage == 0:
-        _apply(row, table, ctrl, step)
-    if row[slot.SIGNAL_COUNT] != 0.0 and failure == slot.FINE:
-        fraction = 0.0 if stage == 0 else (LEFT if stage == 3 else 0.5)
-        failure = disturb(base, row, table, xfrc, joints, k * row[slot.PERIOD] + (within + fraction) * row[slot.STEP])
-    if failure != slot.FINE:
-        row[slot.FAILURE], row[slot.FAILED_STEP] = failure, step
-        clear(row, table, xfrc, joints)
-        for i in range(n):
-            if table[i, column.CTRL] >= 0:
-                ctrl[table[i, column.CTRL]] = 0.0
-    elif sampling:
-        for i in range(n):
-            log[0, k, i], log[1, k, i] = qpos[table[i, column.QPOS]], qvel[table[i, column.QVEL]]
-            log[3, k, i] = _applied(row, table, ctrl, i)
-            log[5, k, i] = disturbance(table, i, xfrc, joints, tips, anchors)
-            at = int(row[slot.FORCES]) + 2 * i
-            log[7, k, i], log[8, k, i] = row[at] / row[slot.STEPS], row[at + 1] / row[slot.STEPS]
-            row[at], row[at + 1] = 0.0, 0.0
+def _disturb(at, sim, data, t):
+    """The sum of the disturbances of every channel at time t, onto its body or, in models of users, its joint.
+
+    A failure code.
+    """
+    instant, motion = sim.instant, sim.motion
+    instant.t, instant.seed = t, sim.seed
+    for i in range(sim.n):
+        _calm(data, channel_at(sim.channels + i * CHANNEL_SIZE))
+    for j in range(sim.signal_count):
+        signal = signal_at(sim.signals + j * SIGNAL_SIZE)
+        function = signal.function
+        instant.stream = signal.stream
+        for i in range(sim.n):
+            channel = channel_at(sim.channels + i * CHANNEL_SIZE)
+            if signal.stream != 0.0 or i == 0:  # what is not random is the same in every channel
+                instant.channel = i
+                memory = function.memory + i * function.stride
+                if (
+                    call(function.address, at + record.INSTANT_AT, function.parameters, memory, at + record.MOTION_AT)
+                    != 0
+                ):
+                    return record.DISTURBANCE_RAISED
+            if signal.cartesian != 0:
+                data.xfrc_applied[channel.push] += motion.value
+            elif channel.ctrl >= 0 and channel.direct >= 0:
+                data.qfrc_applied[channel.direct] += motion.value
+            elif channel.ctrl >= 0:  # matched: where an actuator could answer it
+                data.xfrc_applied[channel.xfrc] += channel.sign * motion.value
+    for i in range(sim.n):
+        channel = channel_at(sim.channels + i * CHANNEL_SIZE)
+        if not (math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.push])):
+            return record.DISTURBANCE_NOT_FINITE
+        if channel.direct >= 0 and not math.isfinite(data.qfrc_applied[channel.direct]):
+            return record.DISTURBANCE_NOT_FINITE
+    return record.FINE
+
+
+@njit(error_model="numpy", inline="always")
+def _disturbance(data, channel):
+    """The generalised force that disturbances exert on a channel."""
+    if channel.direct >= 0:
+        return data.qfrc_applied[channel.direct]
+    d = channel.sign * data.xfrc_applied[channel.xfrc]
+    if channel.tip >= 0:
+        arm = data.xipos[channel.tip] - data.xanchor[channel.anchor]
+        d += channel.push_sign * arm * data.xfrc_applied[channel.push]
+    return d
+
+
+@njit(error_model="numpy", inline="always")
+def _sum_forces(sim, data):
+    """Add up what drives, and what friction and contacts, exerted on each joint in the last physics step."""
+    for i in range(sim.n):
+        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
+        if channel.force >= 0:
+            state.force += data.actuator_force[channel.force]
+        state.reaction += data.qfrc_constraint[channel.qvel]
+        if channel.friction >= 0:
+            state.reaction += data.actuator_force[channel.friction]
+
+
+@njit(error_model="numpy", inline="always")
+def _log(sim, data, k):
+    """Sample k of every channel into the log, but for u, s and r, which are there already."""
+    for i in range(sim.n):
+        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
+        sample = log_at(sim.log + (k * sim.n + i) * LOG_SIZE)
+        sample.x, sample.v = data.qpos[channel.qpos], data.qvel[channel.qvel]
+        if channel.ctrl < 0:
+            sample.applied = 0.0
+        else:
+            sample.applied = data.ctrl[channel.ctrl] / sim.scale if sim.tandem == 0 else state.arrived
+        sample.d = _disturbance(data, channel)
+        sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
+        state.force, state.reaction = 0.0, 0.0

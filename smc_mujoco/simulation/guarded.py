@@ -12,9 +12,11 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plant import Coupled, Plant, Values
-from smc_mujoco.simulation import state as slot
+from smc_mujoco.simulation import state
+from smc_mujoco.simulation.prepare import Packed
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Signal
+from smc_mujoco.simulation.state import view
 
 RAISES = (Exception, SystemExit)  # what a user's function may end in, and the other runs go on
 
@@ -91,43 +93,42 @@ def as_written(function: Any) -> Any:
     return function
 
 
-def retold(s: Scenario, row: np.ndarray) -> str | None:
+def retold(s: Scenario, record: np.ndarray, packed: Packed) -> str | None:
     """Why a simulation failed, in Python's words, which the compiled functions do not have.
 
-    The function that failed is called once more, as Python, with what its row still holds: so the words depend on
+    The function that failed is called once more, as Python, with what its record still holds: so the words depend on
     nothing beside the run. None where it does not fail again: it had already changed its memory.
     """
-    given, n = row[int(row[slot.INPUT]) :], s.plant.n
-    state = row[int(row[slot.STATE]) :]
-    i = int(state[0])
+    joints = view(packed.numbers, record["joints"], (2 + 4 * s.plant.n,))
+    i = int(joints[0])
+
+    def again(c: Component, y: tuple, function: np.ndarray) -> None:
+        memory = view(packed.numbers, function["memory"], (s.plant.n, c.memory))[i].copy()
+        guarded(c, remade(c.function, as_written), i, y, named(c), memory)
+
     try:
-        match int(row[slot.FAILURE]):
-            case slot.ESTIMATOR_RAISED:
-                _again(s.velocity, i, Reading(*given[:3].tolist()), row, slot.ESTIMATOR_MEMORY)
-            case slot.SURFACE_RAISED if s.surface is not None:
-                _again(s.surface, i, Measurement(*given[:21].tolist()), row, slot.SURFACE_MEMORY)
-            case slot.LAW_RAISED | slot.NOT_FINITE as failure:
-                _again(s.law, i, Measurement(*given[:21].tolist()), row, slot.LAW_MEMORY)
-                if failure == slot.NOT_FINITE:
-                    u, sliding = row[int(row[slot.OUTPUT]) :][:2]
+        match int(record["failure"]):
+            case state.ESTIMATOR_RAISED:
+                again(s.velocity, Reading(*record["reading"].tolist()), record["estimator"])
+            case state.SURFACE_RAISED if s.surface is not None:
+                again(s.surface, Measurement(*record["y"].tolist()), record["surface"])
+            case state.LAW_RAISED | state.NOT_FINITE as failure:
+                again(s.law, Measurement(*record["y"].tolist()), record["law"])
+                if failure == state.NOT_FINITE:
+                    u, sliding = record["control"].tolist()
                     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
-            case slot.REFERENCE_RAISED:
-                signalled(s.reference, float(given[0]))
-            case slot.NOMINAL_RAISED:
-                x, v, _, u = state[2 : 2 + 4 * n].reshape(4, n).copy()
+            case state.REFERENCE_RAISED:
+                signalled(s.reference, float(record["instant"]["t"]))
+            case state.NOMINAL_RAISED:
+                x, v, _, u = joints[2:].reshape(4, s.plant.n).copy()
                 nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)
-            case slot.DISTURBANCE_RAISED | slot.DISTURBANCE_NOT_FINITE:
+            case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
+                t = float(record["instant"]["t"])
                 for j, signal in enumerate(s.disturbance):
-                    at = row[int(row[slot.SIGNALS]) + slot.SIGNAL_FIELDS * j :]
-                    for channel in range(n if signal.random else 1):
-                        memory = row[int(at[3]) + channel * int(at[4]) :][: int(at[4])].copy()
-                        signalled(signal, float(given[0]), memory, s.seed, channel, s.stream(j))
+                    at = packed.signals[j]["function"]["memory"]
+                    memories = view(packed.numbers, at, (s.plant.n, signal.memory)).copy()
+                    for channel in range(s.plant.n if signal.random else 1):
+                        signalled(signal, t, memories[channel], s.seed, channel, s.stream(j))
     except Failure as failure:
         return str(failure)
     return None
-
-
-def _again(c: Component, i: int, y: tuple, row: np.ndarray, memory: int) -> None:
-    """Call a component's function as Python; its memory begins at an offset that stands in that slot."""
-    kept = row[int(row[memory]) + i * c.memory :][: c.memory].copy()
-    guarded(c, remade(c.function, as_written), i, y, named(c), kept)

@@ -15,11 +15,11 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.plant import Coupled, Values
-from smc_mujoco.simulation import channels as column
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.controller import HUGE, LEFT, WORLD
+from smc_mujoco.simulation.channels import channels
+from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.guarded import (
     Failure,
     as_written,
@@ -32,10 +32,10 @@ from smc_mujoco.simulation.guarded import (
     surfaced,
 )
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.state import LOGS
+from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
-LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {WORLD:g}, or NaN)"
+LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {MAX_STATE:g}, or NaN)"
 
 INTERRUPTED = (
     "MuJoCo's control callback was set by someone else during the run, which went on without its law: "
@@ -63,7 +63,7 @@ class Loop:
         self.compiled = assembly.model([scenario])
         self.model = assembly.numbered(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
-        self.table = column.channels(self.model)
+        self.channels = channels(self.model)
         self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
         if self.model.nhistory:
             encoder.remember(self.model, self.data)
@@ -86,7 +86,7 @@ class Loop:
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.tandem, self.first = scenario.tandem, np.zeros(n)  # of two drives, and the output of the first
         self.arrived = np.zeros(n)  # the commands whose delay has passed
-        self.log = np.full((LOGS, scenario.samples + 1, n), np.nan)
+        self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
 
@@ -116,16 +116,18 @@ class Loop:
         try:
             if stage == 0:
                 self.begin(data, step)
-            fraction = (0.0, 0.5, 0.5, LEFT)[stage]
+            fraction = (0.0, 0.5, 0.5, LAST_STAGE)[stage]
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.disturb(data, t)
             if stage == 0 and within == 0:
-                x, v = data.qpos[self.table[:, column.QPOS]], data.qvel[self.table[:, column.QVEL]]
-                reached = self.arrived if self.tandem else data.ctrl[self.table[:, column.CTRL]] / self.scale
-                applied = np.where(self.table[:, column.CTRL] >= 0, reached, 0.0)
+                x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
+                reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
+                applied = np.where(self.channels["ctrl"] >= 0, reached, 0.0)
                 acted = self.acted / self.scenario.steps
-                self.log[:, k] = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
+                sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
+                for name, values in zip(LOG.names or (), sample, strict=True):
+                    self.log[name][k] = values
                 self.acted[:] = 0.0
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
@@ -133,7 +135,7 @@ class Loop:
     def begin(self, data: mujoco.MjData, step: int) -> None:
         """The first stage of a physics step: at a sample the law; the command whose delay has passed."""
         self.weigh(data)
-        if not (np.all(np.abs(data.qpos) < WORLD) and np.all(np.abs(data.qvel) < WORLD)):
+        if not (np.all(np.abs(data.qpos) < MAX_STATE) and np.all(np.abs(data.qvel) < MAX_STATE)):
             raise Failure(LEFT_THE_WORLD)
         k, within = divmod(step, self.scenario.steps)
         if within == 0:
@@ -142,14 +144,14 @@ class Loop:
         past = step - self.scenario.delay_steps
         if past >= 0:
             self.arrived = self.commands[past // self.scenario.steps]
-        asked, driven = self.arrived, self.table[:, column.CTRL] >= 0
+        asked, driven = self.arrived, self.channels["ctrl"] >= 0
         if self.tandem:
             asked, self.first = self.tandem(asked, self.first)
-        data.ctrl[self.table[driven, column.CTRL]] = (self.scale * asked)[driven]
+        data.ctrl[self.channels["ctrl"][driven]] = (self.scale * asked)[driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and estimated velocities, (n,) each."""
-        x, v = data.sensordata[self.table[:, column.X_SENSOR]], data.sensordata[self.table[:, column.V_SENSOR]]
+        x, v = data.sensordata[self.channels["x_sensor"]], data.sensordata[self.channels["v_sensor"]]
         estimator, j, sensor = self.scenario.velocity, k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((k * self.scenario.control_period - sensor.delay) / sensor.period + 1e-6))
@@ -169,7 +171,7 @@ class Loop:
         if sensor is None:
             return x, v
         x += sensor.bias
-        if q := sensor.quantum(self.table[i, column.TIP] >= 0):
+        if q := sensor.quantum(self.channels["tip"][i] >= 0):
             x = q * math.floor(x / q + 0.5)
         if j > 0 and words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.held[i, 0], self.held[i, 1]
@@ -184,7 +186,7 @@ class Loop:
         r, dr, ddr = signalled(scenario.reference, t)
         self.r[:] = r
         for i in range(len(x)):
-            if self.table[i, column.CTRL] < 0:  # only measured
+            if self.channels["ctrl"][i] < 0:  # only measured
                 u[i] = s[i] = self.r[i] = 0.0
                 continue
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
@@ -192,7 +194,7 @@ class Loop:
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
                 float(ddr if math.isnan(self.a[i]) else self.a[i]), limits[i], float(scenario.model == "nominal"),
             )  # fmt: skip
-            if (j := i + int(np.sum(self.table[:, column.CTRL] >= 0))) < len(x):  # moves with it, without an actuator
+            if (j := i + int(np.sum(self.channels["ctrl"] >= 0))) < len(x):  # moves with it, without an actuator
                 fq, gq = self.model_at(x, v, j)
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
             if scenario.surface is not None:
@@ -202,7 +204,7 @@ class Loop:
             u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
             self.latest[i] = np.clip(u[i], -limits[i], limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
-            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < HUGE):
+            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < MAX_CONTROL):
                 raise Failure(f"law {law.name!r} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
             u[i] = self.latest[i]
         return u, s
@@ -213,33 +215,31 @@ class Loop:
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Put the disturbances of time t on the bodies; their generalised forces, (n,)."""
-        xfrc, table = data.xfrc_applied.ravel(), self.table
-        xfrc[table[:, column.XFRC]] = xfrc[table[:, column.PUSH]] = 0.0
+        xfrc, table = data.xfrc_applied.ravel(), self.channels
+        xfrc[table["xfrc"]] = xfrc[table["push"]] = 0.0
         joints = np.zeros(len(table))  # those of an own model
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
             stream = self.scenario.stream(j)
             d = [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
-            matched = table[:, column.SIGN] * d * (table[:, column.CTRL] >= 0)  # where an actuator could answer it
+            matched = table["sign"] * d * (table["ctrl"] >= 0)  # where an actuator could answer it
             joints += matched
-            xfrc[table[:, column.PUSH if signal.cartesian else column.XFRC]] += d if signal.cartesian else matched
+            xfrc[table["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
         if self.scenario.plant.direct:
-            xfrc[table[:, column.XFRC]], data.qfrc_applied[table[:, column.DIRECT]] = 0.0, joints
-        d = joints if self.scenario.plant.direct else table[:, column.SIGN] * xfrc[table[:, column.XFRC]]
-        hinged = table[:, column.TIP] >= 0
-        arm = data.xipos.ravel()[table[:, column.TIP]] - data.xanchor.ravel()[table[:, column.ANCHOR]]
-        d[hinged] += (table[:, column.PUSH_SIGN] * arm * xfrc[table[:, column.PUSH]])[hinged]
+            xfrc[table["xfrc"]], data.qfrc_applied[table["direct"]] = 0.0, joints
+        d = joints if self.scenario.plant.direct else table["sign"] * xfrc[table["xfrc"]]
+        hinged = table["tip"] >= 0
+        arm = data.xipos.ravel()[table["tip"]] - data.xanchor.ravel()[table["anchor"]]
+        d[hinged] += (table["push_sign"] * arm * xfrc[table["push"]])[hinged]
         if not np.all(np.isfinite(d)):
             raise Failure("the disturbance became NaN or inf")
         return d
 
     def weigh(self, data: mujoco.MjData) -> None:
         """Add up what drives, and what friction and contacts, exerted on the joints in the last physics step."""
-        rubs = self.table[:, column.FRICTION] >= 0
-        self.acted[0] += np.where(
-            self.table[:, column.FORCE] >= 0, data.actuator_force[self.table[:, column.FORCE]], 0.0
-        )
-        self.acted[1] += data.qfrc_constraint[self.table[:, column.QVEL]]
-        self.acted[1, rubs] += data.actuator_force[self.table[rubs, column.FRICTION]]
+        rubs = self.channels["friction"] >= 0
+        self.acted[0] += np.where(self.channels["force"] >= 0, data.actuator_force[self.channels["force"]], 0.0)
+        self.acted[1] += data.qfrc_constraint[self.channels["qvel"]]
+        self.acted[1, rubs] += data.actuator_force[self.channels["friction"][rubs]]
 
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:

@@ -11,25 +11,22 @@ import ctypes
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import overload
 
 import mujoco
 
 from smc_mujoco.common.errors import ScenarioError, shown, users_frame, whole
-from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.common.progress import bar
 from smc_mujoco.simulation import callback, model, reference
-from smc_mujoco.simulation.batch import Chunk, Report, contents
+from smc_mujoco.simulation.batch import Chunk, Report
+from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Recorded
-from smc_mujoco.simulation.state import LOGS
 from smc_mujoco.simulation.trace import Trace
 
-CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
-DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
-MANY = 64  # runs of a chunk that leave more memory than it takes time to give it back; chosen
 READING_BYTES = 67  # of a late sensor's history, measured: a channel and reading, in mjData and in the Batch
+CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
+MANY = 64  # runs of a chunk that leave more memory than it takes time to give it back; chosen
 
 
 class PlainLoopWarning(UserWarning):
@@ -60,9 +57,9 @@ def run(
     MuJoCo's callbacks are global to the process: while a run lasts, no other one is called, and a run during which
     somebody sets the control callback is a failure.
     """
-    many = [scenarios] if isinstance(scenarios, Scenario) else _listed(scenarios)
+    many = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
     found: list[Trace | None] = [None] * len(many)
-    work = sum(s.work for s in many if isinstance(s, Scenario))
+    work = sum(one.scenario.work for one in many)
     with bar(f"{len(many)} run{'s' * (len(many) != 1)}", work, shown=progress) as drawn:
         for index, trace in stream(many, threads, drawn.advance):
             found[index] = trace
@@ -71,57 +68,46 @@ def run(
 
 
 def stream(
-    scenarios: Iterable[Scenario], threads: int | None = None, report: Report = lambda steps: None
+    scenarios: Iterable[Scenario | Prepared],
+    threads: int | None = None,
+    report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
     """Pairs (index, Trace), each as soon as its chunk is done; at no time is more than one chunk held here."""
-    scenarios = _listed(scenarios)
     threads = cores(threads)
-    groups: dict[tuple, list[int]] = {}
-    slow: list[int] = []
-    for index, scenario in enumerate(scenarios):
-        try:
-            contents(scenario)  # compiles
-            groups.setdefault(layout(scenario), []).append(index)
-        except NotCompilable as error:
-            warnings.warn(f"{error}; the run takes the plain loop", PlainLoopWarning, users_frame())
-            slow.append(index)
-    for indices in [*groups.values(), *([index] for index in slow)]:
-        model.check_starts([scenarios[i] for i in indices])
-    for indices in groups.values():
-        for chunk in _chunks(scenarios, indices, threads):
-            with callback.installed(), memory_for([scenarios[i] for i in chunk]):
-                traces = Chunk([scenarios[i] for i in chunk], threads).run(report)
+    groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
+    slow: list[tuple[int, Prepared]] = []
+    for index, prepared in enumerate(_prepared(scenarios)):
+        if prepared.why_not:
+            warnings.warn(f"{prepared.why_not}; the run takes the plain loop", PlainLoopWarning, users_frame())
+            slow.append((index, prepared))
+        else:
+            groups.setdefault(prepared.key, []).append((index, prepared))
+    for group in [*groups.values(), *([one] for one in slow)]:
+        model.check_starts([prepared.scenario for _, prepared in group])
+    for group in groups.values():
+        for chunk in _chunks(group, threads):
+            ready = [prepared for _, prepared in chunk]
+            with callback.installed(), memory_for(ready):
+                traces = Chunk(ready, threads).run(report)
             if len(chunk) >= MANY:
                 give_back()
-            yield from zip(chunk, traces, strict=True)
-    for index in slow:
-        with memory_for([scenarios[index]]):
-            trace = reference.run(scenarios[index])
+            yield from zip((index for index, _ in chunk), traces, strict=True)
+    for index, prepared in slow:
+        with memory_for([prepared]):
+            trace = reference.run(prepared.scenario)
         yield index, trace
-        report(scenarios[index].work)
-
-
-def _check(scenario: object) -> None:
-    """Raise ScenarioError for what is no scenario, or one whose functions a file could not bring back."""
-    if not isinstance(scenario, Scenario):
-        raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-    for part in (scenario.law, scenario.surface, scenario.velocity):
-        if part is not None and part.function is None:
-            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
-    for signal in (scenario.reference, *scenario.disturbance):
-        if isinstance(signal, Recorded):
-            raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
+        report(prepared.scenario.work)
 
 
 @contextlib.contextmanager
-def memory_for(scenarios: Sequence[Scenario]) -> Iterator[None]:
+def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
     """Say in one sentence that memory ran out for runs."""
     try:
         yield
     except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo has all three, by the place
         if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
             raise
-        count, needed = len(scenarios), sum(map(_bytes, scenarios)) / 2**20
+        count, needed = len(prepared), sum(one.bytes for one in prepared) / 2**20
         raise ScenarioError(
             f"no memory for {count} run{'s' * (count > 1)} at once, about {needed:.0f} MiB beside the traces kept so "
             "far: give a shorter duration, a longer control period or fewer channels, or take traces from smc.stream"
@@ -137,43 +123,28 @@ def give_back() -> None:
         trim(0)
 
 
-def layout(s: Scenario) -> tuple:
-    """What the simulations of a Batch must have in common."""
-    return model.structure(s), s.integrator, s.physics_step, s.control_period, s.samples
-
-
-def _chunks(scenarios: Sequence[Scenario], indices: Sequence[int], threads: int) -> Iterator[list[int]]:
-    """Indices in chunks of at most CHUNK_BYTES, though at least one a thread."""
-    chunk: list[int] = []
+def _chunks(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[list[tuple[int, Prepared]]]:
+    """A group in chunks of at most CHUNK_BYTES, though at least one run a thread."""
+    chunk: list[tuple[int, Prepared]] = []
     held = 0
-    late = max(READING_BYTES * s.plant.n * s.readings for s in (scenarios[i] for i in indices))  # all get the longest
-    for index in indices:
-        size = _bytes(scenarios[index]) + late
+    scenarios = [prepared.scenario for _, prepared in group]
+    late = max(READING_BYTES * s.plant.n * s.readings for s in scenarios)  # all get the longest history
+    for one in group:
+        size = one[1].bytes + late
         if len(chunk) >= threads and held + size > CHUNK_BYTES:
             yield chunk
             chunk, held = [], 0
-        chunk.append(index)
+        chunk.append(one)
         held += size
     if chunk:
         yield chunk
 
 
-def _bytes(s: Scenario) -> int:
-    """What a simulation takes: its log, its mjData, and twice its row (packed, and in the Batch) with the state."""
-    surface = 0 if s.surface is None else s.surface.memory
-    memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
-    row = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 40)
-    return int(8 * (LOGS * (s.samples + 1) * s.plant.n + 2 * row) + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
-
-
-def _listed(scenarios: object) -> list[Scenario]:
+def _prepared(scenarios: object) -> Iterator[Prepared]:
+    """Scenarios, prepared one by one."""
     if isinstance(scenarios, str) or not isinstance(scenarios, Iterable):
         raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
-    found = []
-    for scenario in scenarios:  # one by one, as they may be without end
-        _check(scenario)
-        found.append(scenario)
-    return found
+    yield from map(prepare, scenarios)
 
 
 def cores(threads: int | None = None) -> int:

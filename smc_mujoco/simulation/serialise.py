@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
+from smc_mujoco.common.registry import present_place
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -101,7 +102,7 @@ def _restore_plant(data: dict) -> Plant:
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
-    if module != find_plant(name).build.__module__:
+    if present_place(module) != find_plant(name).build.__module__:
         raise ScenarioError(f"plant {name!r} is not the library's: run it where it is defined")
     return find_plant(name, **plant)
 
@@ -115,7 +116,7 @@ def _component(c: Component) -> dict:
 
 def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
     template = known.get(data["name"])
-    if template is not None and template.function.__module__ == data["module"]:
+    if template is not None and template.function.__module__ == present_place(data["module"]):
         return template.bind(data["gains"])
     return Component(
         kind=kind,
@@ -134,7 +135,7 @@ def _signal(signal: Signal) -> dict:
 
 
 def _restore_signal(data: dict) -> Signal:
-    kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
+    kind, values = _kinds(Signal).get((data["kind"], present_place(data["module"]))), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 
 
@@ -151,7 +152,7 @@ def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...
 
 
 def _restore_part(data: dict) -> Part:
-    kind = _kinds(Part).get((data["kind"], data["module"]))
+    kind = _kinds(Part).get((data["kind"], present_place(data["module"])))
     if kind is None:
         raise ScenarioError(f"part {data['kind']!r} of {data['module']} is not at hand: import what defines it first")
     return kind(**_values(data))

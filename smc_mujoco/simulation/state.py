@@ -1,152 +1,149 @@
-"""One simulation's mjData.userdata: everything the callback needs besides the MuJoCo state, slices by name.
+"""The record of one simulation: all that the callback needs besides MuJoCo's own state, under names.
 
-    header | gains: law, estimator, nominal, reference | disturbances | inputs | outputs | state | memories | ring
-
-The header holds scalars: counts, addresses (exact in a float64, they are below 2^53) and offsets of the other slices.
-What is the same for every simulation of a layout - the channel table - and what is only written - the log - lie outside
-the row, by address. All of it is float64, so that a Batch copies it as state.
+`mjData.userdata` holds two numbers, `callback.magic()` and the address of the record. Compiled code reads it as a
+record (`simulation.period`, `simulation.calls += 1`), Python as a NumPy structured array of the same dtype. What a
+user's function reads and writes are records, too: a law gets a MEASUREMENT and gives a CONTROL. Arrays, such as gains
+and memories, lie in one buffer beside the record, which holds their addresses.
 """
 
-import dataclasses
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-# Header slots.
-(
-    IS_ROW, CALLS, FAILURE, FAILED_STEP,  # what happened so far
-    CHANNELS, TABLE, POSITIONS, VELOCITIES, STEPS, STAGES, STEP, PERIOD,  # channel table, nq, nv, clock
-    DELAY, RING, RINGS, LIMIT, LIMITS, SCALE, FORCES,  # delay in steps, ring, its samples; u_max, or one each; drive
-    FIRST, FIRST_HELD, FIRST_LEFT,  # of two drives the first: its command and output a channel, and its Tandem
-    SEED, SIGMA_X, SIGMA_V, BIAS, COUNTS, LOST, HELD, READ_PERIOD, READ_DELAY,  # noise, encoder, its last readings
-    LAW, GAINS, MODEL, SURFACE, SURFACE_GAINS, ESTIMATOR, ESTIMATOR_GAINS,
-    NOMINAL, NOMINAL_VALUES, REFERENCE, REFERENCE_VALUES,
-    SIGNALS, SIGNAL_COUNT, LOG, SAMPLES,
-    INPUT, OUTPUT, STATE,
-    LAW_MEMORY, LAW_STRIDE, SURFACE_MEMORY, SURFACE_STRIDE, ESTIMATOR_MEMORY, ESTIMATOR_STRIDE,
-    HEADER,
-) = range(56)  # fmt: skip
+from smc_mujoco.common.jit import record_at
+from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.law import Measurement
 
-# Of each disturbance: function, offset of its parameters, stream of random numbers, offset and stride of its memory,
-# whether it is a Cartesian force.
-SIGNAL_FIELDS = 6
 
-# What a log holds of every sample: position, velocity, command, command after its delay, sliding variable, disturbance,
-# reference, the drive's force, what friction and contacts exert.
+def floats(names: Iterable[str]) -> np.dtype:
+    """The dtype of a record of float64."""
+    return np.dtype([(name, "f8") for name in names], align=True)
+
+
+# What functions get, and what they give: a law a MEASUREMENT -> CONTROL, a surface a MEASUREMENT -> SLIDING, an
+# estimator a READING -> ESTIMATE, a reference or a disturbance an INSTANT -> MOTION, the nominal model -> MODEL.
+MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
+INSTANT = floats(("t", "seed", "channel", "stream"))
+CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
+MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
+
+# What is kept of a channel between calls: the last reading that arrived, the command that has passed its delay, the
+# output of the first of two drives, and sums over a control period of the drive's force and of friction and contacts.
+CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction"))
+
+# A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
+# the drive's force, what friction and contacts exert.
 LOGGED = ("x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
-LOGS = len(LOGGED)
+LOG = floats(LOGGED)
 
-# What FAILURE says.
+# A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
+FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
+# A disturbance: its stream of random numbers (0: none, and then the same in every channel), and whether it is a
+# horizontal force on the body instead of a force on the joint.
+SIGNAL = np.dtype([("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8")], align=True)
+
+SIMULATION = np.dtype(
+    [
+        # what has happened so far: calls of the callback, a failure and its physics step
+        ("calls", "i8"), ("failure", "i8"), ("failed_step", "i8"),
+        # sizes: channels, those of them that have an actuator, qpos, qvel, disturbances
+        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("signal_count", "i8"),
+        # the clock: physics steps a control period, callbacks a physics step, s of each
+        ("steps", "i8"), ("stages", "i8"), ("step", "f8"), ("period", "f8"),
+        # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), SIGNAL (signal_count,)
+        ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("signals", "i8"),
+        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (n,), unit of the drive
+        ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
+        # two drives in series: whether there are, and the factors of Tandem
+        ("tandem", "i8"), ("tandem_held", "f8"), ("tandem_left", "f8"),
+        # the sensor: noise, encoder
+        ("seed", "f8"), ("sigma_x", "f8"), ("sigma_v", "f8"), ("bias", "f8"), ("counts", "f8"), ("dropout", "f8"),
+        ("read_period", "f8"), ("read_delay", "f8"),
+        # functions, and whether the law may use the nominal model
+        ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
+        ("reference", FUNCTION), ("uses_model", "f8"),
+        # what the nominal model gets: i, n, then x, v, a and u of all channels, (n,) each, by their addresses too
+        ("joints", "i8"), ("x", "i8"), ("v", "i8"), ("a", "i8"), ("u", "i8"),
+        # what functions get and give
+        ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("control", CONTROL), ("sliding", SLIDING),
+        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),
+        ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
+    ],
+    align=True,
+)  # fmt: skip
+
+# Compiled code reads a record at an address by these.
+simulation_at, state_at, log_at, signal_at = map(record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL))
+
+
+def _place(name: str) -> int:
+    """Bytes from the start of a simulation's record to a field."""
+    return int(SIMULATION.fields[name][1])  # pyright: ignore[reportOptionalSubscript]
+
+
+Y, READING_AT, INSTANT_AT = _place("y"), _place("reading"), _place("instant")
+CONTROL_AT, SLIDING_AT, ESTIMATE_AT = _place("control"), _place("sliding"), _place("estimate")
+MOTION_AT, MODEL_AT = _place("motion"), _place("model")
+STATE_SIZE, LOG_SIZE, SIGNAL_SIZE = CHANNEL_STATE.itemsize, LOG.itemsize, SIGNAL.itemsize
+
+# What `failure` says.
 FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE = range(4)
 ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED, DISTURBANCE_RAISED, SURFACE_RAISED, INTERRUPTED = range(
     4, 11
 )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Part:
-    """A compiled function's address, its parameters, and the floats of memory it keeps per channel."""
-
-    address: int
-    values: Sequence[float]
-    memory: int = 0
-    stream: int = 0  # of random numbers; 0: it takes none, and is the same in every channel
-    cartesian: bool = False  # a disturbance that is a horizontal force on the body, not a force on the joint
-    kept: object = None  # what must live as long as the row
+def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
+    """A record's values in the order of its fields, 0 for each that is not named."""
+    return tuple(
+        values.get(name, 0) if (kind := dtype[name]).names is None else as_tuple(kind, values.get(name, {}))
+        for name in dtype.names or ()
+        if name != "unused"
+    ) + ((np.zeros(8),) if "unused" in (dtype.names or ()) else ())
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Contents:
-    """What one simulation's row says."""
+class Buffer:
+    """Float64 numbers in one array, whose parts are addressed before it is made.
 
-    law: Part
-    model: bool  # whether the law may use the nominal model
-    surface: Part | None
-    estimator: Part
-    nominal: Part
-    reference: Part
-    disturbances: Sequence[Part]
-    n: int
-    steps: int  # physics steps per control sample
-    stages: int  # callbacks per physics step
-    step: float  # s
-    period: float  # s
-    delay: int  # physics steps
-    limit: float  # on |u|
-    limits: Sequence[float]  # of each driven channel, where they are not all `limit`; else empty
-    seed: int
-    sigma_x: float
-    sigma_v: float
-    scale: float = 1.0  # what a drive takes per unit of u: V / (N m) of a motor's amplifier
-    tandem: tuple[float, float] | None = None  # of two drives, as of Tandem
-    bias: float = 0.0  # of the encoder, in the unit of x
-    counts: float = 0.0  # a revolution of a hinge, a metre of a slide; 0: no rounding
-    lost: float = 0.0  # probability that a reading gets lost
-    read_period: float = 0.0  # s between readings; 0: every control sample
-    read_delay: float = 0.0  # s until a reading arrives
-
-
-def pack(c: Contents, mark: float, table: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """A fresh row.
-
-    Args:
-      c: its contents.
-      mark: what tells it from any other userdata, `callback.mark()`.
-      table: the channel table, (n, 14) int64, which must outlive the run.
-      log: (LOGS, K + 1, n) float64, written at samples, which must outlive the run.
+    buffer = Buffer()
+    gains = buffer.put([6.0, 3.0])      # a place
+    array = buffer.array()
+    buffer.address(gains)               # where the gains lie, as long as `array` lives
     """
-    row = [0.0] * HEADER
-    n, rings = c.n, c.delay // c.steps + 1
 
-    def put(slot: int, values: Sequence[float]) -> None:
-        row[slot] = len(row)
-        row.extend(values)
+    def __init__(self) -> None:
+        self.values: list[float] = []
+        self.base = 0
 
-    def reserve(slot: int, size: int) -> None:
-        put(slot, [0.0] * size)
+    def put(self, values: Iterable[float]) -> int:
+        """Append numbers; their place."""
+        place = len(self.values)
+        self.values.extend(values)
+        return place
 
-    row[IS_ROW] = mark
-    row[CHANNELS], row[TABLE], row[STEPS], row[STAGES] = n, address(table), c.steps, c.stages
-    row[STEP], row[PERIOD], row[DELAY], row[RINGS] = c.step, c.period, c.delay, rings
-    row[LIMIT], row[SCALE] = c.limit, c.scale
-    row[SEED], row[SIGMA_X], row[SIGMA_V] = c.seed, c.sigma_x, c.sigma_v
-    row[BIAS], row[COUNTS], row[LOST] = c.bias, c.counts, c.lost
-    row[READ_PERIOD], row[READ_DELAY] = c.read_period, c.read_delay
-    row[LAW], row[ESTIMATOR], row[NOMINAL] = c.law.address, c.estimator.address, c.nominal.address
-    row[REFERENCE], row[SIGNAL_COUNT] = c.reference.address, len(c.disturbances)
-    row[LOG], row[SAMPLES] = address(log), log.shape[1]
-    row[LAW_STRIDE], row[ESTIMATOR_STRIDE] = c.law.memory, c.estimator.memory
-    row[MODEL] = c.model
-    if c.limits:
-        put(LIMITS, c.limits)
-    if c.tandem is not None:
-        row[FIRST_HELD], row[FIRST_LEFT] = c.tandem
-        reserve(FIRST, 2 * n)
-    put(GAINS, c.law.values)
-    if c.surface is not None:
-        row[SURFACE], row[SURFACE_STRIDE] = c.surface.address, c.surface.memory
-        put(SURFACE_GAINS, c.surface.values)
-        reserve(SURFACE_MEMORY, c.surface.memory * n)
-    put(ESTIMATOR_GAINS, c.estimator.values)
-    put(NOMINAL_VALUES, c.nominal.values)
-    put(REFERENCE_VALUES, c.reference.values)
-    reserve(SIGNALS, SIGNAL_FIELDS * len(c.disturbances))
-    reserve(INPUT, 24)
-    reserve(OUTPUT, 4)
-    reserve(STATE, 2 + 4 * n)  # the nominal model's input: i, n, measured x, estimated v and acceleration, last u
-    reserve(HELD, 2 * n)
-    reserve(FORCES, 2 * n)
-    for i, d in enumerate(c.disturbances):
-        at = int(row[SIGNALS]) + SIGNAL_FIELDS * i
-        memory = len(row) + len(d.values)
-        row[at : at + SIGNAL_FIELDS] = [d.address, len(row), d.stream, memory, d.memory, d.cartesian]
-        row.extend([*d.values, *[0.0] * (d.memory * n)])
-    reserve(LAW_MEMORY, c.law.memory * n)
-    reserve(ESTIMATOR_MEMORY, c.estimator.memory * n)
-    reserve(RING, rings * n)
-    return np.array(row)
+    def reserve(self, count: int) -> int:
+        """Append zeros; their place."""
+        return self.put(itertools.repeat(0.0, count))
+
+    def array(self) -> np.ndarray:
+        """The numbers, (count,) float64."""
+        made = np.array(self.values)
+        self.base = address(made)
+        return made
+
+    def address(self, place: int) -> int:
+        """The address of a place in the array."""
+        return self.base + 8 * place
 
 
 def address(array: np.ndarray) -> int:
-    """Where a C-contiguous array's data lie."""
-    return array.ctypes.data
+    """The address of a C-contiguous array's data."""
+    return array.__array_interface__["data"][0]
+
+
+def view(array: np.ndarray, at: int, shape: Sequence[int]) -> np.ndarray:
+    """The numbers at an address within a float64 array, as an array of that shape."""
+    first = (at - address(array)) // 8
+    return array[first : first + int(np.prod(shape))].reshape(shape)

@@ -166,23 +166,24 @@ def _trace(fields: dict) -> Trace:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """The Trace of a log (LOGS, K + 1, n), as LOGGED names it; `failed_step` is the physics step of a failure.
+    """The Trace of a log, (K + 1, n) LOG; `failed_step` is the physics step of a failure.
 
     What it holds before its end is finite: a sample that is not is a failure, and the end.
     """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
     end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
-    finite = np.all(np.isfinite(log[:, :end]), axis=2)
+    arrays = {name: np.ascontiguousarray(log[name]) for name in LOGGED}
+    finite = np.array([np.all(np.isfinite(values[:end]), axis=1) for values in arrays.values()])
     if not np.all(finite):
         k = int(np.argmin(np.all(finite, axis=0)))
         name = LOGGED[int(np.argmin(finite[:, k]))]
         failed_step, failure = k * scenario.steps, f"{name} became NaN or inf"
     if failure is not None:
-        log[:, math.ceil(failed_step / scenario.steps) :] = np.nan
+        for values in arrays.values():
+            values[math.ceil(failed_step / scenario.steps) :] = np.nan
         diverged_at = failed_step * scenario.physics_step
         failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
-    arrays = dict(zip(LOGGED, log, strict=True))
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
 

@@ -11,7 +11,7 @@ batch in which the run was, nor on where that was computed.
 import pickle
 import platform
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -24,11 +24,10 @@ from concurrent.futures import (
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.metrics.catalogue import score
-from smc_mujoco.simulation import reference
-from smc_mujoco.simulation.batch import Report, contents
-from smc_mujoco.simulation.run import layout, run, stream
+from smc_mujoco.simulation.batch import Report
+from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
@@ -57,33 +56,23 @@ def outcome(trace: Trace) -> Outcome:
 
 def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Scenario]]:
     """The scenarios, sorted into batches of one layout, each several seconds of work."""
-    groups: dict[tuple, list[Scenario]] = {}
+    groups: dict[Hashable, list[Scenario]] = {}
+    slow: dict[Hashable, bool] = {}
     for s in scenarios:
-        groups.setdefault((layout(s), _compiles(s)), []).append(s)
+        prepared = prepare(s)
+        key = prepared.key, bool(prepared.why_not)
+        groups.setdefault(key, []).append(s)
+        slow[key] = bool(prepared.why_not)
     most = min(STEPS * threads, LOG_STEPS)
-    for (_, compiles), group in groups.items():
-        each = max(1, group[0].work) * (1 if compiles else PLAIN * threads)
+    for key, group in groups.items():
+        each = max(1, group[0].work) * (PLAIN * threads if slow[key] else 1)
         size = max(1, min(RUNS, most // each))
         yield from (group[i : i + size] for i in range(0, len(group), size))
 
 
-def _compiles(scenario: Scenario) -> bool:
-    try:
-        contents(scenario)
-    except NotCompilable:
-        return False
-    return True
-
-
 def simulated(batch: Batch, threads: int | None, report: Report = lambda steps: None) -> list[Trace]:
-    """The traces of a batch, in its order, whose words about a failure do not depend on each other.
-
-    Of several runs in which a law raises or returns NaN, a Batch asks Python for one's words; here each gets its own.
-    """
-    traces: dict[int, Trace] = dict(stream(batch, threads, report))
-    for i, trace in traces.items():
-        if len(batch) > 1 and trace.failure is not None and not trace.failure.startswith(reference.LEFT_THE_WORLD):
-            traces[i] = run(batch[i], threads=1)
+    """The traces of a batch, in its order."""
+    traces = dict(stream(batch, threads, report))
     return [traces[i] for i in range(len(batch))]
 
 

@@ -241,16 +241,14 @@ for words in (["list"], ["laws"], ["laws", "brand_new"]):
 
 
 def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
-    names = [path.name for path in sorted((ROOT / "tests").glob("test_laws*.py"))] + [
-        "test_lawbook.py",
-        "test_references.py",
-    ]
-    files = [str(ROOT / "tests" / name) for name in names]
+    tests = ROOT / "tests"
+    own = tests / "cli" / "test_lawbook.py", tests / "simulation" / "test_references.py"
+    files = [str(path) for path in (*sorted((tests / "control").glob("test_laws*.py")), *own)]
     out = python(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
                  "-k", "brand_new", *files)  # fmt: skip
     cases = [line for line in out.splitlines() if "::" in line]
     assert len(cases) >= 10
-    found = {case.partition("::")[0].removeprefix("tests/") for case in cases}
+    found = {case.partition("::")[0].rpartition("/")[2] for case in cases}
     assert {"test_lawbook.py", "test_references.py"} < found
     assert any(name.startswith("test_laws") for name in found)
 

@@ -557,7 +557,7 @@ def test_a_command_put_wrongly_ends_with_code_2_and_shows_how_it_is_put(words, c
 
 HELP = """
 import contextlib, io, sys
-from smc_mujoco.cli import main
+from smc_mujoco.cli.main import main
 for words in (["--help"], ["run", "--help"], ["show", "--help"], ["list", "--help"], ["--version"]):
     said = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with contextlib.redirect_stdout(said):

@@ -145,7 +145,7 @@ class Slow:
 @pytest.mark.parametrize("python", [True, False], ids=["python", "native"])
 def test_no_python_callback_comes_while_a_model_compiles(python):
     slow, entered = Slow(), threading.Event()
-    native = callback.harness().ctypes
+    native = callback.callback().ctypes
 
     def enter():
         with mjcb.held((lambda model, data: None) if python else native):

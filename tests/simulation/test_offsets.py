@@ -1,4 +1,4 @@
-"""The only unsafe code: offsets are refused when wrong, and the harness touches nothing but its own rows."""
+"""The only unsafe code: offsets are refused when wrong, and the callback touches nothing but its own records."""
 
 import ctypes
 import dataclasses
@@ -10,7 +10,7 @@ import pytest
 from mujoco.introspect import ast_nodes, structs
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation import callback
 from smc_mujoco.simulation import offsets as layout
 
 FIELDS = layout.Offsets._fields[1:]
@@ -132,7 +132,7 @@ def test_an_unknown_type_is_refused(monkeypatch, live):
 def test_nothing_is_installed_when_the_layout_is_wrong(monkeypatch):
     doctored(monkeypatch, "mjModel", lambda fields: [dataclasses.replace(fields[0], name="extra"), *fields])
     layout.offsets.cache_clear()
-    callback.harness.cache_clear()
+    callback.callback.cache_clear()
     with pytest.raises(layout.LayoutError), callback.installed():
         pass
     assert mujoco.get_mjcb_control() is None
@@ -152,7 +152,7 @@ def counting():
 
 def test_the_callback_before_is_back_after_the_block_and_after_an_exception(live):
     before, calls = counting()
-    callback.harness()  # compiled by now, with the little model that checks the layout
+    callback.callback()  # compiled by now, with the little model that checks the layout
     mujoco.set_mjcb_control(before)
     with callback.installed():
         mujoco.mj_forward(*live)
@@ -208,7 +208,7 @@ def test_a_run_puts_a_users_own_callback_back(native):
     own = counting()[0] if native else lambda model, data: None
     alone = smc.run(SCENARIO)
     layout.offsets.cache_clear()  # as in a fresh process
-    callback.harness.cache_clear()
+    callback.callback.cache_clear()
     mujoco.set_mjcb_control(own)
     try:
         trace = smc.run(SCENARIO)
@@ -236,12 +236,12 @@ def userdata(kind, size):
         "ones": np.ones(size),
         "numbers": rng.normal(size=size) * 1e6,
         "nan": np.full(size, np.nan),
-        "nearly a mark": np.full(size, callback.mark() + 1),
+        "nearly our magic number": np.full(size, callback.magic() + 1),
     }[kind]
 
 
-@pytest.mark.parametrize("size", [0, 1, state.HEADER - 1, state.HEADER, 500])
-@pytest.mark.parametrize("kind", ["zeros", "ones", "numbers", "nan", "nearly a mark"])
+@pytest.mark.parametrize("size", [0, 1, callback.USERDATA, 500])
+@pytest.mark.parametrize("kind", ["zeros", "ones", "numbers", "nan", "nearly our magic number"])
 def test_strangers_are_not_touched(size, kind):
     model = smc.plant("pendulum_network").load(nuserdata=size)
     ends = []
@@ -260,11 +260,11 @@ def test_strangers_are_not_touched(size, kind):
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_row_shorter_than_a_header_is_never_read_as_a_row():
-    """Even if it begins with our mark."""
-    model = smc.plant("duffing").load(nuserdata=state.HEADER - 1)
+def test_userdata_without_an_address_is_never_read_as_ours():
+    """Even if it begins with our magic number."""
+    model = smc.plant("duffing").load(nuserdata=callback.USERDATA - 1)
     data = mujoco.MjData(model)
-    data.userdata[0] = callback.mark()
+    data.userdata[0] = callback.magic()
     before = data.userdata.copy()
     with callback.installed():
         mujoco.mj_step(model, data)

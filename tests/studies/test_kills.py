@@ -22,8 +22,8 @@ from pathlib import Path
 from smc_mujoco.studies import executor, store
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import key, study
-from smc_mujoco.simulation.callback import harness as compiled_callback, silence
-from smc_mujoco.simulation.batch import contents
+from smc_mujoco.simulation.callback import callback as compiled_callback, silence
+from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
 
 out, executor.STEPS = Path(sys.argv[1]), 60
@@ -34,7 +34,7 @@ KILLER = """
 import json
 
 for scenario in scenarios:
-    contents(scenario), key(scenario)
+    prepare(scenario), key(scenario)
 compiled_callback(), silence()
 
 def told(pipe):

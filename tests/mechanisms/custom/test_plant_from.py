@@ -14,9 +14,9 @@ from helpers.episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import linearisation
+from smc_mujoco.common import process
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
-from smc_mujoco.control.c import build
 from smc_mujoco.envs import core, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
@@ -963,8 +963,8 @@ def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, mon
 
 
 def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
-    ran, timed = [], build.timed
-    monkeypatch.setattr(build, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k))
+    ran, timed = [], process.timed
+    monkeypatch.setattr(process, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k))
     body = f'<body name="{ran!r}tried"/>'
     first = arm(bodies=body)
     assert (arm(bodies=body), len(ran)) == (first, 1)

@@ -1,0 +1,207 @@
+"""Preparation: what a scenario names, compiled, and which scenarios can share a Batch.
+
+    prepared = prepare(scenario)        # once a run
+    record[i] = pack(prepared, ...)     # the record that the callback reads, see state.py
+
+What does not compile runs in the reference loop; `prepared.why_not` says why.
+"""
+
+import dataclasses
+import math
+from collections.abc import Hashable
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.plant import Coupled
+from smc_mujoco.simulation import model, native, state
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Recorded
+
+PERFECT = Encoder(counts=math.inf)
+DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Compiled:
+    """The C functions of what a scenario names; `nominal` is None for a model that MuJoCo itself computes."""
+
+    law: Function | AtAddress
+    surface: Function | AtAddress | None
+    estimator: Function | AtAddress
+    nominal: Function | None
+    reference: Function
+    disturbances: tuple[Function, ...]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Prepared:
+    """A scenario that is ready to run.
+
+    Attributes:
+      scenario: as it was given.
+      compiled: its functions, None where one does not compile.
+      why_not: what does not compile, in one sentence.
+      key: equal for scenarios that can share a Batch.
+    """
+
+    scenario: Scenario
+    compiled: Compiled | None
+    why_not: str
+    key: Hashable
+
+    @property
+    def bytes(self) -> int:
+        """What its simulation takes: its log, its mjData and its record, without the history of a late sensor."""
+        s = self.scenario
+        surface = 0 if s.surface is None else s.surface.memory
+        memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
+        numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
+        log = state.LOG_SIZE * (s.samples + 1) * s.plant.n
+        return int(log + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
+
+
+def prepare(scenario: object) -> Prepared:
+    """A scenario with all that it names compiled.
+
+    Raises:
+      ScenarioError: no Scenario, or one whose functions a file could not bring back.
+    """
+    if isinstance(scenario, Prepared):
+        return scenario
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
+    for part in (scenario.law, scenario.surface, scenario.velocity):
+        if part is not None and part.function is None:
+            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
+    for signal in (scenario.reference, *scenario.disturbance):
+        if isinstance(signal, Recorded):
+            raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
+    key = (
+        model.structure(scenario), scenario.integrator, scenario.physics_step, scenario.control_period,
+        scenario.samples,
+    )  # fmt: skip
+    try:
+        return Prepared(scenario, _compile(scenario), "", key)
+    except NotCompilable as error:
+        return Prepared(scenario, None, str(error), key)
+
+
+def _compile(s: Scenario) -> Compiled:
+    """Every function of a scenario, compiled; NotCompilable names the one that is not for numba."""
+    plant = s.plant
+    for signal in (s.reference, *s.disturbance):
+        native.values_of(signal)  # refuses data that compiled code would misread
+    return Compiled(
+        law=native.component(s.law),
+        surface=s.surface and native.component(s.surface),
+        estimator=native.component(s.velocity),
+        nominal=None if isinstance(plant.nominal, Coupled) else native.nominal(plant.nominal, tuple(plant.parameters)),
+        reference=native.of_signal(s.reference),
+        disturbances=tuple(map(native.of_signal, s.disturbance)),
+    )
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Packed:
+    """What must live as long as a simulation: the arrays whose addresses stand in its record.
+
+    Attributes:
+      numbers: gains, memories and all else that is float64.
+      signals: the disturbances, (m,) SIGNAL.
+      nominal: what the nominal model works on.
+    """
+
+    numbers: np.ndarray
+    signals: np.ndarray
+    nominal: Any
+
+
+def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv: int) -> tuple[tuple, Packed]:
+    """A simulation's record, as the tuple to be put into an array of SIMULATION, and its arrays.
+
+    Args:
+      channels: (n,) CHANNEL.
+      log: (K + 1, n) LOG, written at samples.
+      nq, nv: sizes of qpos and qvel.
+
+    `channels` and `log` must outlive the run, too.
+    """
+    s, compiled = prepared.scenario, prepared.compiled
+    assert compiled is not None
+    n, sensor, tandem, buffer = s.plant.n, s.sensor or PERFECT, s.tandem, state.Buffer()
+
+    def function(made: Any, values: Any, memory: int = 0, channels: int = n) -> dict[str, int]:
+        places = buffer.put(values), buffer.reserve(memory * channels)
+        return {"address": made.address, "parameters": places[0], "memory": places[1], "stride": 8 * memory}
+
+    own = s.plant.nominal.native(s.plant.parameters) if isinstance(s.plant.nominal, Coupled) else None
+    functions = {
+        "law": function(compiled.law, s.law.gains.values(), s.law.memory),
+        "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
+        "nominal": function(own or compiled.nominal, own.values if own else s.plant.parameters.values()),
+        "reference": function(compiled.reference, native.values_of(s.reference)),
+    }
+    if s.surface is not None:
+        functions["surface"] = function(compiled.surface, s.surface.gains.values(), s.surface.memory)
+    disturbances = [
+        function(made, native.values_of(d), d.memory)
+        for made, d in zip(compiled.disturbances, s.disturbance, strict=True)
+    ]
+    slots = s.delay_steps // s.steps + 1
+    joints, states = buffer.put([0.0, float(n), *[0.0] * (4 * n)]), buffer.reserve(state.STATE_SIZE // 8 * n)
+    limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
+    numbers = buffer.array()
+
+    def placed(found: dict[str, int]) -> dict[str, int]:
+        return found | {name: buffer.address(found[name]) for name in ("parameters", "memory")}
+
+    signals = np.array(
+        [
+            state.as_tuple(state.SIGNAL, {"function": placed(one), "stream": s.stream(i), "cartesian": d.cartesian})
+            for i, (one, d) in enumerate(zip(disturbances, s.disturbance, strict=True))
+        ],
+        state.SIGNAL,
+    )
+    at = buffer.address(joints)
+    values = {name: placed(found) for name, found in functions.items()} | {
+        "n": n,
+        "driven": int(np.sum(channels["ctrl"] >= 0)),
+        "nq": nq,
+        "nv": nv,
+        "signal_count": len(signals),
+        "steps": s.steps,
+        "stages": s.stages,
+        "step": s.physics_step,
+        "period": s.control_period,
+        "channels": state.address(channels),
+        "states": buffer.address(states),
+        "log": state.address(log),
+        "signals": state.address(signals),
+        "delay": s.delay_steps,
+        "delay_slots": slots,
+        "delay_buffer": buffer.address(delay_buffer),
+        "limits": buffer.address(limits),
+        "scale": math.prod(part.scale for part in s.actuator),
+        "tandem": tandem is not None,
+        "tandem_held": tandem.held if tandem else 0.0,
+        "tandem_left": tandem.left if tandem else 0.0,
+        "seed": s.seed,
+        "sigma_x": s.noise.position,
+        "sigma_v": s.noise.velocity,
+        "bias": sensor.bias,
+        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
+        "dropout": sensor.dropout,
+        "read_period": sensor.period or 0.0,
+        "read_delay": sensor.delay,
+        "uses_model": s.model == "nominal",
+        "joints": at,
+        "x": at + 16,
+        "v": at + 16 + 8 * n,
+        "a": at + 16 + 16 * n,
+        "u": at + 16 + 24 * n,
+    }
+    return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, own)
