@@ -12,7 +12,7 @@ from scipy import stats
 import smc_mujoco as smc
 from smc_mujoco import cells, grid, identity, paper, record
 from smc_mujoco import study as run_study
-from smc_mujoco.differences import OF_VALUE, exceeds, least_difference, worse
+from smc_mujoco.differences import OF_VALUE, coarse, exceeds, least_difference, worse
 from smc_mujoco.errors import ScenarioError, find
 from smc_mujoco.friedman import friedman
 from smc_mujoco.leaderboard import METRICS, Board, leaderboard
@@ -20,7 +20,7 @@ from smc_mujoco.leaderboard_table import leaderboard_table
 from smc_mujoco.metrics import metrics as every_metric
 from smc_mujoco.ranking import SEEDS, Rank, compare, holm
 from smc_mujoco.ranking import ranks as places
-from smc_mujoco.statistics import Interval, median_interval, share_interval
+from smc_mujoco.statistics import Interval, median_interval, median_of, share_interval
 
 INF = math.inf
 FEW = 199  # resamples
@@ -575,6 +575,24 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
     text = " ".join(printed([board]).split())
     assert "20 seeds, 1 distinct run" in text
     assert board.verdict == "no winner in all 2 conditions: a wins under c0"
+
+
+def test_seeds_that_change_rounding_alone_are_one_sample():
+    values = 1.0 + 1e-12 * np.arange(20.0)
+    (board,) = leaderboard(stand({"a": values[None], "b": 2 * values[None]}), ["itae"])
+    assert board.verdict == "no winner: 20 seeds, 1 distinct run"
+    assert len({*coarse(np.array([0.1, 0.1 + 1e-15, 0.1 - 1e-15]))}) == 1
+    assert (coarse(np.array([INF, 0.0, 3.0, 1.7e308])) > coarse(np.array([1.0, -1e-3, 2.9999, 1.0]))).all()
+
+
+def test_a_block_without_randomness_is_in_every_resample():
+    (one, two), nothing = blocks(1.0, 2.0, seeds=20), [math.nan] * 19
+    both = median_of(np.stack([one, [5.0, *nothing]]))
+    alone = median_of(one[None])
+    assert both[:3] == pytest.approx([(5.0 + end) / 2 for end in alone[:3]])
+    first, second = (np.stack([block, [rest, *nothing]]) for block, rest in ((one, 2.0), (two, 1.0)))
+    for shares in (False, True):
+        assert [(r.low, r.high) for r in ranks({"a": first, "b": second}, shares=shares)] == [(1.5, 1.5)] * 2
 
 
 def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count_are_tied():
