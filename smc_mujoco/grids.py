@@ -46,13 +46,15 @@ def grid(
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
+      ScenarioError: a name that is not known, conditions of one name, gains that the set does not have, or more than a
+        million runs.
     """
     numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
     numbers = listed("seeds", itertools.islice(numbers, MOST + 1))
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
+    conditions = _apart(conditions)
     return [
         case(plant, law, condition, duration, gains, seed, starts)
         for plant in plants
@@ -86,6 +88,16 @@ def case(
         fields |= {"control_period": paper.CONTROL_PERIOD, "u_max": paper.U_MAX}
     scenario = Scenario(**fields | asked.on(machine, duration) | dict(changes))
     return (starts or Starts()).place(scenario, seed).named(asked.name)
+
+
+def _apart(conditions: Sequence[str | Condition]) -> list[Condition]:
+    """The conditions, of which those that differ have names that differ."""
+    found = [find_condition(condition) for condition in conditions]
+    known: dict[str, Condition] = {}
+    for one in found:
+        if str(known.setdefault(one.name, one)) != str(one):
+            raise ScenarioError(f"two conditions have the name {one.name!r}: give each a name of its own")
+    return found
 
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:

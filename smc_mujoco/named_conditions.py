@@ -157,7 +157,7 @@ def parsed(text: str) -> Condition:
     if not isinstance(call, ast.Call) or call.args or any(word.arg is None for word in call.keywords):
         cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
         raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}")
-    return condition(name.strip(), **{str(word.arg): _value(word.value) for word in call.keywords})
+    return condition(name.strip(), **_named(call))
 
 
 def from_file(path: Path) -> list[Condition]:
@@ -183,7 +183,7 @@ def _value(node: ast.expr) -> Any:
         return -errors.number("a value", _value(node.operand), infinite=True)
     if isinstance(node, ast.Tuple | ast.List):
         return tuple(_value(item) for item in node.elts)
-    if isinstance(node, ast.Dict):
+    if isinstance(node, ast.Dict) and None not in node.keys:
         return {_value(k): _value(v) for k, v in zip(node.keys, node.values, strict=True) if k is not None}
     if isinstance(node, ast.Call):
         return _called(node)
@@ -196,13 +196,23 @@ def _called(node: ast.Call) -> Any:
     """A part, a signal or an estimator with its numbers."""
     name = ast.unparse(node.func).removeprefix("smc.")
     kind = find("part, signal or estimator", name, _kinds() | estimators())
-    values = [_value(value) for value in node.args], {str(word.arg): _value(word.value) for word in node.keywords}
+    values, named = [_value(value) for value in node.args], _named(node)
     try:
-        return kind(*values[0], **values[1])
+        return kind(*values, **named)
     except TypeError:
         known = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
         cure = f"it takes {', '.join(known) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
+
+
+def _named(node: ast.Call) -> dict[str, Any]:
+    """The named values of a call, each of them given once."""
+    found: dict[str, Any] = {}
+    for word in node.keywords:
+        if str(word.arg) in found:
+            raise ScenarioError(f"condition has {word.arg} twice, in {shown(ast.unparse(node))}: give it once")
+        found[str(word.arg)] = _value(word.value)
+    return found
 
 
 def _kinds() -> dict[str, Any]:

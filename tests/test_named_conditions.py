@@ -106,6 +106,9 @@ def test_what_happens_once_does_so_at_half_time():
         ("worn: frction=1", "did you mean 'friction'"),
         ("worn: plant='duffing'", "which the grid itself says"),
         ("worn:", "has no fields"),
+        ("worn: x0=1, x0=2", "has x0 twice"),
+        ("worn: friction=Coulomb(level=1, level=2)", "has level twice"),
+        ("worn: mismatch={'mass': 1.3, **{'mass': 2}}", "give numbers, texts and parts"),
         (": input_delay=0.01", "a condition's name"),
         ("noise: input_delay=0.01", "is a name of the suite"),
         ("noisy", "did you mean 'noise'"),
@@ -128,6 +131,18 @@ def test_a_file_holds_a_condition_a_line(tmp_path):
 
 
 # grids
+
+
+def test_conditions_of_one_name_that_differ_are_refused():
+    light, heavy = (smc.condition("loaded", mismatch={"mass": factor}) for factor in (0.9, 1.1))
+    with pytest.raises(smc.ScenarioError, match="two conditions have the name 'loaded'"):
+        smc.grid("duffing", "classical", [light, heavy])
+    assert len(smc.grid("duffing", "classical", [light, light, "noise + coulomb", "noise + coulomb"])) == 4
+
+
+def test_a_condition_that_starts_at_0_is_nothing_to_tune_for():
+    with pytest.raises(smc.ScenarioError, match=r"duffing starts at 0 under 'rest'.*smc.starts"):
+        smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)])
 
 
 def test_a_grid_has_conditions_of_ones_own_under_their_names():
