@@ -14,6 +14,7 @@ gear's, the lag a hydraulic valve's, the counts, per revolution or metre, an ine
 """
 
 import ast
+import contextlib
 import dataclasses
 import inspect
 import math
@@ -138,6 +139,17 @@ def find_condition(value: Condition | str) -> Condition:
         return parsed(value)
     found = [find("condition", part.strip(), NAMED) for part in value.split("+")]
     return sum(found[1:], start=found[0])
+
+
+def suiting(names: Iterable[str], plants: Iterable[Plant], duration: float) -> list[str]:
+    """Of the suite's conditions of these names, those that have numbers for each plant."""
+    plants, found = list(plants), []
+    for name in names:
+        with contextlib.suppress(ScenarioError):
+            for plant in plants:
+                NAMED[name].on(plant, duration)
+            found.append(name)
+    return found
 
 
 def parsed(text: str) -> Condition:

@@ -13,7 +13,7 @@ from smc_mujoco.cli import app
 from smc_mujoco.identity import condition as told
 from smc_mujoco.identity import key
 from smc_mujoco.initial_states import SEEDS
-from smc_mujoco.named_conditions import NAMED, find_condition, from_file, parsed
+from smc_mujoco.named_conditions import NAMED, find_condition, from_file, parsed, suiting
 from smc_mujoco.objective import Objective
 
 ARM = """<mujoco model="arm">
@@ -140,6 +140,13 @@ def test_conditions_of_one_name_that_differ_are_refused():
     assert len(smc.grid("duffing", "classical", [light, light, "noise + coulomb", "noise + coulomb"])) == 4
 
 
+def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
+    names = ["nominal", "jump_mild", "coulomb", "contact"]
+    duffing = smc.plant("duffing")
+    assert suiting(names, [duffing], 1.0) == names
+    assert suiting(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
+
+
 def test_a_condition_that_starts_at_0_is_nothing_to_tune_for():
     with pytest.raises(smc.ScenarioError, match=r"duffing starts at 0 under 'rest'.*smc.starts"):
         smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)])
@@ -249,6 +256,15 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
         ("duffing", "worn gear"),
         ("arm", "worn gear"),
     }
+
+
+def test_bench_has_conditions_for_a_model_of_ones_own_without_being_told_any(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--laws", "pid", "--gains", "default", "--seeds", "1", "--duration", "0.05", "--x0", "0.4"]
+    done = CliRunner().invoke(app, ["bench", "--quick", "--plants", f"{file}:shoulder", *arguments])
+    assert done.exit_code == 0, done.output
+    done = CliRunner().invoke(app, ["bench", "--plants", f"{file}:shoulder", *arguments])
+    assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize(

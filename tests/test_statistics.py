@@ -595,6 +595,14 @@ def test_a_block_without_randomness_is_in_every_resample():
         assert [(r.low, r.high) for r in ranks({"a": first, "b": second}, shares=shares)] == [(1.5, 1.5)] * 2
 
 
+@pytest.mark.parametrize(("seeds", "told"), [(5, True), (6, False)])
+def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
+    text = " ".join(
+        printed(leaderboard(stand({"a": blocks(1.0, seeds=seeds), "b": blocks(2.0, seeds=seeds)}), ["itae"])).split()
+    )
+    assert ("of fewer than 6 runs an interval is their range" in text) == told
+
+
 def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count_are_tied():
     fine = paper.scenario("duffing", "none")  # x0 1.5, u_max 6
     coarse = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
