@@ -30,6 +30,7 @@ from smc_mujoco.conditions import Jump, Noise
 from smc_mujoco.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.estimators import catalogue as estimators
 from smc_mujoco.estimators import estimator
+from smc_mujoco.files import reading
 from smc_mujoco.friction import Coulomb, LuGre
 from smc_mujoco.frozen import frozen
 from smc_mujoco.part import Actuator, Friction, Part
@@ -178,10 +179,8 @@ def from_file(path: Path) -> list[Condition]:
     Raises:
       ScenarioError: a file or a line that cannot be read.
     """
-    try:
-        lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"cannot read conditions from {str(path)!r} ({error}): give a text file") from None
+    with reading(path, "file of conditions", "give a text file, a condition a line") as file:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     return [find_condition(line) for line in lines if line and not line.startswith("#")]
 
 

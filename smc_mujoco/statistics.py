@@ -126,13 +126,14 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     z = NormalDist().inv_cdf((1 + checked(level)) / 2)
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((middle + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(share, max(low, 0.0), min(high, 1.0), n)
+    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding leaves 1 out, and 0
 
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int, resamples: int, seed: int) -> np.ndarray:
     """How often each of n seeds comes in each resample, (n, resamples)."""
     whole("resamples", resamples, 99, 10**6)
+    whole("seed", seed, 0, 2**63)
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
     drawn = np.ascontiguousarray(drawn.T, np.int32)
     drawn.setflags(write=False)

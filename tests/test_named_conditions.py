@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -126,8 +128,15 @@ def test_a_file_holds_a_condition_a_line(tmp_path):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
     assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
-    with pytest.raises(smc.ScenarioError, match="cannot read conditions"):
+    with pytest.raises(smc.ScenarioError, match="no file of conditions"):
         from_file(tmp_path / "none.txt")
+
+
+def test_a_pipe_or_a_folder_is_no_file_of_conditions(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, Path("/dev/zero")):
+        with pytest.raises(smc.ScenarioError, match="file of conditions"):
+            from_file(path)
 
 
 # grids

@@ -144,16 +144,17 @@ def test_values_that_are_none_are_refused(values):
         median_interval(values)
 
 
-@pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9)])
+@pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9), ("seed", -1)])
 def test_a_level_or_a_number_of_resamples_out_of_range_is_refused(name, value):
     with pytest.raises(ScenarioError, match=name):
         median_interval([1.0, 2.0], **{name: value})
 
 
-@pytest.mark.parametrize(("k", "n"), [(0, 1), (3, 20), (20, 20)])
+@pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 17), (3, 20), (15, 15), (20, 20)])
 def test_the_interval_of_a_share_is_wilson_s(k, n):
-    wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
-    assert share_interval(k / n, n)[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
+    wanted, found = stats.binomtest(k, n).proportion_ci(method="wilson"), share_interval(k / n, n)
+    assert found[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
+    assert found.low <= found.median <= found.high
 
 
 # ranks
