@@ -93,9 +93,10 @@ class Condition:
         """
         return dict(self.fields(plant, duration) if callable(self.fields) else self.fields)
 
-    def __add__(self, other: "Condition") -> "Condition":
+    def __add__(self, other: "Condition | str") -> "Condition":
         """Both at once. Disturbances, frictions and actuators add up; of any other field only one may say something."""
-        return Condition(f"{self.name} + {other.name}", lambda plant, duration: _joined((self, other), plant, duration))
+        both = self, find_condition(other)
+        return Condition(" + ".join(one.name for one in both), lambda plant, duration: _joined(both, plant, duration))
 
     def __str__(self) -> str:
         """The text that `parsed` reads; the name alone of one of the suite's."""

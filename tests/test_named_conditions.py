@@ -88,6 +88,9 @@ def test_conditions_add_up():
     with pytest.raises(smc.ScenarioError, match="'light' and 'heavy' both set mismatch"):
         find_condition("light + heavy").on(duffing, 4.0)
     assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
+    assert (WORN + "noise").name == "worn gear + noise"
+    with pytest.raises(smc.ScenarioError, match="condition is 3: give a name"):
+        _ = WORN + 3  # pyright: ignore[reportOperatorIssue]
 
 
 def test_what_happens_once_does_so_at_half_time():
