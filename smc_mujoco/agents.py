@@ -17,7 +17,7 @@ from smc_mujoco import plain
 from smc_mujoco.callback import installed
 from smc_mujoco.channels import V_SENSOR, X_SENSOR
 from smc_mujoco.component import Template
-from smc_mujoco.errors import ScenarioError, shown
+from smc_mujoco.errors import ScenarioError, attribute, shown
 from smc_mujoco.estimators import Estimator
 from smc_mujoco.guarded import Failure
 from smc_mujoco.law import Law
@@ -90,8 +90,8 @@ class Agent:
 
 def _source(environment: Any) -> Any:
     """What has an environment's setting and counts its samples."""
-    for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
-        if isinstance(getattr(owner, "setting", None), Setting) and isinstance(getattr(owner, "sample", None), int):
+    for owner in (attribute(environment, "task"), attribute(environment, "unwrapped")):
+        if isinstance(attribute(owner, "setting"), Setting) and isinstance(attribute(owner, "sample"), int):
             return owner
     cure = "give one of smc_mujoco.suite, or a single one of smc_mujoco.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")

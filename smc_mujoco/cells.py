@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from smc_mujoco.differences import OF_SCALE, coarse
-from smc_mujoco.errors import ScenarioError, unknown
+from smc_mujoco.errors import ScenarioError, taken, unknown
 from smc_mujoco.groups import groups as channel_groups
 from smc_mujoco.metrics import metrics
 from smc_mujoco.scenario import Scenario
@@ -113,6 +113,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     Raises:
       ScenarioError: no runs, an unknown group, or two runs in a cell.
     """
+    by = taken("by", by)
     for name in by:
         if name not in GROUPS:
             raise unknown("group of a leaderboard", name, GROUPS)

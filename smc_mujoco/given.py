@@ -11,7 +11,7 @@ import numpy as np
 from smc_mujoco.actuators import Lag
 from smc_mujoco.component import Component, Template
 from smc_mujoco.contact import Contact
-from smc_mujoco.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.errors import ScenarioError, number, shown, taken, unknown
 from smc_mujoco.estimators import estimator
 from smc_mujoco.hook import compiled
 from smc_mujoco.law import law
@@ -133,7 +133,7 @@ def state(name: str, value: object, n: int) -> tuple[float, ...]:
     """n numbers, from one or n of them."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else (value,)
+    items = taken(name, value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else [value]
     if len(items) == 1:
         items *= n
     if len(items) != n:

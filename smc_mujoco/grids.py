@@ -5,22 +5,19 @@
 Plants may be the suite's, by name, or models of your own; so may laws and conditions.
 """
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from smc_mujoco import gains as sets
 from smc_mujoco import given, paper
 from smc_mujoco.component import Component, Template
-from smc_mujoco.errors import ScenarioError, shown, whole
+from smc_mujoco.errors import MOST, ScenarioError, shown, taken, whole
 from smc_mujoco.initial_states import SEEDS, Starts
 from smc_mujoco.law import Law
 from smc_mujoco.named_conditions import Condition, find_condition
 from smc_mujoco.plant import Plant
 from smc_mujoco.plant import plant as find_plant
 from smc_mujoco.scenario import Scenario
-
-MOST = 1_000_000  # runs of a grid, some kB each; chosen
 
 
 def grid(
@@ -50,7 +47,7 @@ def grid(
         million runs.
     """
     numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
-    numbers = listed("seeds", itertools.islice(numbers, MOST + 1))
+    numbers = listed("seeds", numbers)
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
@@ -111,6 +108,6 @@ def listed(what: str, values: object) -> list:
     """Several values as a list, from one or several."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
-    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := list(values)):
+    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := taken(what, values)):
         raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
     return found

@@ -19,7 +19,7 @@ import numpy as np
 
 from smc_mujoco import cells
 from smc_mujoco.cells import SETTLES, Columns
-from smc_mujoco.errors import ScenarioError, shown, unknown
+from smc_mujoco.errors import ScenarioError, shown, unknown, whole
 from smc_mujoco.friedman import Friedman, friedman
 from smc_mujoco.ranking import SEEDS, Comparison, Rank, compare, ranks
 from smc_mujoco.statistics import RESAMPLES, Interval, median_of, share_interval
@@ -185,7 +185,7 @@ def leaderboard(
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
     """
-    units, boards = _units(metrics), []
+    units, boards, seed = _units(metrics), [], whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
         ran = cells.scenarios(table, group)

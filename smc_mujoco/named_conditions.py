@@ -22,6 +22,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from smc_mujoco import errors
 from smc_mujoco.actuators import DCMotor, Drive, Lag
 from smc_mujoco.backlash import Backlash
@@ -102,7 +104,11 @@ class Condition:
         """The text that `parsed` reads; the name alone of one of the suite's."""
         if self.name in NAMED or callable(self.fields):
             return self.name
-        return f"{self.name}: " + ", ".join(f"{name}={_text(value)}" for name, value in self.fields.items())
+        try:
+            texts = {name: _text(value) for name, value in self.fields.items()}
+        except Exception:  # of a user's value, whose repr fails or nests too deep; no scenario takes it either
+            texts = {name: shown(value) for name, value in self.fields.items()}
+        return f"{self.name}: " + ", ".join(f"{name}={text}" for name, text in texts.items())
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -254,6 +260,7 @@ def _frozen(value: Any) -> Any:
     """A field's value that cannot change."""
     if isinstance(value, Mapping):
         return frozen(value)
+    value = value.tolist() if isinstance(value, np.ndarray) else value
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -263,12 +270,20 @@ def _joined(both: Iterable[Condition], plant: Plant, duration: float) -> dict[st
         for field, value in one.on(plant, duration).items():
             if field in found and field in SEVERAL:
                 found[field] = (*_several(found[field]), *_several(value))
-            elif field in found and found[field] != value:
+            elif field in found and not _same(found[field], value):
                 names = " and ".join(repr(c.name) for c in both)
                 raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
             else:
                 found[field] = value
     return found
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are equal; those that do not compare, such as arrays, are not."""
+    try:
+        return bool(one == other)
+    except Exception:
+        return False
 
 
 def _several(value: Any) -> tuple:

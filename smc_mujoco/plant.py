@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.component import modules
-from smc_mujoco.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.errors import MOST, ScenarioError, find, number, unknown, whole
 from smc_mujoco.files import shipped
 from smc_mujoco.frozen import frozen
 from smc_mujoco.hook import compiled
@@ -169,7 +169,7 @@ class Plant:
           factors: parameter name -> factor on its value (the true plant's mismatch).
           nuserdata: length of mjData.userdata.
         """
-        model = ready(self.spec(), nuserdata)
+        model = ready(self.spec(), whole("nuserdata", nuserdata, 0, MOST))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco import record
-from smc_mujoco.errors import ScenarioError, find, shown
+from smc_mujoco.errors import ScenarioError, find, shown, taken
 from smc_mujoco.files import from_json, reading, replacing, to_json
 from smc_mujoco.frozen import frozen
 from smc_mujoco.metrics import metrics
@@ -168,7 +168,8 @@ class Table:
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
                 there = dict.fromkeys(self.column(name).tolist())
-                names = list(wanted) if isinstance(wanted, Iterable) and not isinstance(wanted, str) else [wanted]
+                several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
+                names = taken(name, wanted) if several else [wanted]
                 for one in names:
                     find(f"{name} of this table", one, there)
                 data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))

@@ -93,6 +93,21 @@ def test_conditions_add_up():
         _ = WORN + 3  # pyright: ignore[reportOperatorIssue]
 
 
+def test_a_condition_of_any_values_has_a_text_and_joins_others():
+    class Shy:
+        def __repr__(self):
+            raise KeyError("no")
+
+    assert str(smc.condition("shy", friction=Shy())) == "shy: friction=<Shy>"
+    array = smc.condition("array", x0=np.array([0.3]))
+    assert parsed(str(array)) == array
+    (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
+    assert run.x0 == (0.3,)
+    odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
+    with pytest.raises(smc.ScenarioError, match="'odd' and 'noise' both set noise"):
+        smc.grid("duffing", "none", odd + find_condition("noise"))
+
+
 def test_what_happens_once_does_so_at_half_time():
     assert NAMED["pulse"].on(smc.plant("duffing"), 3.0)["disturbance"].time == 1.5
 

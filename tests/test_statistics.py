@@ -440,6 +440,7 @@ def test_groups_may_be_conditions_or_all_runs_where_units_allow():
     assert all_runs.cells == 80
     assert math.isnan(all_runs.entries[0].interval.median)  # rad and m, N and N m
     assert all_runs.winner == "a"
+    assert leaderboard(table, ["itae"], by=np.array([]))[0] == all_runs  # pyright: ignore[reportArgumentType]
     (times,) = leaderboard(table, ["settling_time"], by=())
     assert math.isfinite(times.entries[0].interval.median)
     both = leaderboard(table, ["itae"], by=("plant", "condition"))
@@ -470,6 +471,7 @@ def test_what_cannot_be_compared_is_refused():
         (table, {"metrics": ["speed"]}, "unknown metric"),
         (table, {"metrics": ()}, "metrics is"),
         (table, {"by": ("law",)}, "unknown group"),
+        (table, {"seed": 0.5}, "seed is 0.5"),
         (table, {"level": 1.5}, "level"),
         (table.taken(np.r_[0:240, 0]), {}, "several runs of a on van_der_pol, nominal, seed 0"),
         (table.taken(first), {}, "a, b, c have no run of van_der_pol in common"),

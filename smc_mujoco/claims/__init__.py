@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from smc_mujoco.claims.verdict import NAMED, Claim, Found, combined, numbers, verdict
 from smc_mujoco.claims.verdict import VERDICTS as VERDICTS
 from smc_mujoco.component import modules
-from smc_mujoco.errors import ScenarioError, find, unknown
+from smc_mujoco.errors import ScenarioError, find, taken, unknown
 
 if TYPE_CHECKING:
     from smc_mujoco.claims.evidence import Held, Runs, Substitute
@@ -155,7 +155,7 @@ def wanted(only: Iterable[str | int] | None) -> list[Entry]:
     known = catalogue()
     if only is None:
         return list(known.values())
-    ids = {str(id) for id in only}
+    ids = {str(id) for id in taken("only", only)}
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]
@@ -167,7 +167,7 @@ def sets(gains: str | Sequence[str] | None, quick: bool) -> list[str]:
 
     if gains is None:
         return list(QUICK_SETS if quick else SETS)
-    names = [gains] if isinstance(gains, str) else list(gains)
+    names = [gains] if isinstance(gains, str) else taken("gains", gains)
     for name in names:
         find("set of gains", name, dict.fromkeys(SETS))
     if not names:

@@ -20,7 +20,7 @@ from smc_mujoco.draw.caption import Caption
 from smc_mujoco.draw.charts import Charts
 from smc_mujoco.draw.envelope import end, finite, windows
 from smc_mujoco.draw.stage import Stage
-from smc_mujoco.errors import ScenarioError
+from smc_mujoco.errors import ScenarioError, number
 from smc_mujoco.files import replacing
 from smc_mujoco.trace import Trace
 
@@ -160,10 +160,8 @@ def still(
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
-    with (
-        contextlib.closing(frames(traces, np.array([time]), labels, title, size)) as pictures,
-        replacing(path) as part,
-    ):
+    times = np.array([number("time", time, least=0.0)])
+    with contextlib.closing(frames(traces, times, labels, title, size)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path
 
