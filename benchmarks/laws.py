@@ -29,8 +29,9 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.batch import Chunk
-from smc_mujoco.simulation.callback import harness, installed
-from smc_mujoco.simulation.state import FAILURE, FINE
+from smc_mujoco.simulation.callback import callback, installed
+from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.state import FINE
 
 QUICK = "--quick" in sys.argv
 CALLS, ROUNDS = (50_000, 5) if QUICK else (200_000, 15)
@@ -91,24 +92,25 @@ def sample(law: str, velocity: str = "measured") -> float:
         plant=smc.plant("pendulum_network", n=PENDULUMS), law=law, velocity=velocity, integrator="Euler", duration=1.0
     )
     with installed():
-        chunk = Chunk([scenario], 1)  # keeps what its rows point to
-        data, row = mujoco.MjData(chunk.model), chunk.rows[0].copy()
+        chunk = Chunk([prepare(scenario)], 1)  # keeps what its record points to
+        data, record = mujoco.MjData(chunk.model), chunk.records.copy()
+        numbers, userdata = chunk.packed[0].numbers.copy(), chunk.batch.bind("userdata")[0].copy()
         phase = np.linspace(0.0, 40.0, PENDULUMS)
         data.qpos[:], data.qvel[:] = 0.3 * np.sin(phase), 2.1 * np.cos(phase)
         mujoco.mj_forward(chunk.model, data)
-    function, model, at = harness().ctypes, chunk.model._address, data._address
+    function, model, at = callback().ctypes, chunk.model._address, data._address
     moved = phase + 7e-3 * np.arange(SAMPLES)[:, None]
     seen = np.empty((SAMPLES, len(data.sensordata)))  # position and velocity, channel by channel
     seen[:, 0::2], seen[:, 1::2] = 0.3 * np.sin(moved), 2.1 * np.cos(moved)
     least = np.inf
     for _ in range(ROUNDS):
-        data.userdata[:] = row
+        data.userdata[:], chunk.records[:], chunk.packed[0].numbers[:] = userdata, record, numbers
         start = time.perf_counter()
         for k in range(SAMPLES):
             data.sensordata[:] = seen[k]
             function(model, at)
         least = min(least, time.perf_counter() - start)
-        assert data.userdata[FAILURE] == FINE, law
+        assert chunk.records["failure"][0] == FINE, law
     return 1e9 * least / (SAMPLES * PENDULUMS)
 
 

@@ -22,6 +22,7 @@ from rich.table import Table
 import smc_mujoco as smc
 from smc_mujoco.simulation.batch import Chunk
 from smc_mujoco.simulation.callback import installed
+from smc_mujoco.simulation.prepare import prepare
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9
@@ -48,15 +49,18 @@ def ratio(one: Callable[[], object], other: Callable[[], object]) -> tuple[float
 def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
     """A batch of equal runs, ready to step."""
     with installed():
-        return Chunk([dataclasses.replace(scenario, seed=seed) for seed in range(runs)], threads)
+        return Chunk([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
 
 
 def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:
     """Steps of a batch from its first state, with the callback or bare."""
-    start = batch.batch.state.copy()
+    start, records = batch.batch.state.copy(), batch.records.copy()
+    numbers = [packed.numbers.copy() for packed in batch.packed]
 
     def action() -> None:
-        batch.batch.state[:] = start
+        batch.batch.state[:], batch.records[:] = start, records
+        for packed, first in zip(batch.packed, numbers, strict=True):
+            packed.numbers[:] = first
         if bare:
             batch.batch.step(nstep=steps)
         else:

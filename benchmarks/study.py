@@ -23,6 +23,7 @@ import smc_mujoco as smc
 from smc_mujoco.simulation.batch import Chunk
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies import executor
 from smc_mujoco.studies.paper import scenarios as paper
@@ -49,7 +50,7 @@ def bare(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     spent = 0.0
     for batch in executor.batches(scenarios, threads):
         with installed():
-            chunk = Chunk(batch, threads)
+            chunk = Chunk([prepare(scenario) for scenario in batch], threads)
         start = time.perf_counter()
         chunk.batch.step(nstep=batch[0].samples * batch[0].steps)
         spent += time.perf_counter() - start

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 import smc_mujoco as smc
+from smc_mujoco.common.errors import shown
+from smc_mujoco.simulation.conditions import NAMED, find_condition
 
 ARM = """<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0" damping="0.1"/>
 <geom type="capsule" size="0.05" fromto="0 0 0 0.5 0 0" mass="1"/><body pos="0.5 0 0"><joint name="elbow" axis="0 1 0"/>
@@ -272,3 +274,43 @@ def fields(random: Random) -> dict[str, Any]:
     if random.random() < 1 / 200:
         found[random.choice(["sed", "lawn", "x_0", "", "controlperiod"])] = value(random)
     return {"plant": where} | found
+
+
+def starts(random: Random, n: int) -> Any:
+    """Where the runs of a grid begin: nothing said, or wild numbers."""
+    if random.random() < 0.5:
+        return None
+    x0 = random.choice([None, random.uniform(-3, 3), [wide(random) for _ in range(n)]])
+    given = {"x0": x0} | {name: positive(random) for name in few(random, ["spread", "by"], 2)}
+    if random.random() < 1 / 40:
+        given[random.choice(["x0", "spread", "by", "bye"])] = value(random)
+    return smc.starts(**given)
+
+
+def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
+    """The fields as a condition of one's own, alone, with one of the suite's or as text, on a grid of two seeds."""
+    left = {name: held for name, held in fields.items() if name not in ("plant", "law", "duration", "model", "surface")}
+    seeds = [0, left.pop("seed", 7)]
+    ours = random.choice(sorted(NAMED))
+    mine = smc.condition("wild", **left) if left else find_condition(ours)
+    around = starts(random, fields["plant"].n if isinstance(fields["plant"], smc.Plant) else 1)
+    way = random.randrange(3)
+    condition = mine + find_condition(ours) if way == 0 and left else mine
+
+    def grid(of: Any) -> list[smc.Scenario]:
+        return smc.grid(
+            [fields["plant"]], [fields["law"]], of, seeds, gains="default", duration=fields["duration"], starts=around
+        )
+
+    made = grid(condition)
+    if way == 1 and (read := _read(str(mine))) is not None and grid(read) != made:
+        raise AssertionError(f"{shown(str(mine))} is read as another condition")
+    return made
+
+
+def _read(text: str) -> Any:
+    """The condition that a text tells, None where it is refused: its values may be wild."""
+    try:
+        return find_condition(text)
+    except smc.ScenarioError:
+        return None

@@ -13,6 +13,9 @@ are few. The binomial interval of order statistics, the alternative, knows no bl
 ends are order statistics too, and cover as the binomial distribution says: 93 % or more with 6 to 40 seeds, and
 1 - 2^(1 - n) with fewer, which is all that the range of a sample can cover.
 
+A block may have fewer runs than there are seeds: seeds that change nothing in it are one run. It is fixed all the same,
+and a resample that draws none of its runs takes each of them once.
+
 The median of several blocks is the median of their medians. A law with the lower median in every block then has the
 lower one over all of them; the median of all runs together does not promise that.
 """
@@ -89,20 +92,27 @@ def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np
     """The lower and the upper of the middle two of each block in each resample of its seeds.
 
     Args:
-      values: (blocks, n), NaN where no run is.
+      values: (blocks, n), NaN where no run is; no block is without any.
       drawn: (n, resamples), how often each seed is drawn.
 
     Returns:
-      Two arrays (resamples, blocks), NaN where no run of the block is drawn.
+      Two arrays (resamples, blocks).
     """
-    found = np.full((2, drawn.shape[1], len(values)), math.nan)
+    found = np.empty((2, drawn.shape[1], len(values)))
     for k, block in enumerate(values):
         order = np.argsort(block)[: (~np.isnan(block)).sum()]
-        counted = 2 * np.cumsum(drawn[order], axis=0, dtype=drawn.dtype)
-        total, ordered = counted[-1] // 2, np.append(block[order], math.nan)
-        found[0, :, k] = ordered[(counted < np.maximum(total, 1)).sum(axis=0)]
+        counted, ordered = 2 * np.cumsum(counts(drawn, order), axis=0, dtype=drawn.dtype), block[order]
+        total = counted[-1] // 2
+        found[0, :, k] = ordered[(counted < total).sum(axis=0)]
         found[1, :, k] = ordered[(counted <= total).sum(axis=0)]
     return found[0], found[1]
+
+
+def counts(drawn: np.ndarray, runs: np.ndarray) -> np.ndarray:
+    """How often each of a block's runs counts in each resample: as drawn, or once where none of them is."""
+    found = drawn[runs]
+    found[:, ~found.any(axis=0)] = 1
+    return found
 
 
 def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
@@ -116,13 +126,14 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     z = NormalDist().inv_cdf((1 + checked(level)) / 2)
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((middle + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(share, max(low, 0.0), min(high, 1.0), n)
+    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding leaves 1 out, and 0
 
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int, resamples: int, seed: int) -> np.ndarray:
     """How often each of n seeds comes in each resample, (n, resamples)."""
     whole("resamples", resamples, 99, 10**6)
+    whole("seed", seed, 0, 2**63)
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
     drawn = np.ascontiguousarray(drawn.T, np.int32)
     drawn.setflags(write=False)

@@ -36,3 +36,10 @@ def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """1.0 where a is more than b but for rounding, -1.0 where less, 0.0 where they are tied; NaN where both are."""
     tie = np.maximum(ROUNDING, ALIKE * np.minimum(np.abs(a), np.abs(b)))
     return np.where(np.isnan(a), np.nan, (a > b + tie).astype(float) - (b > a + tie))
+
+
+def coarse(values: np.ndarray) -> np.ndarray:
+    """Values without what may be rounding: 0 below 1e-9, and 20 binary digits."""
+    share, exponent = np.frexp(np.where(np.abs(values) < ROUNDING, 0.0, values))
+    with np.errstate(over="ignore"):
+        return np.ldexp(np.round(share * 2**20), exponent - 20)

@@ -62,9 +62,9 @@ class Kind:
         return max(1, round(level / base.control_period)) * base.control_period
 
     def expected(self, base: Scenario) -> float | None:
-        """The largest level by linear theory; None where that has nothing to say of the law or the plant."""
+        """The largest level by linear theory; None where that has nothing to say of the law, plant or condition."""
         try:
-            return self.theory(base)
+            return None if _pushed(base) else self.theory(base)
         except ScenarioError:
             return None
 
@@ -77,6 +77,11 @@ def bears(trace: Trace) -> bool:
         return False
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
     return all(bound(part) <= BEARS * scale(part) for part in parts(trace).values())
+
+
+def _pushed(base: Scenario) -> bool:
+    """Whether forces or a plant that the theory does not know are there already."""
+    return bool(base.disturbance or base.friction or base.mismatch or base.jump)
 
 
 def _doubled(largest: float) -> tuple[float, ...]:
@@ -92,6 +97,13 @@ def _critical_delay(base: Scenario) -> float | None:
 def _at_rest(base: Scenario) -> float | None:
     most = BEARS * (max(map(abs, base.x0)) or 1.0)
     return theory.borne(base.plant, base.law, most, min(base.limits))
+
+
+def _rubbing(base: Scenario, level: float) -> Scenario:
+    """With so much dry friction more than there is."""
+    others = tuple(part for part in base.friction if not isinstance(part, Coulomb))
+    there = sum(part.level for part in base.friction if isinstance(part, Coulomb))
+    return dataclasses.replace(base, friction=(*others, Coulomb(there + level)))
 
 
 def _heavier(base: Scenario, level: float) -> Scenario:
@@ -116,7 +128,7 @@ SPECS: dict[str, Kind] = {
     "friction": Kind(
         unit="{u}",
         levels=_doubled(LARGEST),
-        put=lambda base, level: dataclasses.replace(base, friction=(*base.friction, Coulomb(level))),
+        put=_rubbing,
         theory=_at_rest,
     ),
     "mass": Kind(

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from smc_mujoco.analysis.differences import OF_SCALE
-from smc_mujoco.common.errors import ScenarioError, unknown
+from smc_mujoco.analysis.differences import OF_SCALE, coarse
+from smc_mujoco.common.errors import ScenarioError, taken, unknown
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
@@ -61,7 +61,7 @@ class Group:
       shape: laws, blocks, seeds.
       places: where among these each row is, flat.
       seeds: of each block, in how many every law ran.
-      repeats: (blocks, seeds), whether every law has done the same in an earlier seed.
+      repeats: (blocks, seeds), whether every law has done the same, but for rounding, in an earlier seed.
     """
 
     name: Mapping[str, str]
@@ -113,6 +113,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     Raises:
       ScenarioError: no runs, an unknown group, or two runs in a cell.
     """
+    by = taken("by", by)
     for name in by:
         if name not in GROUPS:
             raise unknown("group of a leaderboard", name, GROUPS)
@@ -130,12 +131,12 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 
 
 def _outcomes(table: Columns) -> np.ndarray:
-    """A number a row, the same for runs that are the same in every metric."""
+    """A number a row, the same for runs that are the same in every metric, but for rounding."""
     columns = []
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that was not there when the table was written
             columns.append(np.array(table.column(name), float))
-    numbers = np.ascontiguousarray(np.stack(columns, axis=1))
+    numbers = np.ascontiguousarray(coarse(np.stack(columns, axis=1)))
     numbers[np.isnan(numbers)] = math.nan  # one kind of it
     return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
 

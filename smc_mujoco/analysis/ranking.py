@@ -30,7 +30,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.bootstrap import RESAMPLES, checked, drawn_medians, draws, middle, outermost
+from smc_mujoco.analysis.bootstrap import RESAMPLES, checked, counts, drawn_medians, draws, middle, outermost
 from smc_mujoco.analysis.differences import exceeds, least_difference, worse
 from smc_mujoco.common.errors import ScenarioError, shown
 
@@ -173,7 +173,7 @@ def ranks(found: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[
     middles, low, high = place, np.full(k, math.nan), np.full(k, math.nan)
     if n > 1:
         drawn = block_ranks(_drawn_centres(found, draws(n, resamples, seed)), found.floors)
-        places, at = np.sort(_places(np.nanmean(drawn, axis=2)), axis=0), outermost(n, found.level, resamples)
+        places, at = np.sort(_places(drawn.mean(axis=2)), axis=0), outermost(n, found.level, resamples)
         middles, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
     p, best = found.p.min(axis=(0, 1)), ~np.any(found.better, axis=(0, 1))
     rows = [
@@ -193,23 +193,25 @@ def ranks(found: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[
 
 
 def _drawn_centres(found: Comparison, drawn: np.ndarray) -> np.ndarray:
-    """(resamples, laws, blocks), the centres of resamples; NaN where no run of the block is drawn."""
+    """(resamples, laws, blocks), the centres of resamples."""
     if not found.shares:
         return np.stack([sum(drawn_medians(own, drawn)) / 2 for own in found.cells], axis=1)
-    there = ~np.isnan(found.cells[0])
-    count = np.einsum("bn,nr->rb", there, drawn)
-    total = np.einsum("kbn,nr->rkb", np.where(there, found.cells, 0.0), drawn)
-    return total / np.where(count, count, math.nan)[:, None]
+    means = []
+    for block in found.cells.swapaxes(0, 1):
+        runs = np.flatnonzero(~np.isnan(block[0]))
+        count = counts(drawn, runs)
+        means.append(block[:, runs] @ count / count.sum(axis=0))
+    return np.stack(means).transpose(2, 1, 0)
 
 
 def block_ranks(centres: np.ndarray, floors: np.ndarray) -> np.ndarray:
-    """The laws' ranks in each block, (..., laws, blocks) as the centres; NaN where these are."""
+    """The laws' ranks in each block, (..., laws, blocks) as the centres."""
     lowered, twice = centres - least_difference(centres, resolution=floors), np.zeros(centres.shape, np.int16)
     for rival in range(centres.shape[-2]):
         own = slice(rival, rival + 1)
         twice += (lowered > centres[..., own, :]).view(np.int8)
         twice -= (lowered[..., own, :] > centres).view(np.int8)
-    return np.where(np.isnan(centres), math.nan, (centres.shape[-2] + 1 + twice) / 2)
+    return (centres.shape[-2] + 1 + twice) / 2
 
 
 def _places(mean: np.ndarray) -> np.ndarray:

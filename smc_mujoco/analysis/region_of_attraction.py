@@ -12,7 +12,8 @@ every channel. States are run for 15 % of the duration; those still open again, 
 for all of it (runs are deterministic, and keep no state between: this costs at most 1.55 times the last).
 - converges, early: home throughout the last third of the horizon, and (x/X)^2 + (v/V)^2 smaller by a tenth in the
   second half of it than in the first; or near, within a tenth of home, in the second half. There its size tells
-  nothing: a law that switches leaves a ripple, whose beat makes now one half larger, now the other.
+  nothing: a law that switches leaves a ripple, whose beat makes now one half larger, now the other. A start that is
+  near itself tells nothing either: what leaves slowly is near for long.
 - does not, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away from home.
 - at the end: converges if home throughout the last 20 % of the run, and near or not leaving, larger by 5 %; does not if
   never home in them; else undecided. What leaves by less, 2.5 % a second in runs of 10 s, is taken to stay.
@@ -191,10 +192,12 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     distance = np.maximum(np.abs(trace.x / far[0]), np.abs(trace.v / far[1])).max(axis=1)
     late = last(trace) if final else slice(-(distance.size // LATE), None)
     home = distance[late] <= BAND
-    square = ((trace.x[late] / far[0]) ** 2 + (trace.v[late] / far[1]) ** 2).sum(axis=1)
+    square = ((trace.x / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
+    start, square = square[0], square[late]
     middle = square.size // 2
     sooner, later = square[:middle].max(), square[middle:].max()
-    stays = home.all() and later <= max((LEAVING if final else SHRINKING) * sooner, NEAR)
+    near = NEAR if final or start > NEAR else 0.0
+    stays = home.all() and later <= max((LEAVING if final else SHRINKING) * sooner, near)
     if final or stays:
         return CONVERGES if stays else UNDECIDED if home.any() else DOES_NOT
     moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])

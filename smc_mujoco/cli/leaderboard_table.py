@@ -19,6 +19,7 @@ KEY = (
     "place by mean rank, won and lost under how many, and a winner wins under each; x, u of driven joints, in rad or "
     "m, N m or N"
 )
+NARROW = 6  # runs, with fewer of which no interval of a median covers 95 %, see `statistics`
 
 
 def leaderboard_table(boards: Sequence[Board]) -> Table:
@@ -38,6 +39,8 @@ def leaderboard_table(boards: Sequence[Board]) -> Table:
             table.add_row(*line)
         table.add_section()
     table.caption = KEY.format(level=100 * boards[0].level) if boards else "no boards: no metric applies"
+    if any(block.runs < NARROW for board in boards for block in board.blocks):
+        table.caption += f"; of fewer than {NARROW} runs an interval is their range, and covers less"
     table.caption_justify = "left"
     return table
 

@@ -4,6 +4,7 @@ kind_of(Sequence[float] | None).takes([1.0, "a"])        # False
 kind_of(Sequence[float] | None).one                      # "a list of numbers or None"
 """
 
+import itertools
 import math
 import numbers
 import os
@@ -15,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import number, whole
+from smc_mujoco.common.errors import MOST, number, whole
 
 LONGEST = 255  # bytes of a file's name
 
@@ -126,8 +127,11 @@ def _several(origin: type, held: list[Kind], count: int | None) -> Kind:
             return False
         if not isinstance(value, Sized):
             return not issubclass(origin, Sized)
-        kinds = held[:1] * len(value) if count is None else held
-        return count in (None, len(value)) and all(kind.takes(item) for kind, item in zip(kinds, value, strict=False))
+        if count not in (None, len(value)):
+            return False
+        kinds = itertools.repeat(held[0]) if count is None and held else held
+        items = itertools.islice(value, MOST)  # of a range without end the beginning
+        return all(kind.takes(item) for kind, item in zip(kinds, items, strict=False))
 
     plural = held[0].several if held else "values"
     return Kind(test, f"a list of {plural}" if count is None else f"{count} {plural}", f"lists of {plural}")

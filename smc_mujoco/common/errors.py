@@ -12,6 +12,7 @@ import numpy as np
 
 T = TypeVar("T")
 LONGEST_NAME = 100  # characters: chosen, for tables and figures
+MOST = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
 LONGEST = 1500  # characters of a message: a path may have any number
 
 
@@ -122,6 +123,22 @@ def _real(value: Any) -> Any:
         value = value.item()
     number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
     return value if number else None
+
+
+def taken(what: str, values: Iterable[T]) -> list[T]:
+    """The items of a user's list, or ScenarioError naming `what` where there are more than MOST, or no end of them."""
+    found = list(itertools.islice(values, MOST + 1))
+    if len(found) > MOST:
+        raise ScenarioError(f"{what} has more than {MOST:,} items: give fewer")
+    return found
+
+
+def attribute(value: object, name: str) -> Any:
+    """An attribute of a user's value; None where it has none, or fails where it is asked for one."""
+    try:
+        return getattr(value, name, None)
+    except Exception:
+        return None
 
 
 def name(what: str, value: object) -> str:

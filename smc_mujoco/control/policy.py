@@ -30,6 +30,7 @@ from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]
 LIBRARIES = {".onnx": "onnxruntime", ".pt": "torch", ".pth": "torch", ".ts": "torch", ".pt2": "torch"}
+CURE = "give a callable from an observation to an action"
 SCRIPT = "give TorchScript, as torch.jit.script(module).save writes it, and no state_dict"
 CURES = {".onnx": "give what torch.onnx.export writes", ".pt2": "give what torch.export.save writes"}  # else SCRIPT
 ONNX = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
@@ -152,7 +153,12 @@ def policy(act: Any, *, reference: bool = False) -> Law:
     Raises:
       ScenarioError: nothing of these, no such file, or a library that is not installed.
     """
-    asked, name = _callable(act)
+    try:
+        asked, name = _callable(act)
+    except ScenarioError:
+        raise
+    except Exception as error:  # of a user's object that does not even say whether it can be called
+        raise ScenarioError(f"policy is {shown(act)}: {CURE}") from error
     return law_function(Policy(asked, name, reference))()
 
 
@@ -172,7 +178,7 @@ def _callable(act: Any) -> tuple[Act, str]:
     if predicts and not callable(act):  # a model of stable-baselines3 has its policy's own predict
         act = getattr(act, "policy", act)
     elif not callable(act):
-        raise ScenarioError(f"policy is {shown(act)}: give a callable from an observation to an action")
+        raise ScenarioError(f"policy is {shown(act)}: {CURE}")
     if torch is None or not isinstance(act, torch.nn.Module):
         return (act if callable(act) else functools.partial(_predicted, act)), getattr(act, "__name__", name)
     try:

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation import reference
@@ -118,7 +118,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     own = [trace.scenario.law.name for trace in traces]
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
-            raise ScenarioError(f"labels are {given!r} for {len(traces)} traces: give one string a trace")
+            raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
         return [str(label) for label in given]
     names = [law_name(law) for law in own]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
@@ -174,7 +174,7 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     Raises:
       ScenarioError: none, or of several plants.
     """
-    traces = [traces] if isinstance(traces, Trace) else list(traces)
+    traces = [traces] if isinstance(traces, Trace) else taken("traces", traces)
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
     plants = sorted({trace.scenario.plant.name for trace in traces})

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, attribute, shown
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -89,10 +89,10 @@ class Agent:
 
 def _source(environment: Any) -> Any:
     """What has an environment's setting and counts its samples."""
-    for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
-        if isinstance(getattr(owner, "setting", None), Setting) and isinstance(getattr(owner, "sample", None), int):
+    for owner in (attribute(environment, "task"), attribute(environment, "unwrapped")):
+        if isinstance(attribute(owner, "setting"), Setting) and isinstance(attribute(owner, "sample"), int):
             return owner
-    cure = "give one of smc_mujoco.envs.dm_control_env, or a single one of smc_mujoco.envs.gymnasium_env"
+    cure = "give one of smc_mujoco.suite, or a single one of smc_mujoco.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")
 
 

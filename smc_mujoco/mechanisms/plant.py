@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Protocol
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.errors import MOST, ScenarioError, find, number, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
@@ -169,7 +169,7 @@ class Plant:
           factors: parameter name -> factor on its value (the true plant's mismatch).
           nuserdata: length of mjData.userdata.
         """
-        model = ready(self.spec(), nuserdata)
+        model = ready(self.spec(), whole("nuserdata", nuserdata, 0, MOST))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model

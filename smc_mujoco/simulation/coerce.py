@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import estimator
@@ -135,7 +135,7 @@ def state(name: str, value: object, n: int) -> tuple[float, ...]:
     """n numbers, from one or n of them."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else (value,)
+    items = taken(name, value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else [value]
     if len(items) == 1:
         items *= n
     if len(items) != n:

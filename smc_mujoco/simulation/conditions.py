@@ -14,6 +14,7 @@ gear's, the lag a hydraulic valve's, the counts, per revolution or metre, an ine
 """
 
 import ast
+import contextlib
 import dataclasses
 import inspect
 import math
@@ -21,8 +22,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -91,15 +95,20 @@ class Condition:
         """
         return dict(self.fields(plant, duration) if callable(self.fields) else self.fields)
 
-    def __add__(self, other: "Condition") -> "Condition":
+    def __add__(self, other: "Condition | str") -> "Condition":
         """Both at once. Disturbances, frictions and actuators add up; of any other field only one may say something."""
-        return Condition(f"{self.name} + {other.name}", lambda plant, duration: _joined((self, other), plant, duration))
+        both = self, find_condition(other)
+        return Condition(" + ".join(one.name for one in both), lambda plant, duration: _joined(both, plant, duration))
 
     def __str__(self) -> str:
         """The text that `parsed` reads; the name alone of one of the suite's."""
         if self.name in NAMED or callable(self.fields):
             return self.name
-        return f"{self.name}: " + ", ".join(f"{name}={_text(value)}" for name, value in self.fields.items())
+        try:
+            texts = {name: _text(value) for name, value in self.fields.items()}
+        except Exception:  # of a user's value, whose repr fails or nests too deep; no scenario takes it either
+            texts = {name: shown(value) for name, value in self.fields.items()}
+        return f"{self.name}: " + ", ".join(f"{name}={text}" for name, text in texts.items())
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -140,6 +149,17 @@ def find_condition(value: Condition | str) -> Condition:
     return sum(found[1:], start=found[0])
 
 
+def suiting(names: Iterable[str], plants: Iterable[Plant], duration: float) -> list[str]:
+    """Of the suite's conditions of these names, those that have numbers for each plant."""
+    plants, found = list(plants), []
+    for name in names:
+        with contextlib.suppress(ScenarioError):
+            for plant in plants:
+                NAMED[name].on(plant, duration)
+            found.append(name)
+    return found
+
+
 def parsed(text: str) -> Condition:
     """The condition that a text tells, such as "worn gear: friction=Coulomb(0.05)".
 
@@ -157,7 +177,7 @@ def parsed(text: str) -> Condition:
     if not isinstance(call, ast.Call) or call.args or any(word.arg is None for word in call.keywords):
         cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
         raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}")
-    return condition(name.strip(), **{str(word.arg): _value(word.value) for word in call.keywords})
+    return condition(name.strip(), **_named(call))
 
 
 def from_file(path: Path) -> list[Condition]:
@@ -166,10 +186,8 @@ def from_file(path: Path) -> list[Condition]:
     Raises:
       ScenarioError: a file or a line that cannot be read.
     """
-    try:
-        lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"cannot read conditions from {str(path)!r} ({error}): give a text file") from None
+    with reading(path, "file of conditions", "give a text file, a condition a line") as file:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     return [find_condition(line) for line in lines if line and not line.startswith("#")]
 
 
@@ -183,7 +201,7 @@ def _value(node: ast.expr) -> Any:
         return -errors.number("a value", _value(node.operand), infinite=True)
     if isinstance(node, ast.Tuple | ast.List):
         return tuple(_value(item) for item in node.elts)
-    if isinstance(node, ast.Dict):
+    if isinstance(node, ast.Dict) and None not in node.keys:
         return {_value(k): _value(v) for k, v in zip(node.keys, node.values, strict=True) if k is not None}
     if isinstance(node, ast.Call):
         return _called(node)
@@ -196,13 +214,23 @@ def _called(node: ast.Call) -> Any:
     """A part, a signal or an estimator with its numbers."""
     name = ast.unparse(node.func).removeprefix("smc.")
     kind = find("part, signal or estimator", name, _kinds() | estimators())
-    values = [_value(value) for value in node.args], {str(word.arg): _value(word.value) for word in node.keywords}
+    values, named = [_value(value) for value in node.args], _named(node)
     try:
-        return kind(*values[0], **values[1])
+        return kind(*values, **named)
     except TypeError:
         known = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
         cure = f"it takes {', '.join(known) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
+
+
+def _named(node: ast.Call) -> dict[str, Any]:
+    """The named values of a call, each of them given once."""
+    found: dict[str, Any] = {}
+    for word in node.keywords:
+        if str(word.arg) in found:
+            raise ScenarioError(f"condition has {word.arg} twice, in {shown(ast.unparse(node))}: give it once")
+        found[str(word.arg)] = _value(word.value)
+    return found
 
 
 def _kinds() -> dict[str, Any]:
@@ -232,6 +260,7 @@ def _frozen(value: Any) -> Any:
     """A field's value that cannot change."""
     if isinstance(value, Mapping):
         return frozen(value)
+    value = value.tolist() if isinstance(value, np.ndarray) else value
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -241,12 +270,20 @@ def _joined(both: Iterable[Condition], plant: Plant, duration: float) -> dict[st
         for field, value in one.on(plant, duration).items():
             if field in found and field in SEVERAL:
                 found[field] = (*_several(found[field]), *_several(value))
-            elif field in found and found[field] != value:
+            elif field in found and not _same(found[field], value):
                 names = " and ".join(repr(c.name) for c in both)
                 raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
             else:
                 found[field] = value
     return found
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are equal; those that do not compare, such as arrays, are not."""
+    try:
+        return bool(one == other)
+    except Exception:
+        return False
 
 
 def _several(value: Any) -> tuple:

@@ -65,6 +65,8 @@ def control(at, sim, data):
         _sum_forces(sim, data)
         if _escaped(sim, data):
             failure = record.DIVERGED
+        elif k >= sim.samples:  # somebody steps the simulation beyond its end
+            failure = record.INTERRUPTED
         elif within == 0:
             failure = _measure(at, sim, data, k)
             if failure == record.FINE:

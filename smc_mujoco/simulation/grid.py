@@ -5,11 +5,10 @@
 Plants may be the suite's, by name, or models of your own; so may laws and conditions.
 """
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.errors import MOST, ScenarioError, shown, taken, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
@@ -23,7 +22,6 @@ from smc_mujoco.simulation.scenario import Scenario
 
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 NOTHING: Mapping[str, Any] = frozen({})
-MOST = 1_000_000  # runs of a grid, some kB each; chosen
 
 
 def grid(
@@ -49,13 +47,15 @@ def grid(
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: a name that is not known, gains that the set does not have, or more than a million runs.
+      ScenarioError: a name that is not known, conditions of one name, gains that the set does not have, or more than a
+        million runs.
     """
     numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
-    numbers = listed("seeds", itertools.islice(numbers, MOST + 1))
+    numbers = listed("seeds", numbers)
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
+    conditions = _apart(conditions)
     return [
         case(plant, law, condition, duration, gains, seed, starts)
         for plant in plants
@@ -91,6 +91,16 @@ def case(
     return (starts or Starts()).place(scenario, seed).named(asked.name)
 
 
+def _apart(conditions: Sequence[str | Condition]) -> list[Condition]:
+    """The conditions, of which those that differ have names that differ."""
+    found = [find_condition(condition) for condition in conditions]
+    known: dict[str, Condition] = {}
+    for one in found:
+        if str(known.setdefault(one.name, one)) != str(one):
+            raise ScenarioError(f"two conditions have the name {one.name!r}: give each a name of its own")
+    return found
+
+
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """A law as given, or one of that name with its gains for the plant."""
     if not isinstance(law, str):
@@ -102,6 +112,6 @@ def listed(what: str, values: object) -> list:
     """Several values as a list, from one or several."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
-    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := list(values)):
+    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := taken(what, values)):
         raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
     return found

@@ -99,11 +99,11 @@ def retold(s: Scenario, record: np.ndarray, packed: Packed) -> str | None:
     The function that failed is called once more, as Python, with what its record still holds: so the words depend on
     nothing beside the run. None where it does not fail again: it had already changed its memory.
     """
-    joints = view(packed.numbers, record["joints"], (2 + 4 * s.plant.n,))
+    joints = view(packed.numbers, int(record["joints"]), (2 + 4 * s.plant.n,))
     i = int(joints[0])
 
     def again(c: Component, y: tuple, function: np.ndarray) -> None:
-        memory = view(packed.numbers, function["memory"], (s.plant.n, c.memory))[i].copy()
+        memory = view(packed.numbers, int(function["memory"]), (s.plant.n, c.memory))[i].copy()
         guarded(c, remade(c.function, as_written), i, y, named(c), memory)
 
     try:
@@ -126,7 +126,7 @@ def retold(s: Scenario, record: np.ndarray, packed: Packed) -> str | None:
                 t = float(record["instant"]["t"])
                 for j, signal in enumerate(s.disturbance):
                     at = packed.signals[j]["function"]["memory"]
-                    memories = view(packed.numbers, at, (s.plant.n, signal.memory)).copy()
+                    memories = view(packed.numbers, int(at), (s.plant.n, signal.memory)).copy()
                     for channel in range(s.plant.n if signal.random else 1):
                         signalled(signal, t, memories[channel], s.seed, channel, s.stream(j))
     except Failure as failure:

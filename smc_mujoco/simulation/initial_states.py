@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.common.errors import number
+from smc_mujoco.common.errors import number, taken
 from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
@@ -73,5 +73,5 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     Raises:
       ScenarioError: a number out of its range.
     """
-    items = x0 if isinstance(x0, Sequence) and not isinstance(x0, str) else (x0,)
+    items = taken("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     return Starts(x0=None if x0 is None else tuple(number("x0", item) for item in items), spread=spread, by=by)

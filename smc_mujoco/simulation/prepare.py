@@ -172,6 +172,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "driven": int(np.sum(channels["ctrl"] >= 0)),
         "nq": nq,
         "nv": nv,
+        "samples": len(log),
         "signal_count": len(signals),
         "steps": s.steps,
         "stages": s.stages,

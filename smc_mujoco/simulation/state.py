@@ -48,8 +48,8 @@ SIMULATION = np.dtype(
     [
         # what has happened so far: calls of the callback, a failure and its physics step
         ("calls", "i8"), ("failure", "i8"), ("failed_step", "i8"),
-        # sizes: channels, those of them that have an actuator, qpos, qvel, disturbances
-        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("signal_count", "i8"),
+        # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log, disturbances
+        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("samples", "i8"), ("signal_count", "i8"),
         # the clock: physics steps a control period, callbacks a physics step, s of each
         ("steps", "i8"), ("stages", "i8"), ("step", "f8"), ("period", "f8"),
         # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), SIGNAL (signal_count,)
@@ -80,7 +80,7 @@ simulation_at, state_at, log_at, signal_at = map(record_at, (SIMULATION, CHANNEL
 
 def _place(name: str) -> int:
     """Bytes from the start of a simulation's record to a field."""
-    return int(SIMULATION.fields[name][1])  # pyright: ignore[reportOptionalSubscript]
+    return SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript, reportArgumentType]
 
 
 Y, READING_AT, INSTANT_AT = _place("y"), _place("reading"), _place("instant")

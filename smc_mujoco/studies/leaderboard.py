@@ -22,7 +22,7 @@ from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_
 from smc_mujoco.analysis.friedman import Friedman, friedman
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank, compare, ranks
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
@@ -185,7 +185,7 @@ def leaderboard(
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
     """
-    units, boards = _units(metrics), []
+    units, boards, seed = _units(metrics), [], whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
         ran = cells.scenarios(table, group)

@@ -11,7 +11,7 @@ yours, and the versions of the packages. A run that is there is not run again; o
 import dataclasses
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from pathlib import Path
@@ -19,7 +19,6 @@ from pathlib import Path
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
 from smc_mujoco.common.progress import Counter, counter
 from smc_mujoco.control.gain_sets import LAWS
-from smc_mujoco.simulation.grid import listed
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -110,10 +109,13 @@ def study(
 def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     """Hash -> scenario, in order; of equal ones the first."""
     found: dict[str, Scenario] = {}
-    for scenario in listed("scenarios", scenarios):
+    several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
+    for scenario in scenarios if several else ():  # one by one, as they may be without end
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         found.setdefault(key(scenario), scenario)
+    if not found:
+        raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
     return found
 
 

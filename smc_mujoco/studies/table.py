@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find, shown, taken
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.metrics.catalogue import metrics
@@ -168,7 +168,8 @@ class Table:
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
                 there = dict.fromkeys(self.column(name).tolist())
-                names = list(wanted) if isinstance(wanted, Iterable) and not isinstance(wanted, str) else [wanted]
+                several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
+                names = taken(name, wanted) if several else [wanted]
                 for one in names:
                     find(f"{name} of this table", one, there)
                 data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))

@@ -171,6 +171,21 @@ def test_dry_friction_up_to_theory_is_borne(found):
     assert friction.value >= friction.theory - friction.resolution
 
 
+def test_dry_friction_is_borne_beside_what_a_condition_has():
+    rough = smc.Scenario(plant="duffing", law="pid", friction=(smc.Viscous(0.1), smc.Coulomb(0.1)))
+    put = margin_kinds.SPECS["friction"].put(rough, 0.2)
+    assert set(put.friction) == {smc.Viscous(0.1), smc.Coulomb(0.1 + 0.2)}
+    none = smc.Scenario(plant="duffing", law="pid")
+    assert margin_kinds.SPECS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
+
+
+def test_theory_says_nothing_of_a_plant_that_a_condition_pushes_or_changes():
+    for condition, told in (("nominal", True), ("noise", True), ("constant", False), ("heavy", False)):
+        base = smc.grid("duffing", "observer_free", condition)[0]
+        for kind in ("delay", "disturbance", "friction"):
+            assert (margin_kinds.SPECS[kind].expected(base) is not None) == told
+
+
 def test_only_laws_with_a_linear_part_have_theory(found):
     assert [margin.kind for margin in found if margin.theory is not None] == ["delay", "disturbance", "friction"]
 

@@ -12,8 +12,8 @@ from scipy import stats
 import smc_mujoco as smc
 from smc_mujoco import grid
 from smc_mujoco.analysis import paired_runs as cells
-from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
-from smc_mujoco.analysis.differences import OF_VALUE, exceeds, least_difference, worse
+from smc_mujoco.analysis.bootstrap import Interval, median_interval, median_of, share_interval
+from smc_mujoco.analysis.differences import OF_VALUE, coarse, exceeds, least_difference, worse
 from smc_mujoco.analysis.friedman import friedman
 from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, holm
 from smc_mujoco.analysis.ranking import ranks as places
@@ -148,16 +148,17 @@ def test_values_that_are_none_are_refused(values):
         median_interval(values)
 
 
-@pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9)])
+@pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9), ("seed", -1)])
 def test_a_level_or_a_number_of_resamples_out_of_range_is_refused(name, value):
     with pytest.raises(ScenarioError, match=name):
         median_interval([1.0, 2.0], **{name: value})
 
 
-@pytest.mark.parametrize(("k", "n"), [(0, 1), (3, 20), (20, 20)])
+@pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 17), (3, 20), (15, 15), (20, 20)])
 def test_the_interval_of_a_share_is_wilson_s(k, n):
-    wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
-    assert share_interval(k / n, n)[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
+    wanted, found = stats.binomtest(k, n).proportion_ci(method="wilson"), share_interval(k / n, n)
+    assert found[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
+    assert found.low <= found.median <= found.high
 
 
 # ranks
@@ -443,6 +444,7 @@ def test_groups_may_be_conditions_or_all_runs_where_units_allow():
     assert all_runs.cells == 80
     assert math.isnan(all_runs.entries[0].interval.median)  # rad and m, N and N m
     assert all_runs.winner == "a"
+    assert leaderboard(table, ["itae"], by=np.array([]))[0] == all_runs  # pyright: ignore[reportArgumentType]
     (times,) = leaderboard(table, ["settling_time"], by=())
     assert math.isfinite(times.entries[0].interval.median)
     both = leaderboard(table, ["itae"], by=("plant", "condition"))
@@ -473,6 +475,7 @@ def test_what_cannot_be_compared_is_refused():
         (table, {"metrics": ["speed"]}, "unknown metric"),
         (table, {"metrics": ()}, "metrics is"),
         (table, {"by": ("law",)}, "unknown group"),
+        (table, {"seed": 0.5}, "seed is 0.5"),
         (table, {"level": 1.5}, "level"),
         (table.taken(np.r_[0:240, 0]), {}, "several runs of a on van_der_pol, nominal, seed 0"),
         (table.taken(first), {}, "a, b, c have no run of van_der_pol in common"),
@@ -579,6 +582,32 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
     text = " ".join(printed([board]).split())
     assert "20 seeds, 1 distinct run" in text
     assert board.verdict == "no winner in all 2 conditions: a wins under c0"
+
+
+def test_seeds_that_change_rounding_alone_are_one_sample():
+    values = 1.0 + 1e-12 * np.arange(20.0)
+    (board,) = leaderboard(stand({"a": values[None], "b": 2 * values[None]}), ["itae"])
+    assert board.verdict == "no winner: 20 seeds, 1 distinct run"
+    assert len({*coarse(np.array([0.1, 0.1 + 1e-15, 0.1 - 1e-15]))}) == 1
+    assert (coarse(np.array([INF, 0.0, 3.0, 1.7e308])) > coarse(np.array([1.0, -1e-3, 2.9999, 1.0]))).all()
+
+
+def test_a_block_without_randomness_is_in_every_resample():
+    (one, two), nothing = blocks(1.0, 2.0, seeds=20), [math.nan] * 19
+    both = median_of(np.stack([one, [5.0, *nothing]]))
+    alone = median_of(one[None])
+    assert both[:3] == pytest.approx([(5.0 + end) / 2 for end in alone[:3]])
+    first, second = (np.stack([block, [rest, *nothing]]) for block, rest in ((one, 2.0), (two, 1.0)))
+    for shares in (False, True):
+        assert [(r.low, r.high) for r in ranks({"a": first, "b": second}, shares=shares)] == [(1.5, 1.5)] * 2
+
+
+@pytest.mark.parametrize(("seeds", "told"), [(5, True), (6, False)])
+def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
+    text = " ".join(
+        printed(leaderboard(stand({"a": blocks(1.0, seeds=seeds), "b": blocks(2.0, seeds=seeds)}), ["itae"])).split()
+    )
+    assert ("of fewer than 6 runs an interval is their range" in text) == told
 
 
 def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count_are_tied():

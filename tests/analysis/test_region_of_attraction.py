@@ -83,6 +83,12 @@ def test_what_leaves_slowly_is_not_taken_for_home_early(lam, k1):
     assert (found.outcome[1] != CONVERGES).all()
 
 
+@pytest.mark.parametrize("plant", ["duffing", "van_der_pol"])
+def test_what_leaves_slowly_from_near_the_reference_is_not_taken_for_home_early(plant):
+    found = maps.of(base(plant, smc.law("none"), 10.0), [0.0005, 0.001, 2.0], [0.0, 6.0])
+    assert (found.outcome != CONVERGES).all()
+
+
 def test_a_run_that_fails_does_not_converge():
     found = maps.of(base("duffing", fails_far_out(far=1.0), 4.0), [0.5, 1.5], [0.0, 0.1])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2

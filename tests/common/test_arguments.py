@@ -5,6 +5,7 @@ import inspect
 import itertools
 import os
 import pickle
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
+import wild
 
 import smc_mujoco as smc
 from smc_mujoco.common import arguments
@@ -160,6 +162,51 @@ def test_a_public_name_keeps_its_signature_and_words(name):
 def test_a_class_explains_itself_once():
     before = smc.Trace.save
     assert arguments.explained(smc.Trace).save is before
+
+
+# lists without end
+
+
+class Endless(Sequence):
+    """A list that cannot be held: whoever takes two million items of it would take them all."""
+
+    def __len__(self):
+        return 10**9
+
+    def __getitem__(self, i):
+        assert i < 2 * 10**6, "takes every item"
+        return i
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda trace, many: smc.Scenario(plant="duffing", law="none", x0=many), "x0 has more than 1,000,000 items"),
+        (lambda trace, many: smc.starts(many), "x0 has more than"),
+        (lambda trace, many: smc.grid(many, "none"), "plants has more than"),
+        (lambda trace, many: smc.grid("duffing", "none", seeds=many), "seeds has more than"),
+        (lambda trace, many: smc.margins("duffing", many), "laws has more than"),
+        (lambda trace, many: smc.study(many, "out"), "cannot study 0"),
+        (lambda trace, many: smc.plant_from(wild.ARM, many), "channels has more than"),
+        (lambda trace, many: smc.claims(only=many), "only has more than"),
+        (lambda trace, many: smc.claims(gains=many), "gains has more than"),
+        (lambda trace, many: smc.figure(many, "a"), "traces has more than"),
+        (lambda trace, many: smc.figure(trace, "a", labels=many), "labels are "),
+        (lambda trace, many: smc.still(trace, many, "a.png"), "time is "),
+        (
+            lambda trace, many: smc.Table(data=pa.table({"plant": ["duffing"]})).select(plant=many),
+            "plant has more than",
+        ),
+    ],
+)
+def test_a_list_without_end_is_refused_before_it_fills_the_memory(trace, call, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert re.match(words, refused(call, trace, Endless()))
+
+
+def test_an_annotation_looks_at_the_beginning_of_a_list_without_end():
+    assert kind_of(Sequence[int]).takes(Endless())
+    assert not kind_of(Sequence[str]).takes(range(10**9))
 
 
 # values that cannot be shown

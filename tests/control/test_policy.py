@@ -309,6 +309,18 @@ def test_what_is_no_policy_is_one_sentence(act, words):
     assert "\n" not in str(raised.value)
 
 
+class Broken:
+    """What does not say whether it has a method."""
+
+    def __getattr__(self, name):
+        raise ZeroDivisionError(name)
+
+
+def test_what_does_not_say_whether_it_can_be_called_is_no_policy():
+    with pytest.raises(smc.ScenarioError, match=r"policy is .*: give a callable from an observation"):
+        smc.policy(Broken())
+
+
 @pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt", "torch"), ("a.pt2", "torch")])
 def test_a_library_that_is_missing_is_named(file, library, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)

@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+import wild
 from dm_env import StepType, test_utils
 from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, run_of, start
 
@@ -332,7 +333,11 @@ class Lost(smc.Signal):
         (lambda: suite.load("duffing").task.setting.command([np.inf]), "action is \\[inf\\]: give finite numbers"),
         (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
         (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),
-        (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.envs.dm_control_env"),
+        (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.suite"),
+        (
+            lambda: smc.agent("classical", wild.Awkward()),
+            r"environment is <wild.Awkward .*: give one",
+        ),
         (lambda: smc.agent("clasical", suite.load("duffing")), "did you mean 'classical'"),
     ],
 )

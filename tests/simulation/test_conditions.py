@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli.main import app
-from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed
+from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed, suiting
 from smc_mujoco.simulation.initial_states import SEEDS
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.run_key import condition as told
@@ -86,6 +88,24 @@ def test_conditions_add_up():
     with pytest.raises(smc.ScenarioError, match="'light' and 'heavy' both set mismatch"):
         find_condition("light + heavy").on(duffing, 4.0)
     assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
+    assert (WORN + "noise").name == "worn gear + noise"
+    with pytest.raises(smc.ScenarioError, match="condition is 3: give a name"):
+        _ = WORN + 3  # pyright: ignore[reportOperatorIssue]
+
+
+def test_a_condition_of_any_values_has_a_text_and_joins_others():
+    class Shy:
+        def __repr__(self):
+            raise KeyError("no")
+
+    assert str(smc.condition("shy", friction=Shy())) == "shy: friction=<Shy>"
+    array = smc.condition("array", x0=np.array([0.3]))
+    assert parsed(str(array)) == array
+    (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
+    assert run.x0 == (0.3,)
+    odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
+    with pytest.raises(smc.ScenarioError, match="'odd' and 'noise' both set noise"):
+        smc.grid("duffing", "none", odd + find_condition("noise"))
 
 
 def test_what_happens_once_does_so_at_half_time():
@@ -106,6 +126,9 @@ def test_what_happens_once_does_so_at_half_time():
         ("worn: frction=1", "did you mean 'friction'"),
         ("worn: plant='duffing'", "which the grid itself says"),
         ("worn:", "has no fields"),
+        ("worn: x0=1, x0=2", "has x0 twice"),
+        ("worn: friction=Coulomb(level=1, level=2)", "has level twice"),
+        ("worn: mismatch={'mass': 1.3, **{'mass': 2}}", "give numbers, texts and parts"),
         (": input_delay=0.01", "a condition's name"),
         ("noise: input_delay=0.01", "is a name of the suite"),
         ("noisy", "did you mean 'noise'"),
@@ -123,11 +146,37 @@ def test_a_file_holds_a_condition_a_line(tmp_path):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
     assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
-    with pytest.raises(smc.ScenarioError, match="cannot read conditions"):
+    with pytest.raises(smc.ScenarioError, match="no file of conditions"):
         from_file(tmp_path / "none.txt")
 
 
+def test_a_pipe_or_a_folder_is_no_file_of_conditions(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, Path("/dev/zero")):
+        with pytest.raises(smc.ScenarioError, match="file of conditions"):
+            from_file(path)
+
+
 # grids
+
+
+def test_conditions_of_one_name_that_differ_are_refused():
+    light, heavy = (smc.condition("loaded", mismatch={"mass": factor}) for factor in (0.9, 1.1))
+    with pytest.raises(smc.ScenarioError, match="two conditions have the name 'loaded'"):
+        smc.grid("duffing", "classical", [light, heavy])
+    assert len(smc.grid("duffing", "classical", [light, light, "noise + coulomb", "noise + coulomb"])) == 4
+
+
+def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
+    names = ["nominal", "jump_mild", "coulomb", "contact"]
+    duffing = smc.plant("duffing")
+    assert suiting(names, [duffing], 1.0) == names
+    assert suiting(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
+
+
+def test_a_condition_that_starts_at_0_is_nothing_to_tune_for():
+    with pytest.raises(smc.ScenarioError, match=r"duffing starts at 0 under 'rest'.*smc.starts"):
+        smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)])
 
 
 def test_a_grid_has_conditions_of_ones_own_under_their_names():
@@ -234,6 +283,15 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
         ("duffing", "worn gear"),
         ("arm", "worn gear"),
     }
+
+
+def test_bench_has_conditions_for_a_model_of_ones_own_without_being_told_any(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--laws", "pid", "--gains", "default", "--seeds", "1", "--duration", "0.05", "--x0", "0.4"]
+    done = CliRunner().invoke(app, ["bench", "--quick", "--plants", f"{file}:shoulder", *arguments])
+    assert done.exit_code == 0, done.output
+    done = CliRunner().invoke(app, ["bench", "--plants", f"{file}:shoulder", *arguments])
+    assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize(

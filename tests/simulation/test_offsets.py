@@ -29,6 +29,13 @@ def nothing_left_behind():
     assert left == (None, None)
 
 
+@pytest.mark.parametrize("number", [-1, 2**53, 0.5, None])
+def test_a_length_of_userdata_that_mujoco_cannot_hold_is_one_sentence(number):
+    with pytest.raises(smc.ScenarioError, match=r"nuserdata is .*: give a whole number from 0 to"):
+        smc.plant("duffing").load(nuserdata=number)
+    assert smc.plant("duffing").load(nuserdata=-0.0).nuserdata == 0  # pyright: ignore[reportArgumentType]
+
+
 @pytest.fixture
 def live():
     model = smc.plant("duffing").load(nuserdata=17)

@@ -87,11 +87,22 @@ class Objective:
         }
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
-        """One run for each condition; every candidate has the same starts and the same noise."""
+        """One run for each condition; every candidate has the same starts and the same noise.
+
+        Raises:
+          ScenarioError: a condition in which the plant starts at 0.
+        """
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
         cases = [dataclasses.replace(first, **one.on(first.plant, self.duration)) for one in self.conditions]
-        return [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
+        placed = [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
+        for one, case in zip(self.conditions, placed, strict=True):
+            if not any(case.x0):
+                cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
+                raise ScenarioError(
+                    f"{case.plant.name} starts at 0 under {one.name!r}, where a law has nothing to do: {cure}"
+                )
+        return placed
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
         """Tracking and variation of a candidate's runs, each summed over them; J = tracking + weight variation."""

@@ -20,7 +20,9 @@ def bench(
         str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
     ] = None,
     laws: Annotated[str | None, typer.Option(help="Laws, as a,b, or all; default the report's short list.")] = None,
-    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
+    conditions: Annotated[
+        str | None, typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants.")
+    ] = None,
     condition: asked.Conditions = None,
     x0: asked.Middle = None,
     spread: asked.Spread = None,
@@ -51,6 +53,8 @@ def bench(
             from rich.console import Console
 
             from smc_mujoco.cli.leaderboard_table import leaderboard_table
+            from smc_mujoco.mechanisms.plant import plant as find_plant
+            from smc_mujoco.simulation.conditions import suiting
             from smc_mujoco.simulation.grid import grid
             from smc_mujoco.studies.leaderboard import leaderboard
             from smc_mujoco.studies.paper.general_laws import general_laws
@@ -60,13 +64,16 @@ def bench(
         chosen = QUICK if quick else FULL
         with clock("in all"):
             named = asked.plants(asked.names(plants, chosen.plants))
+            length = chosen.duration if duration is None else duration
+            machines = [find_plant(plant) if isinstance(plant, str) else plant for plant in named]
+            usual = () if condition else suiting(chosen.conditions, machines, length)
             scenarios = grid(
                 named,
                 general_laws(named, gains) if laws == "all" else asked.names(laws, chosen.laws),
-                asked.conditions(asked.names(conditions, () if condition else chosen.conditions), condition),
+                asked.conditions(asked.names(conditions, usual), condition),
                 seeds or chosen.seeds,
                 gains,
-                chosen.duration if duration is None else duration,
+                length,
                 asked.starts(x0, spread),
             )
             table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import extras, gl
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite, windows
@@ -161,10 +161,8 @@ def still(
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
-    with (
-        contextlib.closing(frames(traces, np.array([time]), labels, title, size)) as pictures,
-        replacing(path) as part,
-    ):
+    times = np.array([number("time", time, least=0.0)])
+    with contextlib.closing(frames(traces, times, labels, title, size)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import mujoco
 
-from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.common.errors import ScenarioError, find, number, shown, taken
 from smc_mujoco.mechanisms.custom.mjcf import pick
 
 BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
@@ -42,7 +42,11 @@ def given(channels: object) -> tuple[tuple[str, Channel], ...]:
     """Joints with their Channels, from whatever the user gave."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
-    items = list(channels.items()) if isinstance(channels, Mapping) else [(joint, None) for joint in channels]
+    items = (
+        list(channels.items())
+        if isinstance(channels, Mapping)
+        else [(joint, None) for joint in taken("channels", channels)]
+    )
     if not items:
         raise ScenarioError("channels is empty: give at least one joint's name")
     return tuple((joint, channel(joint, value)) for joint, value in items)

@@ -71,7 +71,8 @@ class Encoder(Part):
                 f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"
             )
         for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
-            if abs(time / step - round(time / step)) > 1e-6 or 0.0 < time < 0.5 * step:
+            count = time / step
+            if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
                 raise ScenarioError(
                     f"Encoder's {name} {time:g} s is no whole number of physics steps of {step:g} s: "
                     "give a physics_step that divides it"

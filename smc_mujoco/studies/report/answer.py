@@ -69,7 +69,14 @@ def cells(scores: Sequence[Score]) -> Cells:
 
 def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
     """The laws that are best, or level with the best; none where none gets there at all."""
-    return [s.law for s in found.get((plant, condition, metric), ()) if s.best and math.isfinite(s.median)]
+    best = [s for s in found.get((plant, condition, metric), ()) if s.best]
+    return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
+
+
+def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
+    """The law that wins, as on a board: it alone leads, among several."""
+    leading = leaders(found, plant, condition, metric)
+    return leading[0] if len(leading) == 1 < len(found[plant, condition, metric]) else None
 
 
 def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
@@ -80,7 +87,7 @@ def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
         Standing(
             law,
             sum(law in b for b in best.values()),
-            sum(b == [law] for b in best.values()),
+            sum(winner(found, *key) == law for key in best),
             sum(law in b for b in behind.values()),
             len(best),
         )
@@ -91,20 +98,20 @@ def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
 
 def everywhere(found: Cells, metric: str) -> dict[str, list[str]]:
     """Law -> the conditions under which it wins on every plant, of at least two."""
-    winners: dict[str, list[list[str]]] = {}
+    winners: dict[str, list[str | None]] = {}
     for key in (key for key in found if key[2] == metric):
-        winners.setdefault(key[1], []).append(leaders(found, *key))
+        winners.setdefault(key[1], []).append(winner(found, *key))
     told: dict[str, list[str]] = {}
     for condition, by_plant in winners.items():
-        if len(by_plant) > 1 and len(by_plant[0]) == 1 and all(each == by_plant[0] for each in by_plant):
-            told.setdefault(by_plant[0][0], []).append(words.condition(condition))
+        if len(by_plant) > 1 and by_plant[0] and set(by_plant) == {by_plant[0]}:
+            told.setdefault(by_plant[0], []).append(words.condition(condition))
     return told
 
 
 def undecided(found: Cells, metrics: Sequence[str]) -> Open:
     """How many comparisons end without one winner."""
-    best = [leaders(found, *key) for key in found if key[2] in metrics]
-    return Open(sum(len(b) != 1 for b in best), len(best))
+    winners = [winner(found, *key) for key in found if key[2] in metrics]
+    return Open(winners.count(None), len(winners))
 
 
 def repeated(found: Cells) -> int:

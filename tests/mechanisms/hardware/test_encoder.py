@@ -449,6 +449,11 @@ def test_times_that_are_no_whole_number_of_steps_are_refused(field):
     scenario(smc.Encoder(**{field: 0.0015}), physics_step=5e-4)
 
 
+def test_a_period_beyond_all_steps_is_refused():
+    with pytest.raises(smc.ScenarioError, match=r"period 1e\+306 s is no whole number of physics steps"):
+        scenario(smc.Encoder(period=1e306))
+
+
 def test_a_delay_beyond_the_run_leaves_the_initial_state():
     _, x, _ = read(smc.Encoder(math.inf, delay=2.0))
     assert (x == 1.5).all()

@@ -329,6 +329,16 @@ def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findi
     assert "nor in every condition" in text
 
 
+def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
+    cell = [s._replace(best=True) for s in scores(observer_free=1.0, classical=math.inf)]
+    assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
+    assert "wins" not in told(findings, cell)
+
+
+def test_a_law_alone_does_not_win(findings):
+    assert "wins" not in told(findings, scores(classical=1.0))
+
+
 def test_the_answer_says_where_seeds_change_nothing(findings):
     cells = scores(runs=1, observer_free=2.0, classical=1.0), scores("noise", observer_free=2.0, classical=1.0)
     assert "In 1 of the cells seeds change nothing" in told(findings, *cells)

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from smc_mujoco.common.errors import ScenarioError, find, unknown
+from smc_mujoco.common.errors import ScenarioError, find, taken, unknown
 from smc_mujoco.common.registry import modules
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.studies.paper.claims.entry import Entry
@@ -37,7 +37,7 @@ def catalogue() -> dict[str, Entry]:
       ScenarioError: two claims of one id.
     """
     found: dict[str, Entry] = {}
-    for module in modules(__package__):
+    for module in modules("smc_mujoco.studies.paper.claims"):
         for entry in vars(module).values():
             if isinstance(entry, Entry):
                 if entry.id in found:
@@ -89,7 +89,7 @@ def wanted(only: Iterable[str | int] | None) -> list[Entry]:
     known = catalogue()
     if only is None:
         return list(known.values())
-    ids = {str(id) for id in only}
+    ids = {str(id) for id in taken("only", only)}
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]
@@ -99,7 +99,7 @@ def sets(gains: str | Sequence[str] | None, quick: bool) -> list[str]:
     """The sets of gains that `claims` takes for these arguments; an unknown one is a ScenarioError."""
     if gains is None:
         return list(QUICK_SETS if quick else SETS)
-    names = [gains] if isinstance(gains, str) else list(gains)
+    names = [gains] if isinstance(gains, str) else taken("gains", gains)
     for name in names:
         find("set of gains", name, dict.fromkeys(SETS))
     if not names:

@@ -5,8 +5,7 @@ Noise is the study's, 0.01 m on x and 0.05 m/s on v; the disturbance is the pape
 
 import numpy as np
 
-from smc_mujoco.metrics import conventions
-from smc_mujoco.metrics.catalogue import HIGH
+from smc_mujoco.metrics.catalogue import HIGH, conventions
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper.claims.checks import about
 from smc_mujoco.studies.paper.claims.compare import OURS, RIVALS, UNCLAMPED, deviation, given, scores
