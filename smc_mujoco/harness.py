@@ -201,7 +201,8 @@ def _applied(row, table, ctrl, i):
         return 0.0
     if row[slot.FIRST] > 0.0:
         return row[int(row[slot.FIRST]) + 2 * i]
-    return ctrl[table[i, column.CTRL]] / row[slot.SCALE]
+    limit = _limit(row, i)
+    return min(max(ctrl[table[i, column.CTRL]] / row[slot.SCALE], -limit), limit)  # scaled and back: an ulp beyond
 
 
 @njit(error_model="numpy")

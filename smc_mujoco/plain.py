@@ -73,6 +73,7 @@ class Loop:
         self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.tandem, self.first = scenario.tandem, np.zeros(n)  # of two drives, and the output of the first
+        self.limits = np.array(scenario.limits)
         self.arrived = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((LOGS, scenario.samples + 1, n), np.nan)
         self.failure: str | None = None
@@ -111,7 +112,8 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.table[:, column.QPOS]], data.qvel[self.table[:, column.QVEL]]
                 reached = self.arrived if self.tandem else data.ctrl[self.table[:, column.CTRL]] / self.scale
-                applied = np.where(self.table[:, column.CTRL] >= 0, reached, 0.0)
+                applied, driven = np.zeros(len(x)), self.table[:, column.CTRL] >= 0
+                applied[driven] = np.clip(reached[driven], -self.limits, self.limits)  # scaled and back: an ulp beyond
                 acted = self.acted / self.scenario.steps
                 self.log[:, k] = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
                 self.acted[:] = 0.0
