@@ -50,7 +50,7 @@ SLICE = 10_000  # cases a process at most; each process compiles the laws that i
 MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
-CASES = {"scenarios": 12_000, "batches": 1_000, "calls": 8_000, "files": 2_000}  # 10 minutes on two cores
+CASES = {"scenarios": 40_000, "batches": 2_000, "calls": 25_000, "files": 8_000}  # 10 minutes on two cores
 
 
 class Found(AssertionError):

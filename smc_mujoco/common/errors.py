@@ -127,7 +127,11 @@ def _real(value: Any) -> Any:
 
 def taken(what: str, values: Iterable[T]) -> list[T]:
     """The items of a user's list, or ScenarioError naming `what` where there are more than MOST, or no end of them."""
-    found = list(itertools.islice(values, MOST + 1))
+    try:
+        items = iter(values)
+    except Exception:  # an array without axes, or a user's object that fails
+        raise ScenarioError(f"{what} is {shown(values)}: give a list") from None
+    found = list(itertools.islice(items, MOST + 1))
     if len(found) > MOST:
         raise ScenarioError(f"{what} has more than {MOST:,} items: give fewer")
     return found

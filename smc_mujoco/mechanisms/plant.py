@@ -185,7 +185,7 @@ class Plant:
                 raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
             values[name] *= factor
         for name, value in values.items():
-            if not math.isfinite(value) or (value <= 0.0 and name in self.positive):
+            if not abs(value) <= LARGEST or (value <= 0.0 and name in self.positive):
                 raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
         return Values(**values)
 

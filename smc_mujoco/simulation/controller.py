@@ -312,7 +312,9 @@ def _log(sim, data, k):
         if channel.ctrl < 0:
             sample.applied = 0.0
         else:
-            sample.applied = data.ctrl[channel.ctrl] / sim.scale if sim.tandem == 0 else state.arrived
+            applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
+            # scaled and back, it may be an ulp beyond the limit
+            sample.applied = min(max(applied, -limit), limit) if sim.tandem == 0 else state.arrived
         sample.d = _disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
         state.force, state.reaction = 0.0, 0.0

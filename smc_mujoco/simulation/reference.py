@@ -85,6 +85,7 @@ class Loop:
         self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.tandem, self.first = scenario.tandem, np.zeros(n)  # of two drives, and the output of the first
+        self.limits = np.array(scenario.limits)
         self.arrived = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -123,7 +124,8 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
-                applied = np.where(self.channels["ctrl"] >= 0, reached, 0.0)
+                applied, driven = np.zeros(len(x)), self.channels["ctrl"] >= 0
+                applied[driven] = np.clip(reached[driven], -self.limits, self.limits)  # scaled and back: an ulp beyond
                 acted = self.acted / self.scenario.steps
                 sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
                 for name, values in zip(LOG.names or (), sample, strict=True):

@@ -204,6 +204,12 @@ def test_a_list_without_end_is_refused_before_it_fills_the_memory(trace, call, w
     assert re.match(words, refused(call, trace, Endless()))
 
 
+def test_what_cannot_be_gone_through_is_no_list():
+    for x0 in (wild.Awkward(), np.array(0.5)):
+        assert refused(smc.grid, "duffing", "none", seeds=x0).startswith("seeds is ")
+    assert refused(smc.Scenario, plant="duffing", law="none", x0=wild.Awkward()).endswith(": give a list")
+
+
 def test_an_annotation_looks_at_the_beginning_of_a_list_without_end():
     assert kind_of(Sequence[int]).takes(Endless())
     assert not kind_of(Sequence[str]).takes(range(10**9))

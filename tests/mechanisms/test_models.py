@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.mechanisms.plant import catalogue, model_path, plant, write
 
 NAMES = sorted(catalogue())
@@ -232,3 +233,9 @@ def test_pymjcf_reads_every_file():
             assert getattr(again, count) == getattr(made, count), f"{count} of {file.name}"
         np.testing.assert_array_equal(again.body_mass, made.body_mass)
         np.testing.assert_array_equal(again.geom_pos, made.geom_pos)
+
+
+@pytest.mark.parametrize("name", ["cart_pole", "pendulum_network", "overhead_crane"])
+def test_a_true_parameter_beyond_what_a_plant_takes_is_refused(name):
+    with pytest.raises(smc.ScenarioError, match=rf"{name}'s true l becomes \S+: give other factors"):
+        smc.run(smc.Scenario(plant=name, law="none", duration=0.01, mismatch={"l": 1e277}))

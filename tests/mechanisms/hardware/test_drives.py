@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
+import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit
@@ -333,3 +334,18 @@ def test_bad_numbers_are_one_sentence(make, says):
     with pytest.raises(ScenarioError) as error:
         make()
     assert str(error.value) == says
+
+
+@smc.law_function
+def saturated(y, gains, memory):
+    """A law that does not compile and asks for more than there is."""
+    return float(str(-100.0)), y.e
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+@pytest.mark.parametrize("law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"])
+def test_what_a_motor_is_asked_for_is_within_the_bound_to_the_last_bit(law):
+    """With this gear a command of 6 N becomes volts and comes back an ulp larger."""
+    motor = smc.DCMotor(gear=0.32761186154670086)
+    trace = smc.run(smc.Scenario(plant="duffing", law=law, duration=0.005, x0=0.8, actuator=motor))
+    assert np.abs(trace.applied).max() == trace.scenario.u_max
