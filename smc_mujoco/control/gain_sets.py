@@ -21,7 +21,8 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import catalogue
+from smc_mujoco.mechanisms.plant import Plant, catalogue
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
@@ -84,7 +85,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
 }
 
 
-def law(plant: str, name: str, gains: str = "tuned", seed: int = 0) -> Component:
+def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
     """The law with its gains for a plant, from a set. No warning tells of conditions that they miss: they are as found.
 
     Args:
@@ -97,7 +98,9 @@ def law(plant: str, name: str, gains: str = "tuned", seed: int = 0) -> Component
     find("set of gains", gains, dict.fromkeys((*SETS, "default")))
     if gains == "default":
         return base
-    found = _study(plant, name) if gains == "study" else _found(plant, FORMS.get(name, name), gains, seed)
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    tuned = FORMS.get(name, name)
+    found = _study(machine.name, name) if gains == "study" else _found(machine, tuned, gains, seed)
     return dataclasses.replace(base, gains={gain: found.get(gain, value) for gain, value in base.gains.items()})
 
 
@@ -128,13 +131,22 @@ def _study(plant: str, name: str) -> Mapping[str, float]:
     return find("law of the paper's study", SAME.get(name, name), laws)
 
 
-def _found(plant: str, name: str, gains: str, seed: int) -> Mapping[str, float]:
-    return _read(file(plant, name, OBJECTIVES[gains], seed % tunings(gains, name)), plant, name, gains)
+def _found(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:
+    path = file(plant.name, name, OBJECTIVES[gains], seed % tunings(gains, name))
+    if not path.is_file():
+        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {_cure(plant, name)}")
+    return _read(path)
+
+
+def _cure(plant: Plant, name: str) -> str:
+    """What to do about a law that a set has no gains for on a plant."""
+    example = next(iter(find_law(name).gains), "k")
+    own = f"give the law with gains of its own, as {name}({example}=...)"
+    if not plant.unscaled:
+        own += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
+    return f"{own}, or take default ones (--gains default)"
 
 
 @functools.cache
-def _read(path: Path, plant: str, name: str, gains: str) -> Mapping[str, float]:
-    if not path.is_file():
-        cure = f"give the law with gains of its own (smc-mujoco tune {plant} {name} finds them), or take default ones"
-        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant}: {cure} (--gains default)")
+def _read(path: Path) -> Mapping[str, float]:
     return read_json(path)["scenario"]["law"]["gains"]

@@ -95,7 +95,7 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     """A law as given, or one of that name with its gains for the plant."""
     if not isinstance(law, str):
         return coerce.component(law, "law")
-    return sets.law(plant.name, law, "default" if law == "none" else gains, seed)
+    return sets.law(plant, law, "default" if law == "none" else gains, seed)
 
 
 def listed(what: str, values: object) -> list:

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
 from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed
 from smc_mujoco.simulation.initial_states import SEEDS
@@ -234,6 +235,49 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
         ("duffing", "worn gear"),
         ("arm", "worn gear"),
     }
+
+
+TWO = """<mujoco model="two"><worldbody><body>
+  <joint name="shoulder" type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.4"/>
+  <body pos="0 0 -0.4"><joint name="elbow" type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.4"/></body>
+</body></worldbody><actuator><motor joint="shoulder"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("bench", "--plants", "arm.xml:shoulder"), "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json"),
+        (("basin", "cart_pole", "--law", "hierarchical"), "hierarchical(a=...), or take default ones"),
+        (("tune", "two.xml:shoulder", "pid", "--x0", "0.4"), "two: it has no nominal model, of which tuning takes"),
+        (("bench", "--laws", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),
+        (("bench", "--laws", "pid(50)"), "cannot be read"),
+        (("bench", "--laws", "classical,pdi(kp=5, ki=1)"), "did you mean 'pid'"),
+        (("margins", "--laws", "pid(kq=5)"), "unknown gain of pid"),
+    ],
+)
+def test_commands_name_what_has_no_gains(arguments, words, file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.xml").write_text(TWO)
+    done = CliRunner().invoke(app, list(arguments))
+    said = done.output + capsys.readouterr().err
+    assert done.exit_code == 2
+    assert words in " ".join(said.split())
+
+
+def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runner, common = CliRunner(), ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"]
+    tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
+    assert runner.invoke(app, [*tuned, *common]).exit_code == 0
+    laws = "arm_pid.json,classical(k=5, c=2e0)"
+    bench = ["bench", "--plants", "arm.xml:shoulder", "--laws", laws, "--seeds", "1", "--duration", "0.1", *common]
+    done = runner.invoke(app, bench)
+    assert done.exit_code == 0, done.output
+    assert "gains as given" in done.output
+    table = smc.Table.read(tmp_path / "study")
+    laws = {s.law.name: s.law for s in map(table.scenario, range(len(table)))}
+    assert laws["pid"] == load(tmp_path / "arm_pid.json").law
+    assert laws["classical"].gains == {"k": 5.0, "c": 2.0}
 
 
 @pytest.mark.parametrize(

@@ -213,8 +213,8 @@ def scales(plant: Plant, u_max: float, modelled: bool, reach: float | None = Non
     Raises:
       ScenarioError: a plant without a start or an inertia, with channels of two units, or a joint without an actuator.
     """
-    if plant.underactuated or plant.mixed:
-        raise ScenarioError(f"{plant.name} has free joints, or channels of two units: tune on a plant that has neither")
+    if plant.unscaled:
+        raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     at_rest = np.zeros(plant.n)
     g = min(abs(plant.nominal(at_rest, at_rest, i, plant.values({}))[1]) for i in range(plant.n))
     X = max(abs(x) for x in plant.x0) if reach is None else reach

@@ -19,7 +19,9 @@ def bench(
     plants: Annotated[
         str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
     ] = None,
-    laws: Annotated[str | None, typer.Option(help="Laws, as a,b, or all; default the report's short list.")] = None,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b, or all; default the report's short list. {asked.OWN_GAINS}")
+    ] = None,
     conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b; default 7 ideal and 5 real ones.")] = None,
     condition: asked.Conditions = None,
     x0: asked.Middle = None,
@@ -60,9 +62,10 @@ def bench(
         chosen = QUICK if quick else FULL
         with clock("in all"):
             named = asked.plants(asked.names(plants, chosen.plants))
+            ranked = general_laws(named, gains) if laws == "all" else asked.laws(asked.names(laws, chosen.laws))
             scenarios = grid(
                 named,
-                general_laws(named, gains) if laws == "all" else asked.names(laws, chosen.laws),
+                ranked,
                 asked.conditions(asked.names(conditions, () if condition else chosen.conditions), condition),
                 seeds or chosen.seeds,
                 gains,
@@ -72,6 +75,7 @@ def bench(
             table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
         console.print(leaderboard_table(leaderboard(table)))
         failed = len(table) - table.data["failure"].null_count
-        said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        counts = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
+        said = f"{counts}, {asked.origin(ranked, gains)}, {clock.spent['in all']:.0f} s"
         console.print(said, soft_wrap=True, highlight=False)
         wrote(console, out / "results.parquet")

@@ -18,7 +18,7 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
     for name in general():
         try:
             for plant in plants:
-                sets.law(plant.name if isinstance(plant, Plant) else plant, name, gains)
+                sets.law(plant, name, gains)
         except ScenarioError as error:
             why = error
         else:
