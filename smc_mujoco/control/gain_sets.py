@@ -14,14 +14,16 @@ The files of `tuned_gains/` hold each tuning whole, with history and versions; `
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import Plant, catalogue
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
 
 SETS = ("study", "tuned", "tracking")
@@ -38,7 +40,6 @@ SEEDS = {"tuned": 3, "tracking": 1}  # set -> from how many seeds the laws of LA
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
 FORMS["super_twisting_unclamped"] = "super_twisting"
 SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the first set, whose gains it was not given
-UNTUNED = {"none", "swing_up", *FORMS}  # laws that have units, and are no rivals
 
 # The first set: plant -> law -> gains. Super-twisting's were found with its integral held within u_max, and are run so.
 STUDY: dict[str, dict[str, dict[str, float]]] = {
@@ -104,6 +105,32 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     return dataclasses.replace(base, gains={gain: found.get(gain, value) for gain, value in base.gains.items()})
 
 
+def general() -> tuple[str, ...]:
+    """List every law that can be a rival on some plant: those of LAWS, then all others by name."""
+    others = {name for name, each in catalogue().items() if not each.plants} - {"none", *FORMS, *LAWS}
+    return *LAWS, *sorted(others)
+
+
+def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
+    """List the general laws that have gains in a set on each of these plants, those of LAWS first.
+
+    Raises:
+      ScenarioError: an unknown set, or one without gains for any law on these plants.
+    """
+    found, why = [], None
+    for name in general():
+        try:
+            for plant in plants:
+                law(plant, name, gains)
+        except ScenarioError as error:
+            why = error
+        else:
+            found.append(name)
+    if not found and why:
+        raise why
+    return found
+
+
 def tunings(gains: str, name: str) -> int:
     """From how many seeds a law was tuned for a set."""
     return SEEDS[gains] if name in LAWS else 1
@@ -111,7 +138,7 @@ def tunings(gains: str, name: str) -> int:
 
 def paper_plant(plant: object) -> str:
     """The name of one of the paper's plants, which have conditions and gains; ScenarioError for any other plant."""
-    if isinstance(plant, str) and (plant in STUDY or plant not in catalogue()):
+    if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
     raise ScenarioError(

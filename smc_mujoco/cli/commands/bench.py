@@ -53,9 +53,9 @@ def bench(
             from rich.console import Console
 
             from smc_mujoco.cli.leaderboard_table import leaderboard_table
+            from smc_mujoco.control.gain_sets import general_laws
             from smc_mujoco.simulation.grid import grid
             from smc_mujoco.studies.leaderboard import leaderboard
-            from smc_mujoco.studies.paper.general_laws import general_laws
             from smc_mujoco.studies.study import FULL, QUICK, study
 
         clock, console = Clock(), Console()
