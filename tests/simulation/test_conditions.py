@@ -181,6 +181,17 @@ def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
     assert set(table.column("failure")) == {None}
 
 
+def test_grid_asks_where_a_model_at_rest_starts(arm):
+    law = smc.law("classical")
+    with pytest.raises(smc.ScenarioError, match=r"arm starts at rest at 0 .* 'nominal'.*smc.starts\(x0=0.5\) or --x0"):
+        smc.grid(["duffing", arm], law, ["noise", "nominal"], 2)
+    moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
+    assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 10
+    assert len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2  # seed 0 alone starts at 0
+    held = ARM.replace('fromto="0 0 0 0 0 -0.4"', 'fromto="0 0 0 0.4 0 0"')
+    assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it
+
+
 def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm):
     law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
     with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
