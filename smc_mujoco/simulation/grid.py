@@ -96,8 +96,10 @@ def case(
     fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
     if machine.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": coerce.U_MAX}
-    scenario = Scenario(**fields | asked.on(machine, duration) | dict(changes))
-    return (starts or Starts()).place(scenario, seed).named(asked.name)
+    conditioned, around = asked.on(machine, duration), starts or Starts()
+    around.check_condition(asked.name, conditioned)
+    scenario = Scenario(**fields | conditioned | dict(changes))
+    return around.place(scenario, seed).named(asked.name)
 
 
 def check_moving(seeds: Sequence[Scenario]) -> None:

@@ -181,6 +181,16 @@ def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
     assert set(table.column("failure")) == {None}
 
 
+@pytest.mark.parametrize("search", [smc.grid, smc.margins, smc.tune, smc.basin])
+def test_start_is_set_by_condition_or_starts(search):
+    far = smc.condition("far", x0=1.0)
+    fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
+    more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
+    with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
+        search("duffing", "classical", **fields, **more)
+    assert [s.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
+
+
 def test_grid_asks_where_a_model_at_rest_starts(arm):
     law = smc.law("classical")
     with pytest.raises(smc.ScenarioError, match=r"arm starts at rest at 0 .* 'nominal'.*smc.starts\(x0=0.5\) or --x0"):

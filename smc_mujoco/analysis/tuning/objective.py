@@ -90,7 +90,10 @@ class Objective:
         """One run for each condition; every candidate has the same starts and the same noise."""
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
-        cases = [dataclasses.replace(first, **one.on(first.plant, self.duration)) for one in self.conditions]
+        fields = [one.on(first.plant, self.duration) for one in self.conditions]
+        for one, conditioned in zip(self.conditions, fields, strict=True):
+            self.starts.check_condition(one.name, conditioned)
+        cases = [dataclasses.replace(first, **conditioned) for conditioned in fields]
         return [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
