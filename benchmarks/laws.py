@@ -117,7 +117,7 @@ def sample(law: str, velocity: str = "measured") -> float:
 def general(name: str) -> bool:
     """Whether a law is for the pendulums of the measurement."""
     template = laws()[name]
-    return template.degree < 3 and (not template.plants or "pendulum_network" in template.plants)
+    return template.relative_degree < 3 and (not template.plants or "pendulum_network" in template.plants)
 
 
 def main() -> None:

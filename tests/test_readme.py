@@ -14,7 +14,6 @@ import typer
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.cli import main, show
 from smc_mujoco.common import gl
 from smc_mujoco.studies import scene
@@ -63,7 +62,6 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(search_space, "SCALES", dict(search_space.SCALES))  # to which a page adds
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()

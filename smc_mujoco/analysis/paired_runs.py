@@ -6,20 +6,22 @@ for group in groups(table, by=("plant",)):
 
 import contextlib
 import dataclasses
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from smc_mujoco.analysis.differences import OF_SCALE, coarse
-from smc_mujoco.common.errors import ScenarioError, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
 
 SETTLES = "settles"  # no metric of a run: whether its settling time is finite
 GROUPS = ("plant", "condition")
+FREE = ("law", "model", "surface", "velocity", "versions")  # of a run's description: what may differ within a cell
 
 
 class Columns(Protocol):
@@ -111,7 +113,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     """The groups of a table, in the order of its rows; () is all of it.
 
     Raises:
-      ScenarioError: no runs, an unknown group, or two runs in a cell.
+      ScenarioError: no runs, an unknown group, two runs in a cell, or runs of a cell that differ in more than the law.
     """
     by = taken("by", by)
     for name in by:
@@ -122,12 +124,51 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     if not seeds.size:
         raise ScenarioError("the table has no runs: run a study first")
     columns |= {"seed": seeds, "outcome": _outcomes(table)}
+    _check_alike(table, columns)
     keys = np.stack([columns[name] for name in by]) if by else np.zeros((1, seeds.size), str)
     shared, first, which = np.unique(keys, axis=1, return_index=True, return_inverse=True)
     for i in np.argsort(first):
         rows = np.flatnonzero(which.ravel() == i)
         name = dict(zip(by, shared[:, i].tolist(), strict=True)) if by else {}
         yield _group(name, rows, {name: values[rows] for name, values in columns.items()})
+
+
+def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
+    """Raise ScenarioError for runs of one plant, condition and seed that differ in more than the law.
+
+    A table without the column "scenario" is not looked at.
+    """
+    try:
+        texts = table.column("scenario")
+    except ScenarioError:
+        return
+    cells = list(zip(columns["plant"], columns["condition"], columns["seed"].tolist(), strict=True))
+    first: dict[tuple, tuple[str, dict[str, Any]]] = {}
+    for cell, law, text in zip(cells, columns["law"], texts, strict=True):
+        told = {name: value for name, value in json.loads(text).items() if name not in FREE}
+        told["plant"].get("mjcf", {}).pop("path", None)  # its contents tell models apart
+        known, other = first.setdefault(cell, (law, told))
+        if told != other and (found := _difference(other, told)):
+            what, one, two = found
+            raise ScenarioError(
+                f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {known} and "
+                f"{shown(two)} under {law}: give runs that differ in the law alone"
+            )
+
+
+def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, Any, Any] | None:
+    """The first entry in which two descriptions differ, with its values; None where only one of them has it."""
+    for name in (key for key in one if key in two):
+        a, b = one[name], two[name]
+        if isinstance(a, list) and isinstance(b, list) and a and isinstance(a[0], dict) and len(a) == len(b):
+            a, b = dict(enumerate(a)), dict(enumerate(b))
+        if not (isinstance(a, dict) and isinstance(b, dict)):
+            if a != b:
+                return str(name), a, b
+        elif found := _difference(a, b):
+            inner = isinstance(name, int) or name == "values"  # no names of a user's
+            return found if inner else (f"{name}'s {found[0]}", *found[1:])
+    return None
 
 
 def _outcomes(table: Columns) -> np.ndarray:

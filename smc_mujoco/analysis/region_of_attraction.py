@@ -39,7 +39,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import BAND, last
-from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, case
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -120,6 +120,8 @@ def basin(
       ScenarioError: an unknown plant, law, set or condition, or a grid of nothing.
     """
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
+    if own := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
+        raise ScenarioError(f"condition {base.condition!r} sets {own[0]}, and a map starts everywhere: leave it out")
     reach = TURN[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")

@@ -114,7 +114,7 @@ def _table(heading: str, templates: Mapping[str, Template]) -> Table:
     table.add_column("source", style="dim", max_width=17)
     for name, template in sorted(templates.items()):
         said = entry(template)
-        degree = [str(template.degree)] if graded else []
+        degree = [str(template.relative_degree)] if graded else []
         table.add_row(name, *degree, Text(said.formula), Text(brief(said.source)))
     return table
 
@@ -155,7 +155,7 @@ def _gains(template: Template) -> Iterable[str]:
 
 def _degree(template: Template) -> str:
     """The relative degree in words: what a law asks of its sliding variable, or what a surface gives."""
-    what = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}.get(template.degree, "")
+    what = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}.get(template.relative_degree, "")
     if template.kind == "surface":
-        return f"{template.degree}: for the laws of that degree"
-    return f"{template.degree}: acts on {what}" if what else str(template.degree)
+        return f"{template.relative_degree}: for the laws of that degree"
+    return f"{template.relative_degree}: acts on {what}" if what else str(template.relative_degree)

@@ -1,7 +1,7 @@
-"""A component: a pure function with named gains and a memory - what laws, surfaces and estimators are made of.
+"""A component is a pure function with named gains and a memory. Laws, surfaces and estimators are components.
 
-A `Template` is the function with its default gains; calling it with gains gives a `Component`, plain data that a
-Scenario holds. The function is called as `function(y, gains, memory)`: y and gains are read by attribute, memory is a
+A `Template` is the function with its default gains. Called with gains it gives a `Component`: plain data that a
+Scenario holds. The function is called as `function(y, gains, memory)`. It reads y and gains by attribute. Memory is a
 float array, zero at the start of a run, one per channel, free to change.
 """
 
@@ -10,35 +10,106 @@ import importlib
 import inspect
 import keyword
 import math
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from types import SimpleNamespace
+from typing import NamedTuple, TypedDict
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import modules
+from smc_mujoco.control.units import Gain
+
+Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
+RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # words of version 0.1
+
+
+class Rest(NamedTuple):
+    """What linear theory needs to know of a law that is linear near s = 0. Gains are read by attribute.
+
+    Attributes:
+      linear: gains -> lam and k1 of u = -lam (e' + k1 e), the law near s = 0.
+      force: gains and errors x, (k,) -> the force towards 0 while the plant is held at x.
+    """
+
+    linear: Callable[[SimpleNamespace], tuple[float, float]]
+    force: Callable
+
+
+class Options(TypedDict, total=False):
+    """Options of every decorator; `law_function` explains them."""
+
+    gains: Mapping[str, float | Gain] | None
+    memory: int
+    positive: Iterable[str]
+    nonnegative: Iterable[str]
+    conditions: Conditions | None
+    label: str
+
+
+class SurfaceOptions(Options, total=False):
+    """Options of `surface_function`."""
+
+    relative_degree: int
+
+
+class LawOptions(SurfaceOptions, total=False):
+    """Options of `law_function`."""
+
+    plants: Iterable[str]
+    requires_model: bool
+    short: str
+    colour: str
+    rest: Rest | None
+
+
+OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
+
+
+class GainWarning(UserWarning):
+    """Gains that miss a condition under which the law's theorem holds."""
+
+
+def renamed(old: str) -> property:
+    """Return a property that reads an attribute under its old name, with a DeprecationWarning."""
+
+    def read(self: object) -> object:
+        warnings.warn(f"{old} is now {RENAMED[old]}: read that", DeprecationWarning, users_frame())
+        return getattr(self, RENAMED[old])
+
+    return property(read)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Component:
-    """A function bound to its gains. `function` is None when a loaded trace names one that is not at hand."""
+    """A function bound to its gains.
+
+    Attributes:
+      function: None when a loaded trace names one that is not at hand.
+      template: what it was made from; None when that is not at hand.
+    """
 
     kind: str
     name: str
     gains: Mapping[str, float]
     memory: int
     function: Callable | None
-    degree: int = 1
+    relative_degree: int = 1
     plants: tuple[str, ...] = ()
-    modelled: bool = False
+    requires_model: bool = False
+    template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
+
+    degree = renamed("degree")
+    modelled = renamed("modelled")
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
-        """By the name of its template: that of the decorated function no longer leads to it."""
+        """Pickle by the name of the template: the name of the decorated function leads to the template, not to it."""
         home = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         found = _at(*home)
         if isinstance(found, Template) and found.function is self.function:
@@ -48,6 +119,8 @@ class Component:
     def __post_init__(self):
         gains = {name: number(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
+        if self.template and (self.template.function is not self.function or self.template.name != self.name):
+            object.__setattr__(self, "template", None)  # another function took its place
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
     def __str__(self):
@@ -55,7 +128,7 @@ class Component:
 
 
 def _at(module: str, name: str) -> object:
-    """What stands in a module under a dotted name, or None."""
+    """Return what a module holds under a dotted name, or None."""
     found: object = sys.modules.get(module)
     for part in name.split("."):
         found = getattr(found, part, None)
@@ -69,32 +142,52 @@ def _bind(module: str, name: str, gains: dict[str, float]) -> Component:
     return template.bind(gains)
 
 
-class GainWarning(UserWarning):
-    """Gains that miss a condition under which the law's theorem holds."""
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Template:
-    """A function, its default gains and how many floats of memory it keeps per channel.
+    """A function and what its author said of it.
 
     Attributes:
-      degree: relative degree of the sliding variable that a law needs, or that a surface gives.
+      gains: name -> its default, unit and range.
+      memory: floats of memory per channel.
+      relative_degree: of the sliding variable that a law needs, or that a surface gives.
       conditions: what a theorem asks of the gains, in words -> whether gains, read by attribute, satisfy it.
       plants: names of the plants it is for; empty: every one.
-      modelled: whether it cannot do without the nominal model.
+      requires_model: whether it cannot work without the nominal model.
+      label, short, colour: as its author gave them; "" means automatic, see `smc_mujoco.draw.style`.
+      rest: what linear theory needs to know of it; None: it is not linear at rest.
     """
 
     kind: str
     name: str
     function: Callable
-    defaults: Mapping[str, float]
+    gains: Mapping[str, Gain]
     memory: int
-    positive: frozenset[str]
-    nonnegative: frozenset[str]
-    degree: int = 1
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] = dataclasses.field(default_factory=dict)
+    relative_degree: int = 1
+    conditions: Conditions = dataclasses.field(default_factory=dict)
     plants: tuple[str, ...] = ()
-    modelled: bool = False
+    requires_model: bool = False
+    label: str = ""
+    short: str = ""
+    colour: str = ""
+    rest: Rest | None = None
+
+    degree = renamed("degree")
+    modelled = renamed("modelled")
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """Gain -> its default."""
+        return {name: gain.default for name, gain in self.gains.items()}
+
+    @property
+    def positive(self) -> frozenset[str]:
+        """Gains that must be greater than 0."""
+        return frozenset(name for name, gain in self.gains.items() if gain.positive)
+
+    @property
+    def nonnegative(self) -> frozenset[str]:
+        """Gains that must be at least 0."""
+        return frozenset(name for name, gain in self.gains.items() if gain.nonnegative)
 
     @property
     def doc(self) -> str:
@@ -104,30 +197,31 @@ class Template:
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
 
     def __call__(self, **gains: float) -> Component:
-        """The function with some of its gains changed; errors and warnings as `bind`."""
+        """Bind the function to its gains, some of them changed. Errors and warnings as `bind`."""
         return self.bind(gains, warn=True)
 
     def bind(self, gains: Mapping[str, float], warn: bool = False) -> Component:
-        """The function with some of its gains changed.
+        """Bind the function to its gains, some of them changed.
 
         Args:
           gains: name -> value.
-          warn: whether to warn; not of gains that were warned of before.
+          warn: whether to warn of gains that miss a condition.
 
-            Raises:
-              ScenarioError: unknown gain, not a finite number, or not positive where it must be.
+        Raises:
+          ScenarioError: unknown gain, not a finite number, or out of its range.
 
         Warns:
           GainWarning: gains that miss a condition of the theorem behind it.
         """
-        values = dict(self.defaults)
+        values = self.defaults
         for key, value in gains.items():
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
-            above = 0.0 if key in self.positive else -math.inf
-            least = 0.0 if key in self.nonnegative else -math.inf
-            endless = math.isinf(self.defaults[key])
-            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=endless)
+            gain = self.gains[key]
+            above = 0.0 if gain.positive else -math.inf
+            least = 0.0 if gain.nonnegative else -math.inf
+            infinite = math.isinf(gain.default)
+            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
         for words, holds in self.conditions.items():
             if warn and not _holds(holds, SimpleNamespace(**values)):
                 given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
@@ -138,32 +232,51 @@ class Template:
             gains=values,
             memory=self.memory,
             function=self.function,
-            degree=self.degree,
+            relative_degree=self.relative_degree,
             plants=self.plants,
-            modelled=self.modelled,
+            requires_model=self.requires_model,
+            template=self,
         )
 
 
 def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace) -> bool:
-    """Whether gains satisfy a condition; those for which it cannot be worked out do not."""
+    """Return whether gains satisfy a condition; no, where it cannot be computed."""
     try:
         return condition(gains)
     except (ArithmeticError, ValueError):
         return False
 
 
+def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
+    """Return the Template of a function, or the decorator that makes it where no function is given yet.
+
+    Raises:
+      TypeError: an option that this kind of component does not have.
+      ScenarioError: an option out of its range.
+    """
+    options = dict(options)
+    for old, new in RENAMED.items():
+        if old in options:
+            warnings.warn(f"{kind}_function's {old} is now {new}: write that", DeprecationWarning, users_frame())
+            options[new] = options.pop(old)
+    if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
+        raise TypeError(f"{kind}_function() got an unexpected keyword argument {min(foreign)!r}")
+    decorate = template(kind, **options)
+    return decorate if function is None else decorate(function)
+
+
 def template(
     kind: str,
-    gains: Mapping[str, float] | None,
-    memory: int,
-    positive: Iterable[str],
-    nonnegative: Iterable[str],
-    degree: int = 1,
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    gains: Mapping[str, float | Gain] | None = None,
+    memory: int = 8,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+    relative_degree: int = 1,
+    conditions: Conditions | None = None,
     plants: Iterable[str] = (),
-    modelled: bool = False,
+    **words: object,
 ) -> Callable[[Callable], Template]:
-    """A decorator that makes a Template of a function.
+    """Return a decorator that makes a Template of a function.
 
     Raises:
       ScenarioError: a gain's name is no identifier, its default no number, memory no whole number in 1 .. 10000, or
@@ -171,18 +284,27 @@ def template(
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    for key in gains or {}:
+    found: dict[str, Gain] = {}
+    for key, value in (gains or {}).items():
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
-    defaults = {key: number(f"default of gain {key}", value, infinite=True) for key, value in (gains or {}).items()}
-    size, degree = whole("memory", memory, 1, 10_000), whole("degree", degree, 1, 10)
+        gain = value if isinstance(value, Gain) else Gain(value)
+        found[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
+    memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
     if not isinstance(conditions, Mapping | None) or not all(map(callable, (conditions or {}).values())):
         raise ScenarioError(f"conditions is {shown(conditions)}: give words with functions of the gains")
-    for name in (*positive, *nonnegative):
-        if name not in defaults:
-            raise unknown("gain with a sign", name, defaults)
+    for word in ("label", "short", "colour"):
+        if not isinstance(words.get(word, ""), str):
+            raise ScenarioError(f"{word} is {shown(words[word])}: give a text")
+    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
+        raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
+    for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
+        for name in names:
+            if name not in found:
+                raise unknown("gain with a sign", name, found)
+            found[name] = dataclasses.replace(found[name], **{sign: True})
 
     def decorate(function: Callable) -> Template:
         name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
@@ -194,21 +316,19 @@ def template(
             kind=kind,
             name=name,
             function=function,
-            defaults=defaults,
-            memory=size,
-            positive=frozenset(positive),
-            nonnegative=frozenset(nonnegative),
-            degree=degree,
+            gains=found,
+            memory=memory,
+            relative_degree=relative_degree,
             conditions=dict(conditions or {}),
             plants=tuple(plants),
-            modelled=modelled,
+            **words,  # pyright: ignore[reportArgumentType]
         )
 
     return decorate
 
 
 def discover(package: str) -> dict[str, Template]:
-    """Every Template at the top level of a package's modules, by name."""
+    """Return every Template at the top level of a package's modules, by name."""
     found: dict[str, Template] = {}
     for module in modules(package):
         found |= {value.name: value for value in vars(module).values() if isinstance(value, Template)}

@@ -1,15 +1,14 @@
-"""Velocity estimators, one per file: (y, gains, memory) -> velocity; found by walking this package.
+"""What a velocity estimator is: a pure function (y, gains, memory) -> velocity. They are found in their package.
 
 An estimator of higher order returns the pair (velocity, acceleration).
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
-from types import SimpleNamespace
-from typing import NamedTuple, overload
+from collections.abc import Callable
+from typing import NamedTuple, Unpack, overload
 
 from smc_mujoco.common.errors import find
-from smc_mujoco.control.component import Component, Template, discover, template
+from smc_mujoco.control.component import Component, Options, Template, decorated, discover
 
 Estimator = Component
 
@@ -25,37 +24,25 @@ class Reading(NamedTuple):
 @overload
 def estimator_function(function: Callable, /) -> Template: ...
 @overload
+def estimator_function(**options: Unpack[Options]) -> Callable[[Callable], Template]: ...
 def estimator_function(
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
-) -> Callable[[Callable], Template]: ...
-def estimator_function(
-    function: Callable | None = None,
-    /,
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    function: Callable | None = None, /, **options: Unpack[Options]
 ) -> Callable[[Callable], Template] | Template:
-    """Make an estimator of a function (y, gains, memory) -> velocity. Arguments as for `law_function`."""
-    decorate = template("estimator", gains, memory, positive, nonnegative, conditions=conditions)
-    return decorate if function is None else decorate(function)
+    """Make an estimator of a function (y, gains, memory) -> velocity.
+
+    Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.
+    """
+    return decorated("estimator", function, options)
 
 
 @functools.cache
 def catalogue() -> dict[str, Template]:
-    """Every estimator of this package, by name."""
+    """Return every estimator of smc_mujoco.control.estimators, by name."""
     return discover("smc_mujoco.control.estimators")
 
 
 def estimator(name: str, **gains: float) -> Estimator:
-    """The estimator `name`, with some of its gains changed.
+    """Return the estimator `name`, with some of its gains changed.
 
     Raises:
       ScenarioError: unknown estimator or gain, or a gain out of its range.
@@ -64,5 +51,5 @@ def estimator(name: str, **gains: float) -> Estimator:
 
 
 def estimators() -> list[str]:
-    """Names that `estimator` knows."""
+    """List the names that `estimator` knows."""
     return list(catalogue())

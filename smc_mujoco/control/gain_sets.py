@@ -14,14 +14,17 @@ The files of `tuned_gains/` hold each tuning whole, with history and versions; `
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import catalogue
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
@@ -37,7 +40,6 @@ SEEDS = {"tuned": 3, "tracking": 1}  # set -> from how many seeds the laws of LA
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
 FORMS["super_twisting_unclamped"] = "super_twisting"
 SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the first set, whose gains it was not given
-UNTUNED = {"none", "swing_up", *FORMS}  # laws that have units, and are no rivals
 
 # The first set: plant -> law -> gains. Super-twisting's were found with its integral held within u_max, and are run so.
 STUDY: dict[str, dict[str, dict[str, float]]] = {
@@ -84,7 +86,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
 }
 
 
-def law(plant: str, name: str, gains: str = "tuned", seed: int = 0) -> Component:
+def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
     """The law with its gains for a plant, from a set. No warning tells of conditions that they miss: they are as found.
 
     Args:
@@ -97,8 +99,36 @@ def law(plant: str, name: str, gains: str = "tuned", seed: int = 0) -> Component
     find("set of gains", gains, dict.fromkeys((*SETS, "default")))
     if gains == "default":
         return base
-    found = _study(plant, name) if gains == "study" else _found(plant, FORMS.get(name, name), gains, seed)
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    tuned = FORMS.get(name, name)
+    found = _study(machine.name, name) if gains == "study" else _found(machine, tuned, gains, seed)
     return dataclasses.replace(base, gains={gain: found.get(gain, value) for gain, value in base.gains.items()})
+
+
+def general() -> tuple[str, ...]:
+    """List every law that can be a rival on some plant: those of LAWS, then all others by name."""
+    others = {name for name, each in catalogue().items() if not each.plants} - {"none", *FORMS, *LAWS}
+    return *LAWS, *sorted(others)
+
+
+def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
+    """List the general laws that have gains in a set on each of these plants, those of LAWS first.
+
+    Raises:
+      ScenarioError: an unknown set, or one without gains for any law on these plants.
+    """
+    found, why = [], None
+    for name in general():
+        try:
+            for plant in plants:
+                law(plant, name, gains)
+        except ScenarioError as error:
+            why = error
+        else:
+            found.append(name)
+    if not found and why:
+        raise why
+    return found
 
 
 def tunings(gains: str, name: str) -> int:
@@ -108,7 +138,7 @@ def tunings(gains: str, name: str) -> int:
 
 def paper_plant(plant: object) -> str:
     """The name of one of the paper's plants, which have conditions and gains; ScenarioError for any other plant."""
-    if isinstance(plant, str) and (plant in STUDY or plant not in catalogue()):
+    if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
     raise ScenarioError(
@@ -128,13 +158,22 @@ def _study(plant: str, name: str) -> Mapping[str, float]:
     return find("law of the paper's study", SAME.get(name, name), laws)
 
 
-def _found(plant: str, name: str, gains: str, seed: int) -> Mapping[str, float]:
-    return _read(file(plant, name, OBJECTIVES[gains], seed % tunings(gains, name)), plant, name, gains)
+def _found(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:
+    path = file(plant.name, name, OBJECTIVES[gains], seed % tunings(gains, name))
+    if not path.is_file():
+        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {_cure(plant, name)}")
+    return _read(path)
+
+
+def _cure(plant: Plant, name: str) -> str:
+    """What to do about a law that a set has no gains for on a plant."""
+    example = next(iter(find_law(name).gains), "k")
+    own = f"give the law with gains of its own, as {name}({example}=...)"
+    if not plant.unscaled:
+        own += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
+    return f"{own}, or take default ones (--gains default)"
 
 
 @functools.cache
-def _read(path: Path, plant: str, name: str, gains: str) -> Mapping[str, float]:
-    if not path.is_file():
-        cure = f"give the law with gains of its own (smc-mujoco tune {plant} {name} finds them), or take default ones"
-        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant}: {cure} (--gains default)")
+def _read(path: Path) -> Mapping[str, float]:
     return read_json(path)["scenario"]["law"]["gains"]

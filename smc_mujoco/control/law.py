@@ -15,14 +15,13 @@ and as it stands where it does not (f = 0, g = 1).
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping
-from types import SimpleNamespace
-from typing import NamedTuple, overload
+from collections.abc import Callable
+from typing import NamedTuple, Unpack, overload
 
 from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.control.component import Component, Template, discover, template
+from smc_mujoco.control.component import Component, LawOptions, Template, decorated, discover
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -97,40 +96,24 @@ def power(a, p):
 @overload
 def law_function(function: Callable, /) -> Template: ...
 @overload
+def law_function(**options: Unpack[LawOptions]) -> Callable[[Callable], Template]: ...
 def law_function(
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    degree: int = 1,
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
-    plants: Iterable[str] = (),
-    modelled: bool = False,
-) -> Callable[[Callable], Template]: ...
-def law_function(
-    function: Callable | None = None,
-    /,
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    degree: int = 1,
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
-    plants: Iterable[str] = (),
-    modelled: bool = False,
+    function: Callable | None = None, /, **options: Unpack[LawOptions]
 ) -> Callable[[Callable], Template] | Template:
     """Make a law of a function (y, gains, memory) -> (u, s).
 
     Args:
-      gains: name -> default value.
-      memory: floats of state per channel.
-      positive, nonnegative: gains that must be greater than 0, or at least 0.
-      degree: relative degree of the sliding variable that the law needs: 1, or 2 and 3 for laws of e and its rates.
-      conditions: what its theorem asks of the gains, in words -> whether gains satisfy it; else a warning quotes them.
+      gains: name -> default value, or a Gain that says its unit and range too. `smc.tune` needs the units.
+      memory: floats of memory per channel. Default: 8.
+      positive, nonnegative: gains that must be greater than 0, or at least 0; a Gain can say it itself.
+      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 and 3 for laws of e.
+      conditions: what its theorem asks of the gains, in words -> whether gains satisfy it. A warning quotes the words.
       plants: names of the plants that it is for; empty: every one.
-      modelled: whether it cannot do without the nominal model, which a scenario then gives it by default.
+      requires_model: whether it cannot work without the nominal model, which a scenario then gives it by default.
+      label: its name in figures and tables. Default: the function's name.
+      short: its name in two or three letters. Default: initials.
+      colour: "#RRGGBB". Default: one of a palette, always the same.
+      rest: what linear theory needs to know, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
 
     The function must be pure: what it is to remember goes into memory, what is to vary into gains. Compiled, it keeps
     the globals and closed-over values that it was compiled with, and random numbers in it would come from a shared
@@ -141,8 +124,7 @@ def law_function(
     Returns:
       A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.
     """
-    decorate = template("law", gains, memory, positive, nonnegative, degree, conditions, plants, modelled)
-    return decorate if function is None else decorate(function)
+    return decorated("law", function, options)
 
 
 @functools.cache

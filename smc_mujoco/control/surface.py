@@ -1,16 +1,15 @@
-"""Sliding surfaces, one per file: (y, gains, memory) -> (s, eq); found by walking this package.
+"""What a sliding surface is: a pure function (y, gains, memory) -> (s, eq). The surfaces are found in their package.
 
-A surface gives a first-order law the sliding variable s, of relative degree `degree`, and eq, the acceleration of the
-error that keeps s constant: s' = 0 for e'' = eq. Letters as in laws.
+A surface gives a first-order law the sliding variable s, of relative degree `relative_degree`, and eq, the acceleration
+of the error that keeps s constant: s' = 0 for e'' = eq. Letters as in laws.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
-from types import SimpleNamespace
-from typing import overload
+from collections.abc import Callable
+from typing import Unpack, overload
 
 from smc_mujoco.common.errors import find
-from smc_mujoco.control.component import Component, Template, discover, template
+from smc_mujoco.control.component import Component, SurfaceOptions, Template, decorated, discover
 
 Surface = Component
 
@@ -18,39 +17,25 @@ Surface = Component
 @overload
 def surface_function(function: Callable, /) -> Template: ...
 @overload
+def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable], Template]: ...
 def surface_function(
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    degree: int = 1,
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
-) -> Callable[[Callable], Template]: ...
-def surface_function(
-    function: Callable | None = None,
-    /,
-    *,
-    gains: Mapping[str, float] | None = None,
-    memory: int = 8,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    degree: int = 1,
-    conditions: Mapping[str, Callable[[SimpleNamespace], bool]] | None = None,
+    function: Callable | None = None, /, **options: Unpack[SurfaceOptions]
 ) -> Callable[[Callable], Template] | Template:
-    """Make a surface of a function (y, gains, memory) -> (s, eq). Arguments as for `law_function`."""
-    decorate = template("surface", gains, memory, positive, nonnegative, degree, conditions)
-    return decorate if function is None else decorate(function)
+    """Make a surface of a function (y, gains, memory) -> (s, eq).
+
+    Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree, conditions and label.
+    """
+    return decorated("surface", function, options)
 
 
 @functools.cache
 def catalogue() -> dict[str, Template]:
-    """Every surface of this package, by name."""
+    """Return every surface of smc_mujoco.control.surfaces, by name."""
     return discover("smc_mujoco.control.surfaces")
 
 
 def surface(name: str, **gains: float) -> Surface:
-    """The surface `name`, with some of its gains changed.
+    """Return the surface `name`, with some of its gains changed.
 
     Raises:
       ScenarioError: unknown surface or gain, or a gain out of its range.
@@ -59,5 +44,5 @@ def surface(name: str, **gains: float) -> Surface:
 
 
 def surfaces() -> list[str]:
-    """Names that `surface` knows."""
+    """List the names that `surface` knows."""
     return list(catalogue())

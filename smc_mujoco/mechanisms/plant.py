@@ -158,6 +158,18 @@ class Plant:
         """Whether several channels have an actuator, and one unit: then they can be compared with each other."""
         return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
+    @property
+    def argument(self) -> str:
+        """How the command line calls it: its name, or of a model of the user's FILE.xml:joint+joint."""
+        return getattr(self.build, "argument", self.name)
+
+    @property
+    def unscaled(self) -> str:
+        """Why tuning cannot take its scales from the plant, or ""."""
+        if self.underactuated or self.mixed:
+            return "it has free joints, or channels of two units: choose a plant that has neither"
+        return f"it has no nominal model, of which tuning takes its scales: {self.unmodelled}" * bool(self.unmodelled)
+
     def spec(self) -> mujoco.MjSpec:
         """The mechanism as an editable MjSpec, with default parameters."""
         return self.build(self.n)

@@ -118,7 +118,7 @@ def integrator(name: object, realistic: bool) -> str:
 def model(value: object, law: Component) -> str:
     """What the law may know of the plant, "none" or "nominal"; what it needs where nothing is said."""
     if value is None or isinstance(value, FilledName):
-        return FilledName("nominal" if law.modelled else "none")
+        return FilledName("nominal" if law.requires_model else "none")
     if not isinstance(value, str) or value not in MODELS:
         raise unknown("model", value, MODELS)
     return value

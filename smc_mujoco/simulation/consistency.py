@@ -88,15 +88,15 @@ def check_law(s: "Scenario") -> None:
         raise ScenarioError(f"law {s.law.name!r} is for {', '.join(s.law.plants)} alone, not for {s.plant.name}{hint}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
-    if s.surface is not None and s.law.degree > 1:
+    if s.surface is not None and s.law.relative_degree > 1:
         raise ScenarioError(
             f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "
             "leave it out, or give a law of degree 1"
         )
-    if s.surface is not None and s.surface.degree != s.law.degree:
+    if s.surface is not None and s.surface.relative_degree != s.law.relative_degree:
         raise ScenarioError(
-            f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.degree}, "
-            f"and surface {s.surface.name!r} has {s.surface.degree}: give another, or leave it out"
+            f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.relative_degree}, "
+            f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another, or leave it out"
         )
 
 

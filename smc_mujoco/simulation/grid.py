@@ -8,6 +8,9 @@ Plants may be the suite's, by name, or models of your own; so may laws and condi
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import mujoco
+import numpy as np
+
 from smc_mujoco.common.errors import MOST, ScenarioError, shown, taken, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
@@ -18,10 +21,12 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.model import model, numbered, start
+from smc_mujoco.simulation.scenario import QUIET, REST, Scenario
 
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 NOTHING: Mapping[str, Any] = frozen({})
+STILL = 1e-9  # rad/s^2 or m/s^2: rounding
 
 
 def grid(
@@ -47,8 +52,8 @@ def grid(
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: a name that is not known, conditions of one name, gains that the set does not have, or more than a
-        million runs.
+      ScenarioError: a name that is not known, conditions of one name, gains that the set does not have, runs in which
+        nothing happens, as they begin at rest at 0 and stay there, or more than a million runs.
     """
     numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
     numbers = listed("seeds", numbers)
@@ -56,13 +61,16 @@ def grid(
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
     conditions = _apart(conditions)
-    return [
+    made = [
         case(plant, law, condition, duration, gains, seed, starts)
         for plant in plants
         for condition in conditions
         for law in laws
         for seed in numbers
     ]
+    for first in range(0, len(made), len(laws) * len(numbers)):
+        check_moving(made[first : first + len(numbers)])
+    return made
 
 
 def case(
@@ -87,8 +95,32 @@ def case(
     fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
     if machine.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": coerce.U_MAX}
-    scenario = Scenario(**fields | asked.on(machine, duration) | dict(changes))
-    return (starts or Starts()).place(scenario, seed).named(asked.name)
+    conditioned, around = asked.on(machine, duration), starts or Starts()
+    around.check_condition(asked.name, conditioned)
+    scenario = Scenario(**fields | conditioned | dict(changes))
+    return around.place(scenario, seed).named(asked.name)
+
+
+def check_moving(seeds: Sequence[Scenario]) -> None:
+    """Raise ScenarioError for runs from several seeds in which nothing happens, whatever the law."""
+    if all(map(_rests, seeds)):
+        at = seeds[0]
+        raise ScenarioError(
+            f"{at.plant.name} starts at rest at 0 and nothing moves it, condition {at.condition!r}: say where its runs "
+            "begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
+        )
+
+
+def _rests(scenario: Scenario) -> bool:
+    """Whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
+    moved = any(scenario.x0) or any(scenario.v0) or scenario.disturbance or scenario.sensor
+    if moved or scenario.noise != QUIET or scenario.reference != REST:
+        return False
+    made = numbered(model([scenario]), scenario)
+    data = mujoco.MjData(made)
+    data.qpos[:], data.qvel[:] = start(made, scenario)
+    mujoco.mj_forward(made, data)
+    return bool(np.abs(data.qacc).max() < STILL)
 
 
 def _apart(conditions: Sequence[str | Condition]) -> list[Condition]:
@@ -105,7 +137,7 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     """A law as given, or one of that name with its gains for the plant."""
     if not isinstance(law, str):
         return coerce.component(law, "law")
-    return sets.law(plant.name, law, "default" if law == "none" else gains, seed)
+    return sets.law(plant, law, "default" if law == "none" else gains, seed)
 
 
 def listed(what: str, values: object) -> list:

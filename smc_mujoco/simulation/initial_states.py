@@ -12,11 +12,12 @@ pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import number, taken
+from smc_mujoco.common.errors import ScenarioError, number, taken
 from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
@@ -45,6 +46,11 @@ class Starts:
         """The largest distance from 0 of any channel at a start, rad or m."""
         middle = scenario.x0 if self.x0 is None else self.x0
         return max(abs(x) for x in middle) or self.by
+
+    def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
+        """Raise ScenarioError for a condition whose fields say another middle of the starts."""
+        if self.x0 is not None and "x0" in fields:
+            raise ScenarioError(f"condition {name!r} and the starts, or --x0, both set x0: give one of them")
 
     def place(self, scenario: Scenario, seed: int) -> Scenario:
         """The scenario with a seed, from the start that belongs to it."""

@@ -109,7 +109,7 @@ def _restore_plant(data: dict) -> Plant:
 
 def _component(c: Component) -> dict:
     return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
-        "degree": c.degree,
+        "degree": c.relative_degree,
         "module": getattr(c.function, "__module__", ""),
     }
 
@@ -123,7 +123,7 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
         name=data["name"],
         gains=dict(data["gains"]),
         memory=data["memory"],
-        degree=data.get("degree", 1),
+        relative_degree=data.get("degree", 1),
         function=None,
     )
 

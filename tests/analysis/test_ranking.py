@@ -1,5 +1,6 @@
 """Statistics: intervals cover what they say, ranks are paired, and no winner is declared inside the noise."""
 
+import contextlib
 import io
 import json
 import math
@@ -536,6 +537,32 @@ def checked(boards: list[Board]) -> int:
             assert not set(board.wins(entry.law)) & set(board.losses(entry.law))
             assert entry.rank.best == (not board.losses(entry.law))
     return named
+
+
+STIFF = smc.plant("duffing", beta=5.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"starts": smc.starts(x0=1.0)}, r"x0 is \[1.5\] under classical and \[1.0\] under pid"),
+        ({"duration": 2.0}, "duration is 1.0 under classical and 2.0 under pid"),
+        ({"plants": STIFF}, "plant's beta is 1.0 under classical and 5.0 under pid"),
+        (
+            {"conditions": smc.condition("worn", friction=smc.Coulomb(0.2))},
+            "friction's level is 0.05 under classical and 0.2",
+        ),
+    ],
+)
+def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
+    given = {"plants": "duffing", "conditions": smc.condition("worn", friction=smc.Coulomb(0.05)), "duration": 1.0}
+    for law, fields, refused in (("pid", {}, False), ("pid", changed, True)):
+        runs = smc.grid(**(given | {"laws": "classical"})) + smc.grid(**(given | fields | {"laws": law}))
+        rows = [run_key.row(s) for s in runs]
+        names = ("plant", "law", "condition", "seed", "scenario")
+        table = Stand(**{name: [row[name] for row in rows] for name in names}, itae=[1.0, 2.0])
+        with pytest.raises(ScenarioError, match=words) if refused else contextlib.nullcontext():
+            leaderboard(table, ["itae"])
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -21,7 +21,8 @@ GENERAL = pytest.mark.parametrize(
     "name", [name for name, law in catalogue().items() if name != "none" and not law.plants]
 )
 FIRST = pytest.mark.parametrize(
-    "name", [name for name, law in catalogue().items() if name != "none" and not law.plants and law.degree == 1]
+    "name",
+    [name for name, law in catalogue().items() if name != "none" and not law.plants and law.relative_degree == 1],
 )
 CHAINS = {1: plant_a, 2: plant_b, 3: functools.partial(plant_c, g=20.0)}  # the last as a lag of 50 ms would be
 
@@ -77,7 +78,7 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
 @GENERAL
 def test_a_law_brings_its_chain_of_integrators_in_and_its_mirror_image_drives_it_out(name):
     law = smc.law(name)
-    chain = CHAINS[law.degree]
+    chain = CHAINS[law.relative_degree]
     right = chain(law, constant(0.5), limit=50.0)
     wrong = chain(law, constant(0.5), limit=50.0, sign=-1.0, duration=3.0)
     assert right.residual() < 0.3

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
 from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed, suiting
 from smc_mujoco.simulation.initial_states import SEEDS
@@ -229,6 +230,27 @@ def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
     assert set(table.column("failure")) == {None}
 
 
+@pytest.mark.parametrize("search", [smc.grid, smc.margins, smc.tune, smc.basin])
+def test_start_is_set_by_condition_or_starts(search):
+    far = smc.condition("far", x0=1.0)
+    fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
+    more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
+    with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
+        search("duffing", "classical", **fields, **more)
+    assert [s.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
+
+
+def test_grid_asks_where_a_model_at_rest_starts(arm):
+    law = smc.law("classical")
+    with pytest.raises(smc.ScenarioError, match=r"arm starts at rest at 0 .* 'nominal'.*smc.starts\(x0=0.5\) or --x0"):
+        smc.grid(["duffing", arm], law, ["noise", "nominal"], 2)
+    moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
+    assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 10
+    assert len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2  # seed 0 alone starts at 0
+    held = ARM.replace('fromto="0 0 0 0 0 -0.4"', 'fromto="0 0 0 0.4 0 0"')
+    assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it
+
+
 def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm):
     law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
     with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
@@ -292,6 +314,49 @@ def test_bench_has_conditions_for_a_model_of_ones_own_without_being_told_any(fil
     assert done.exit_code == 0, done.output
     done = CliRunner().invoke(app, ["bench", "--plants", f"{file}:shoulder", *arguments])
     assert done.exit_code == 0, done.output
+
+
+TWO = """<mujoco model="two"><worldbody><body>
+  <joint name="shoulder" type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.4"/>
+  <body pos="0 0 -0.4"><joint name="elbow" type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.4"/></body>
+</body></worldbody><actuator><motor joint="shoulder"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("bench", "--plants", "arm.xml:shoulder"), "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json"),
+        (("basin", "cart_pole", "--law", "hierarchical"), "hierarchical(a=...), or take default ones"),
+        (("tune", "two.xml:shoulder", "pid", "--x0", "0.4"), "two: it has no nominal model, of which tuning takes"),
+        (("bench", "--laws", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),
+        (("bench", "--laws", "pid(50)"), "cannot be read"),
+        (("bench", "--laws", "classical,pdi(kp=5, ki=1)"), "did you mean 'pid'"),
+        (("margins", "--laws", "pid(kq=5)"), "unknown gain of pid"),
+    ],
+)
+def test_commands_name_what_has_no_gains(arguments, words, file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.xml").write_text(TWO)
+    done = CliRunner().invoke(app, list(arguments))
+    said = done.output + capsys.readouterr().err
+    assert done.exit_code == 2
+    assert words in " ".join(said.split())
+
+
+def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runner, common = CliRunner(), ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"]
+    tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
+    assert runner.invoke(app, [*tuned, *common]).exit_code == 0
+    laws = "arm_pid.json,classical(k=5, c=2e0)"
+    bench = ["bench", "--plants", "arm.xml:shoulder", "--laws", laws, "--seeds", "1", "--duration", "0.1", *common]
+    done = runner.invoke(app, bench)
+    assert done.exit_code == 0, done.output
+    assert "gains as given" in done.output
+    table = smc.Table.read(tmp_path / "study")
+    laws = {s.law.name: s.law for s in map(table.scenario, range(len(table)))}
+    assert laws["pid"] == load(tmp_path / "arm_pid.json").law
+    assert laws["classical"].gains == {"k": 5.0, "c": 2.0}
 
 
 @pytest.mark.parametrize(

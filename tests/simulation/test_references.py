@@ -15,7 +15,7 @@ from smc_mujoco.simulation.signals import Sine, Step
 REFERENCES = [Ramp(0.7, 0.3), Ramp(-2.0), MinimumJerk(1.5, 0.2, 0.9), MinimumJerk(-0.4, -0.1, 2.0), Sine(0.5, 3.0, 0.2)]
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")
 # Laws of e and its rate, on any plant, that act: their theory is the same for every reference.
-FOLLOWING = [n for n, t in catalogue().items() if t.degree < 3 and not t.plants and n != "none"]
+FOLLOWING = [n for n, t in catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"]
 
 
 def at(signal, t):

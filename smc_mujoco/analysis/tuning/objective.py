@@ -94,7 +94,10 @@ class Objective:
         """
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
-        cases = [dataclasses.replace(first, **one.on(first.plant, self.duration)) for one in self.conditions]
+        fields = [one.on(first.plant, self.duration) for one in self.conditions]
+        for one, conditioned in zip(self.conditions, fields, strict=True):
+            self.starts.check_condition(one.name, conditioned)
+        cases = [dataclasses.replace(first, **conditioned) for conditioned in fields]
         placed = [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
         for one, case in zip(self.conditions, placed, strict=True):
             if not any(case.x0):

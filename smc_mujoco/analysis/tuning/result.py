@@ -192,7 +192,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         if len(one.history) != one.budget:
             counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
             raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
-        for gain, ends in box(one.law, one.scales).items():
+        for gain, ends in (box(one.law, one.scales) if one.law.template else {}).items():
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")

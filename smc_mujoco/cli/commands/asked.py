@@ -1,6 +1,8 @@
 """What several commands are asked for in the same words: plants, conditions, starts."""
 
+import ast
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation.conditions import Condition
     from smc_mujoco.simulation.initial_states import Starts
@@ -37,9 +40,50 @@ Spread = Annotated[
 ]
 
 
+SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma that is in no brackets
+OWN_GAINS = "With gains of its own: pid(kp=50, ki=1), or the .json file that tune wrote."
+
+
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
     """The names in a,b; the default if none is given."""
-    return default if text is None else [name.strip() for name in text.split(",") if name.strip()]
+    return default if text is None else [name.strip() for name in SEPARATOR.split(text) if name.strip()]
+
+
+def laws(texts: Sequence[str]) -> "list[str | Law]":
+    """Laws by name, or with gains of their own; see `law`."""
+    return [law(text) for text in texts]
+
+
+def law(text: str) -> "str | Law":
+    """One law: by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
+
+    The text is parsed and never evaluated.
+
+    Raises:
+      ScenarioError: another text, an unknown law or gain, or a file that is no tuning.
+    """
+    if text.endswith(".json"):
+        from smc_mujoco.analysis.tuning.result import load
+
+        return load(text).law
+    if "(" not in text:
+        return text
+    from smc_mujoco.common.errors import ScenarioError, find, shown
+    from smc_mujoco.control.law import catalogue
+
+    try:
+        call = ast.parse(text, mode="eval").body
+        if not isinstance(call, ast.Call) or call.args:
+            raise ValueError
+        gains = {str(word.arg): float(ast.unparse(word.value)) for word in call.keywords}
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ScenarioError(f"law {shown(text)} cannot be read: write it as pid(kp=50, ki=1)") from None
+    return find("law", ast.unparse(call.func), catalogue())(**gains)
+
+
+def origin(chosen: "Sequence[str | Law]", gains: str) -> str:
+    """Where the gains of laws are from, in words: the set, unless every law has gains of its own."""
+    return f"gains {gains!r}" if any(isinstance(one, str) for one in chosen) else "gains as given"
 
 
 def plants(texts: Sequence[str]) -> "list[str | Plant]":

@@ -11,7 +11,7 @@ from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
 
 def basin(
     plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint.")],
-    law: Annotated[str, typer.Option(help="One that `laws` shows.")] = "observer_free",
+    law: Annotated[str, typer.Option(help=f"One that `laws` shows. {asked.OWN_GAINS}")] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Positions, and as many velocities.")] = 50,
     gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
     duration: Annotated[float, typer.Option(help="Of the longest runs, s.")] = 10.0,
@@ -44,10 +44,11 @@ def basin(
             writable(out)
         if json:
             writable(ended(json, ".json"))
+        chosen = asked.law(law)
         with clock("in all"), bar(f"{law} on {plant}") as drawn:
             found = search(
                 asked.plant(plant),
-                law,
+                chosen,
                 (points, points),
                 gains=gains,
                 duration=duration,
@@ -56,9 +57,10 @@ def basin(
                 condition=condition,
             )
         counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
-        console.print(f"{law} on {plant}: {100 * found.share:.3g} % of the states converge", highlight=False)
+        share = f"{100 * found.share:.3g} % of the states converge"
+        console.print(f"{found.law} on {found.plant}: {share}", highlight=False)
         said = "{} converge, {} do not, {} undecided".format(*counts)
-        said += f" after {duration:g} s; gains {gains!r}, {clock.spent['in all']:.0f} s"
+        said += f" after {duration:g} s; {asked.origin([chosen], gains)}, {clock.spent['in all']:.0f} s"
         console.print(said, style="dim", soft_wrap=True, highlight=False)
         written = [found.save(json)] if json else []
         written += [region.draw([found], out)] if out else []

@@ -19,7 +19,9 @@ def bench(
     plants: Annotated[
         str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
     ] = None,
-    laws: Annotated[str | None, typer.Option(help="Laws, as a,b, or all; default the report's short list.")] = None,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b, or all; default the report's short list. {asked.OWN_GAINS}")
+    ] = None,
     conditions: Annotated[
         str | None, typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants.")
     ] = None,
@@ -53,11 +55,11 @@ def bench(
             from rich.console import Console
 
             from smc_mujoco.cli.leaderboard_table import leaderboard_table
+            from smc_mujoco.control.gain_sets import general_laws
             from smc_mujoco.mechanisms.plant import plant as find_plant
             from smc_mujoco.simulation.conditions import suiting
             from smc_mujoco.simulation.grid import grid
             from smc_mujoco.studies.leaderboard import leaderboard
-            from smc_mujoco.studies.paper.general_laws import general_laws
             from smc_mujoco.studies.study import FULL, QUICK, study
 
         clock, console = Clock(), Console()
@@ -67,9 +69,10 @@ def bench(
             length = chosen.duration if duration is None else duration
             machines = [find_plant(plant) if isinstance(plant, str) else plant for plant in named]
             usual = () if condition else suiting(chosen.conditions, machines, length)
+            ranked = general_laws(named, gains) if laws == "all" else asked.laws(asked.names(laws, chosen.laws))
             scenarios = grid(
                 named,
-                general_laws(named, gains) if laws == "all" else asked.names(laws, chosen.laws),
+                ranked,
                 asked.conditions(asked.names(conditions, usual), condition),
                 seeds or chosen.seeds,
                 gains,
@@ -79,6 +82,7 @@ def bench(
             table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
         console.print(leaderboard_table(leaderboard(table)))
         failed = len(table) - table.data["failure"].null_count
-        said = f"{len(table)} runs, {failed} of them failed, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        counts = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
+        said = f"{counts}, {asked.origin(ranked, gains)}, {clock.spent['in all']:.0f} s"
         console.print(said, soft_wrap=True, highlight=False)
         wrote(console, out / "results.parquet")

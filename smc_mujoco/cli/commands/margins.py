@@ -25,7 +25,9 @@ def margins(
             show_default=False,
         ),
     ] = None,
-    laws: Annotated[str | None, typer.Option(help="Laws, as a,b; default those of the report's first page.")] = None,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {asked.OWN_GAINS}")
+    ] = None,
     kinds: Annotated[
         str | None, typer.Option(help="Of delay,disturbance,friction,mass,noise, as a,b; default all.")
     ] = None,
@@ -62,14 +64,15 @@ def margins(
         if json:
             writable(ended(json, ".json"))
         chosen = plants or (QUICK["plants"] if quick else scenarios.PLANTS)
-        names = asked.names(laws, scenarios.LAWS if quick else sets.LAWS)
+        borne_by = asked.laws(asked.names(laws, scenarios.LAWS if quick else sets.LAWS))
         kind = asked.names(kinds, QUICK["kinds"] if quick else KINDS)
         with clock("in all"), bar("margins") as drawn:
             machines, around = asked.plants(chosen), asked.starts(x0, None)
-            found = search(machines, names, kind, gains, quick, threads, drawn.reached, condition, around)
+            found = search(machines, borne_by, kind, gains, quick, threads, drawn.reached, condition, around)
         for name in kind:
             console.print(table(name, [margin for margin in found if margin.kind == name]))
-        said = f"{len(found)} margin{'s' * (len(found) != 1)}, gains {gains!r}, {clock.spent['in all']:.0f} s"
+        said = f"{len(found)} margin{'s' * (len(found) != 1)}, {asked.origin(borne_by, gains)}"
+        said += f", {clock.spent['in all']:.0f} s"
         console.print(said, style="dim", soft_wrap=True, highlight=False)
         if json:
             wrote(console, save(found, json))

@@ -110,8 +110,8 @@ def _said(law: Component, slots: int) -> list[str]:
         f'const char smc_law_gains[] = "{text}";',
         f"const int smc_law_memory = {slots};",
         "const int smc_law_real = sizeof(smc_real);",
-        f"const int smc_law_degree = {law.degree};",
-        f"const int smc_law_modelled = {int(law.modelled)};",
+        f"const int smc_law_degree = {law.relative_degree};",
+        f"const int smc_law_modelled = {int(law.requires_model)};",
     ]
     return [*lines, ""]
 

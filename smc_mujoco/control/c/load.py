@@ -24,6 +24,7 @@ from smc_mujoco.common.errors import ScenarioError, whole
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.c import build, child, said, trial
 from smc_mujoco.control.component import Template, template
+from smc_mujoco.control.units import Gain
 
 
 class CLaw(AtAddress):
@@ -79,7 +80,7 @@ class CLaw(AtAddress):
 def law_from_c(
     source: str | Path,
     *,
-    gains: Mapping[str, float] | None = None,
+    gains: Mapping[str, float | Gain] | None = None,
     memory: int | None = None,
     name: str | None = None,
     symbol: str = "smc_law",
@@ -97,8 +98,8 @@ def law_from_c(
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
         `smc_law.h`, which the file may include, tells the function.
-      gains: name -> default, in the order of the function's gains[]. A file that says smc_law_gains has names and
-        defaults itself; these then change the defaults.
+      gains: name -> default or Gain, in the order of the function's gains[]. A file that says smc_law_gains has names
+        and defaults itself; these then change the defaults.
       memory: numbers of state per channel; where left out what the file says in smc_law_memory, or 8.
       name: of the law; the file's where left out.
       symbol: the function's name.
@@ -124,14 +125,19 @@ def law_from_c(
     """
     if name is not None:
         errors.name("name", name)
-    tried = child.tried(source, symbol, flags, timeout, gains, memory, modelled, isolate)
+    told = {name: gain for name, gain in gains.items() if isinstance(gain, Gain)} if isinstance(gains, Mapping) else {}
+    plain = {**gains, **{name: gain.default for name, gain in told.items()}} if gains and told else gains
+    tried = child.tried(source, symbol, flags, timeout, plain, memory, modelled, isolate)  # pyright: ignore[reportArgumentType]
     degree = whole("degree", tried.facts.get("smc_law_degree") or 1 if degree is None else degree, 1, 3)
     path = tried.library.path
     law = CLaw(path, symbol, tried.library.file, said.comment(path))
     _set_up(law)
     law.sized(len(tried.gains), tried.memory)
     law.__name__ = name or law.__name__
-    return template("law", tried.gains, tried.memory, positive, nonnegative, degree, None, plants, tried.modelled)(law)
+    given = {name: told.get(name, value) for name, value in tried.gains.items()}
+    return template(
+        "law", given, tried.memory, positive, nonnegative, degree, None, plants, requires_model=tried.modelled
+    )(law)
 
 
 @functools.cache

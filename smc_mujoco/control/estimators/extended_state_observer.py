@@ -14,9 +14,10 @@ Control Conference 2006; N. Morrison, Introduction to Sequential Smoothing and P
 import math
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import RATE, Gain
 
 
-@estimator_function(gains={"w": 100.0}, memory=4, positive=("w",))
+@estimator_function(gains={"w": Gain(100.0, RATE, positive=True)}, memory=4)
 def extended_state_observer(y, gains, memory):
     h, b = y.dt, math.exp(-gains.w * y.dt)
     if memory[0] == 0.0:

@@ -5,9 +5,10 @@ The first estimate is 0, for want of a past position.
 """
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import TIME, Gain
 
 
-@estimator_function(gains={"tau": 5e-3}, memory=3, nonnegative=("tau",))
+@estimator_function(gains={"tau": Gain(5e-3, TIME, nonnegative=True)}, memory=3)
 def filtered_difference(y, gains, memory):
     started, x_, v = memory
     if started:

@@ -12,9 +12,10 @@ Sources: H. K. Khalil & L. Praly, "High-gain observers in nonlinear feedback con
 import math
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import RATE, Gain
 
 
-@estimator_function(gains={"w": 100.0}, memory=3, positive=("w",))
+@estimator_function(gains={"w": Gain(100.0, RATE, positive=True)}, memory=3)
 def high_gain(y, gains, memory):
     h, b = y.dt, math.exp(-gains.w * y.dt)
     if memory[0] == 0.0:

@@ -11,9 +11,10 @@ Source: J. Liu & X. Wang, Advanced Sliding Mode Control for Mechanical Systems, 
 import math
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import RATE, Gain
 
 
-@estimator_function(gains={"w": 200.0}, memory=5, positive=("w",))
+@estimator_function(gains={"w": Gain(200.0, RATE, positive=True)}, memory=5)
 def integral_chain(y, gains, memory):
     w, h = gains.w, y.dt
     if memory[0] == 0.0:

@@ -15,9 +15,13 @@ Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index); the factori
 import cmath
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import POSITION, Gain, Unit
 
 
-@estimator_function(gains={"sigma": 1e-3, "q": 1e3}, memory=7, positive=("sigma", "q"))
+@estimator_function(
+    gains={"sigma": Gain(1e-3, POSITION, positive=True), "q": Gain(1e3, Unit(position=2, time=-5), positive=True)},
+    memory=7,
+)
 def kalman(y, gains, memory):
     h = y.dt
     if memory[0] == 0.0:

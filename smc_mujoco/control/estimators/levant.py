@@ -21,6 +21,7 @@ import math
 from numba import njit
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import Gain, Unit
 
 
 @njit
@@ -32,9 +33,11 @@ def correction(a, p, m, L, share):
 
 
 @estimator_function(
-    gains={"L": 4800.0, "order": 2.0},
+    gains={
+        "L": Gain(4800.0, lambda g: Unit(position=1, time=-g.order - 1), positive=True),
+        "order": Gain(2.0, positive=True, held=True),
+    },
     memory=5,
-    positive=("L", "order"),
     conditions={"an order of 1, 2 or 3, else the nearest": lambda g: g.order in (1.0, 2.0, 3.0)},
 )
 def levant(y, gains, memory):

@@ -13,6 +13,7 @@ Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing and different
 """
 
 from smc_mujoco.control.estimator import estimator_function
+from smc_mujoco.control.units import Gain
 
 MOST = 128  # readings that the memory holds
 
@@ -25,7 +26,9 @@ FITS = {
 
 
 @estimator_function(
-    gains={"window": 31.0, "degree": 2.0}, memory=2 + 3 * MOST, positive=("window", "degree"), conditions=FITS
+    gains={"window": Gain(31.0, positive=True, held=True), "degree": Gain(2.0, positive=True, held=True)},
+    memory=2 + 3 * MOST,
+    conditions=FITS,
 )
 def savitzky_golay(y, gains, memory):
     N = min(max(int(gains.window), 2), MOST)

@@ -7,9 +7,16 @@ Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; 
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
 
 
-@law_function(gains={"gamma": 50.0, "c": 2.5, "k0": 0.0}, nonnegative=("gamma", "c", "k0"))
+@law_function(
+    gains={
+        "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "k0": Gain(0.0, FORCE, nonnegative=True, held=True),
+    }
+)
 def adaptive(y, gains, memory):
     s, eq = sliding(y, gains.c)
     K = gains.k0 + memory[0]

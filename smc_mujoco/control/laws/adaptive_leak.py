@@ -7,11 +7,17 @@ Automatica 20(5):583, 1984 (leak); Plestan et al., Int. J. Control 83(9), 2010 (
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
 
 
 @law_function(
-    gains={"gamma": 15.0, "c": 2.5, "leak": 3.0, "deadzone": 0.05, "k0": 0.0},
-    nonnegative=("gamma", "c", "leak", "deadzone", "k0"),
+    gains={
+        "gamma": Gain(15.0, FORCE_PER_POSITION, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "leak": Gain(3.0, RATE, nonnegative=True),
+        "deadzone": Gain(0.05, SPEED, nonnegative=True),
+        "k0": Gain(0.0, FORCE, nonnegative=True, held=True),
+    }
 )
 def adaptive_leak(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -9,13 +9,19 @@ and application", Automatica 48(5):759, 2012 (its beta is 2 eps K; the conferenc
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding
+from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
 
 
 @law_function(
-    gains={"rate": 2.0, "eps": 0.5, "mu": 0.02, "least": 0.5, "k0": 2.0, "c": 2.5},
+    gains={
+        "rate": Gain(2.0, Unit(force=1, position=-0.5, time=-0.5), positive=True),  # of K, a force per root
+        "eps": Gain(0.5, Unit(position=0.5, time=-1.5), positive=True),
+        "mu": Gain(0.02, SPEED, positive=True),
+        "least": Gain(0.5, FORCE_PER_ROOT, positive=True),
+        "k0": Gain(2.0, FORCE_PER_ROOT, nonnegative=True, held=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     memory=2,
-    positive=("rate", "eps", "mu", "least"),
-    nonnegative=("k0", "c"),
 )
 def adaptive_super_twisting(y, gains, memory):
     s, eq = sliding(y, gains.c)

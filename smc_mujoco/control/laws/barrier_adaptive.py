@@ -9,12 +9,16 @@ Automatica 93:540, 2018; sampling: L. Ovalle, A. Gonzalez, L. Fridman & H. Haimo
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
 
 
 @law_function(
-    gains={"K0": 50.0, "eps": 0.1, "k_max": 6.0, "c": 2.5},
-    positive=("eps", "k_max"),
-    nonnegative=("K0", "c"),
+    gains={
+        "K0": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
+        "eps": Gain(0.1, SPEED, positive=True),
+        "k_max": Gain(6.0, FORCE, positive=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     memory=2,
 )
 def barrier_adaptive(y, gains, memory):

@@ -6,9 +6,16 @@ Source: J.-J. Slotine, "Sliding controller design for non-linear systems", Int. 
 """
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, SPEED, Gain
 
 
-@law_function(gains={"k": 6.0, "c": 2.5, "phi": 0.5}, positive=("phi",), nonnegative=("k", "c"))
+@law_function(
+    gains={
+        "k": Gain(6.0, FORCE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "phi": Gain(0.5, SPEED, positive=True),
+    }
+)
 def boundary_layer(y, gains, memory):
     s, eq = sliding(y, gains.c)
     return command(y, eq - gains.k * min(max(s / gains.phi, -1.0), 1.0)), s

@@ -5,9 +5,10 @@ O(dt). Explicit. Source: V. Utkin, Sliding Modes in Control and Optimization, Sp
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"k": 4.0, "c": 2.5}, nonnegative=("k", "c"))
+@law_function(gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)})
 def classical(y, gains, memory):
     s, eq = sliding(y, gains.c)
     return command(y, eq - gains.k * sgn(s)), s

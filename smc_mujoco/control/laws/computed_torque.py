@@ -9,9 +9,13 @@ Automatic Control 25(3):468, 1980.
 """
 
 from smc_mujoco.control.law import command, law_function
+from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 
 
-@law_function(gains={"kp": 9.0, "kd": 6.0}, positive=("kp", "kd"), degree=2)
+@law_function(
+    gains={"kp": Gain(9.0, FORCE_PER_POSITION, positive=True), "kd": Gain(6.0, FORCE_PER_SPEED, positive=True)},
+    relative_degree=2,
+)
 def computed_torque(y, gains, memory):
     s = gains.kp * y.e + gains.kd * y.de
     return command(y, -s), s

@@ -11,13 +11,19 @@ Source: V. Torres-Gonzalez, T. Sanchez, L. Fridman & J. Moreno, "Design of conti
 import math
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE_RATE, Gain, Unit
 
 
 @law_function(
-    gains={"L": 1.0, "k1": 7.0, "k2": 5.0, "k3": 2.3, "k4": 1.1},
+    gains={
+        "L": Gain(1.0, FORCE_RATE, positive=True),
+        "k1": Gain(7.0, Unit(force=1 / 3, position=-1 / 3, time=2 / 3), positive=True),  # the cube root of an inertia
+        "k2": Gain(5.0, Unit(force=1 / 2, position=-1 / 2, time=1), positive=True),  # the square root of an inertia
+        "k3": Gain(2.3, positive=True, held=True),  # L k3 and L k4 are the integrator's: L alone is searched
+        "k4": Gain(1.1, positive=True, held=True),
+    },
     memory=1,
-    positive=("L", "k1", "k2", "k3", "k4"),
-    degree=2,
+    relative_degree=2,
     conditions={"k3 > k4 + 1": lambda g: g.k3 > g.k4 + 1.0},
 )
 def continuous_twisting(y, gains, memory):

@@ -10,12 +10,15 @@ control systems'", IEEE Trans. Ind. Electron. 43(1):235, 1996.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
 
 
 @law_function(
-    gains={"eps": 3.0, "q": 3.0, "c": 2.5},
-    nonnegative=("q", "c"),
-    positive=("eps",),
+    gains={
+        "eps": Gain(3.0, FORCE, positive=True),
+        "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    }
 )
 def discrete_reaching(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -11,9 +11,10 @@ Nonlinear Control Systems Design 1989 (bounded u); the condition on g: Jury's, d
 """
 
 from smc_mujoco.control.law import command, input_gain, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"k": 4.0, "c": 2.5}, nonnegative=("k", "c"), memory=3)
+@law_function(gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)}, memory=3)
 def discrete_time(y, gains, memory):
     s, eq = sliding(y, gains.c)
     d = (s - memory[0]) / y.dt - memory[1] if memory[2] != 0.0 else 0.0

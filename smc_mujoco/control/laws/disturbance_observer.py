@@ -16,9 +16,18 @@ manipulators", IEEE Trans. Ind. Electron. 47(4):932, 2000 (observer, with its ga
 import math
 
 from smc_mujoco.control.law import law_function, sgn, sliding
+from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 
-@law_function(gains={"k": 2.0, "c": 2.5, "l": 20.0, "b": 3.0}, memory=4, positive=("l", "b"), nonnegative=("k", "c"))
+@law_function(
+    gains={
+        "k": Gain(2.0, ACCELERATION, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "l": Gain(20.0, RATE, positive=True),
+        "b": Gain(3.0, INPUT_GAIN, positive=True),
+    },
+    memory=4,
+)
 def disturbance_observer(y, gains, memory):
     b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
     if memory[0] != 0.0:  # memory: started, d^, de before, the acceleration b u + f - r'' of the period that ends now

@@ -10,9 +10,17 @@ A. Koshkouei, K. Burnham & A. Zinober, "Dynamic sliding mode control design", IE
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
 
 
-@law_function(gains={"k": 30.0, "q": 5.0, "c": 2.5}, nonnegative=("k", "q", "c"), memory=3)
+@law_function(
+    gains={
+        "k": Gain(30.0, FORCE_RATE, nonnegative=True),
+        "q": Gain(5.0, RATE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
+    memory=3,
+)
 def dynamic(y, gains, memory):
     s, eq = sliding(y, gains.c)
     rate = (s - memory[1]) / y.dt if memory[2] != 0.0 else 0.0

@@ -8,11 +8,15 @@ Electron. 40(1):45, 1993 (law); times: integrated here.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
 
 
 @law_function(
-    gains={"k": 3.0, "q": 3.0, "c": 2.5},
-    nonnegative=("k", "q", "c"),
+    gains={
+        "k": Gain(3.0, FORCE, nonnegative=True),
+        "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     conditions={"k > 0": lambda g: g.k > 0.0},
 )
 def exponential_reaching(y, gains, memory):

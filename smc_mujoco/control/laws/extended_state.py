@@ -18,10 +18,18 @@ American Control Conference 2006. The bound is worked out here.
 import math
 
 from smc_mujoco.control.law import law_function, sgn
+from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 
 @law_function(
-    gains={"k": 2.0, "c": 2.5, "w": 40.0, "b": 3.0}, memory=5, positive=("w", "b"), nonnegative=("k", "c"), degree=2
+    gains={
+        "k": Gain(2.0, ACCELERATION, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "w": Gain(40.0, RATE, positive=True),
+        "b": Gain(3.0, INPUT_GAIN, positive=True),
+    },
+    memory=5,
+    relative_degree=2,
 )
 def extended_state(y, gains, memory):
     h, p = y.dt, math.exp(-gains.w * y.dt)

@@ -9,12 +9,18 @@ Autom. Control 57(8):2106, 2012 (Lemma 1: the bound).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
 
 
 @law_function(
-    gains={"k1": 2.0, "k2": 2.0, "a": 0.5, "b": 1.5, "k": 2.0, "c": 2.5},
-    positive=("a", "b"),
-    nonnegative=("k1", "k2", "k", "c"),
+    gains={
+        "k1": Gain(2.0, force_per("a"), nonnegative=True),
+        "k2": Gain(2.0, force_per("b"), nonnegative=True),
+        "a": Gain(0.5, positive=True, held=True),
+        "b": Gain(1.5, positive=True, held=True),
+        "k": Gain(2.0, FORCE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     conditions={"a < 1 < b": lambda g: g.a < 1.0 < g.b, "k1, k2 > 0": lambda g: g.k1 > 0.0 and g.k2 > 0.0},
 )
 def fixed_time(y, gains, memory):

@@ -17,6 +17,7 @@ Source: after R. Palm, "Robust control by fuzzy sliding mode", Automatica 30(9):
 from numba import njit
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import ACCELERATION, FORCE, RATE, SPEED, Gain
 
 
 @njit
@@ -37,9 +38,13 @@ def inferred(size, rate):
 
 
 @law_function(
-    gains={"k_min": 3.0, "k_max": 6.0, "width": 0.5, "rate": 10.0, "c": 2.5},
-    positive=("width", "rate"),
-    nonnegative=("k_min", "k_max", "c"),
+    gains={
+        "k_min": Gain(3.0, FORCE, nonnegative=True),
+        "k_max": Gain(6.0, FORCE, nonnegative=True),
+        "width": Gain(0.5, SPEED, positive=True),
+        "rate": Gain(10.0, ACCELERATION, positive=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     conditions={"k_min <= k_max": lambda g: g.k_min <= g.k_max},
     memory=2,
 )

@@ -25,15 +25,20 @@ underactuated systems", IEE Proc. Control Theory Appl. 151(6):683, 2004; the roo
 """
 
 from smc_mujoco.control.law import law_function, sgn, sliding
+from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
 
 
 @law_function(
-    gains={"a": 0.67, "c1": 0.67, "c2": 3.6, "k": 0.5, "rate": 3.0},
-    positive=("a", "c1", "k"),
-    nonnegative=("c2", "rate"),
+    gains={
+        "a": Gain(0.67, Unit(), positive=True),
+        "c1": Gain(0.67, RATE, positive=True),
+        "c2": Gain(3.6, RATE, nonnegative=True),
+        "k": Gain(0.5, ACCELERATION, positive=True),
+        "rate": Gain(3.0, RATE, nonnegative=True),
+    },
     conditions={"c2 > c1": lambda g: g.c2 > g.c1},
     plants=("cart_pole", "overhead_crane"),
-    modelled=True,
+    requires_model=True,
 )
 def hierarchical(y, gains, memory):
     s1, eq = sliding(y, gains.c1)

@@ -13,13 +13,16 @@ algorithm", IEEE Trans. Autom. Control 65(8):3707, 2020, eq. 7 to 11.
 import math
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 
 
 @law_function(
-    gains={"k1": 3.0, "k2": 4.4, "c": 2.5},
+    gains={
+        "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
+        "k2": Gain(4.4, FORCE_RATE, positive=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     memory=1,
-    positive=("k1", "k2"),
-    nonnegative=("c",),
     conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
 )
 def implicit_super_twisting(y, gains, memory):

@@ -11,9 +11,17 @@ Conf. Decision and Control 4591, 1996.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"M": 4.0, "c": 2.5, "q": 1.5}, nonnegative=("M", "c", "q"), memory=3)
+@law_function(
+    gains={
+        "M": Gain(4.0, FORCE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "q": Gain(1.5, RATE, nonnegative=True),
+    },
+    memory=3,
+)
 def integral(y, gains, memory):
     s0, eq = y.de + gains.c * y.e, -gains.c * y.de  # the loop that is imposed, not what the law knows of the plant
     if y.surfaced != 0.0:

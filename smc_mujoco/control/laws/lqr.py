@@ -12,13 +12,19 @@ B. D. O. Anderson & J. B. Moore, Optimal Control: Linear Quadratic Methods, Pren
 import math
 
 from smc_mujoco.control.law import command, law_function
+from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, Gain, Unit
 
 
 @law_function(
-    gains={"q1": 100.0, "q2": 16.0, "r": 1.0, "a1": 0.0, "a2": 0.0, "b": 1.0},
-    positive=("q1", "r", "b"),
-    nonnegative=("q2",),
-    degree=2,
+    gains={
+        "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
+        "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+        "r": Gain(1.0, positive=True, held=True),  # the weights count by their ratios alone
+        "a1": Gain(0.0, RATE2, held=True),
+        "a2": Gain(0.0, RATE, held=True),
+        "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
+    },
+    relative_degree=2,
 )
 def lqr(y, gains, memory):
     a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)

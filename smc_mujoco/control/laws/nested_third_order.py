@@ -11,9 +11,12 @@ Source: A. Levant, "Higher-order sliding modes, differentiation and output-feedb
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"a": 5.0, "w": 2.0}, memory=1, positive=("a", "w"), degree=3)
+@law_function(
+    gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)}, memory=1, relative_degree=3
+)
 def nested_third_order(y, gains, memory):
     q1, q2 = y.de / gains.w, (y.a - y.ddr) / gains.w**2
     inner = power(abs(q1) ** 3 + y.e * y.e, 1.0 / 6.0) * sgn(q1 + power(y.e, 2.0 / 3.0))

@@ -9,14 +9,20 @@ Robust Nonlinear Control 21(16):1865, 2011, with k sgn(s) for k2 [s]^rho of its 
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
 
 
 @law_function(
-    gains={"k": 4.0, "rate": 3.0, "a": 0.5, "q": 2.0, "b": 0.4, "p": 1.6},
+    gains={
+        "k": Gain(4.0, FORCE, positive=True),
+        "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),
+        "a": Gain(0.5, lambda g: Unit(position=1 - g.q), positive=True),
+        "q": Gain(2.0, positive=True, held=True),
+        "b": Gain(0.4, lambda g: Unit(position=1 - g.p, time=g.p), positive=True),
+        "p": Gain(1.6, positive=True, held=True),
+    },
     memory=1,
-    positive=("k", "a", "q", "b", "p"),
-    nonnegative=("rate",),
-    degree=2,
+    relative_degree=2,
     conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0, "q > p": lambda g: g.q > g.p},
 )
 def nonsingular_fast_terminal(y, gains, memory):

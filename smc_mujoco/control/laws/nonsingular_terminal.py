@@ -9,13 +9,17 @@ Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of 
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE, Gain, Unit
 
 
 @law_function(
-    gains={"k": 4.0, "B": 3.0, "p": 1.6},
+    gains={
+        "k": Gain(4.0, FORCE, positive=True),
+        "B": Gain(3.0, lambda g: Unit(position=g.p - 1, time=-g.p), positive=True),
+        "p": Gain(1.6, positive=True, held=True),
+    },
     memory=1,
-    positive=("k", "B", "p"),
-    degree=2,
+    relative_degree=2,
     conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0},
 )
 def nonsingular_terminal(y, gains, memory):

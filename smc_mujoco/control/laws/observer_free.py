@@ -9,9 +9,10 @@ variable as s - u/g; the law uses neither g nor that variable, so the trace hold
 import math
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
+@law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
 def observer_free(y, gains, memory):
     s, eq = sliding(y, gains.k1)
     return command(y, eq - gains.lam * math.tanh(s)), s

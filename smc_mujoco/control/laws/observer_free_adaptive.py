@@ -16,12 +16,18 @@ improvement of robustness of adaptive control", Automatica 20(5):583, 1984.
 import math
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gain
 
 
 @law_function(
-    gains={"lam": 6.0, "k1": 2.5, "gamma": 200.0, "leak": 1.0, "deadzone": 0.1, "w_max": 60.0},
-    positive=("lam",),
-    nonnegative=("gamma", "leak", "deadzone", "w_max"),
+    gains={
+        "lam": Gain(6.0, FORCE, positive=True),
+        "k1": Gain(2.5, RATE),
+        "gamma": Gain(200.0, FORCE_PER_POSITION, nonnegative=True),
+        "leak": Gain(1.0, RATE, nonnegative=True),
+        "deadzone": Gain(0.1, SPEED, nonnegative=True),
+        "w_max": Gain(60.0, FORCE, nonnegative=True, held=True),
+    },
     memory=1,
 )
 def observer_free_adaptive(y, gains, memory):

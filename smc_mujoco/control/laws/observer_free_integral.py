@@ -18,11 +18,11 @@ ISA 1995, section 3.5.
 import math
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 
 
 @law_function(
-    gains={"lam": 6.0, "k1": 2.5, "ki": 2.0},
-    positive=("lam", "ki"),
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "ki": Gain(2.0, RATE2, positive=True)},
     memory=1,
 )
 def observer_free_integral(y, gains, memory):

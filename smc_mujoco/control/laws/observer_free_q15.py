@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
 
 FULL, MOST = 32768, 32767
 TABLE = np.array([round(MOST * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64)  # each fits 16 bits
@@ -44,8 +45,13 @@ def saturated(n):
 
 
 @law_function(
-    gains={"lam": 6.0, "k1": 2.5, "e_range": 4.0, "de_range": 8.0, "u_range": 8.0},
-    positive=("lam", "e_range", "de_range", "u_range"),
+    gains={
+        "lam": Gain(6.0, FORCE, positive=True),
+        "k1": Gain(2.5, RATE),
+        "e_range": Gain(4.0, POSITION, positive=True, held=True),
+        "de_range": Gain(8.0, SPEED, positive=True, held=True),
+        "u_range": Gain(8.0, FORCE, positive=True, held=True),
+    },
     conditions={
         "|k1| e_range < 128 and de_range < 128": lambda g: abs(g.k1) * g.e_range < 128.0 and g.de_range < 128.0,
         "lam < u_range": lambda g: g.lam < g.u_range,

@@ -11,12 +11,13 @@ I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.70 (continued fraction)
 import numpy as np
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 ONE, TEN, A45, A105 = np.float32(1.0), np.float32(10.0), np.float32(45.0), np.float32(105.0)
 QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 
 
-@law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
+@law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
 def observer_free_single(y, gains, memory):
     s = np.float32(y.de) + np.float32(gains.k1) * np.float32(y.e)
     slid, eq = sliding(y, gains.k1)

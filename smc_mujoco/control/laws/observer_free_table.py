@@ -14,14 +14,14 @@ import math
 import numpy as np
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 MOST, END = 256, 5.0  # steps; tanh(5) = 1 - 9.1e-5: no more than linear interpolation leaves at 256 steps
 TABLE = np.array([math.tanh(END * i / MOST) for i in range(MOST)] + [1.0])
 
 
 @law_function(
-    gains={"lam": 6.0, "k1": 2.5, "size": 64.0},
-    positive=("lam", "size"),
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "size": Gain(64.0, positive=True, held=True)},
     conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MOST},
 )
 def observer_free_table(y, gains, memory):

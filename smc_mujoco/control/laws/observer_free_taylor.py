@@ -9,14 +9,14 @@ I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.64 (series) and 4.5 (do
 """
 
 from smc_mujoco.control.law import command, law_function, sliding
+from smc_mujoco.control.units import FORCE, RATE, Gain
 
 SERIES = (1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0, 62.0 / 2835.0)
 END = 8.0  # 1 - tanh(8) = 2.3e-7
 
 
 @law_function(
-    gains={"lam": 6.0, "k1": 2.5, "terms": 3.0},
-    positive=("lam", "terms"),
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "terms": Gain(3.0, positive=True, held=True)},
     conditions={"terms is 1, 2, 3, 4 or 5": lambda g: g.terms in (1.0, 2.0, 3.0, 4.0, 5.0)},
 )
 def observer_free_taylor(y, gains, memory):

@@ -11,9 +11,18 @@ Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decompositi
 import math
 
 from smc_mujoco.control.law import command, law_function
+from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 
 
-@law_function(gains={"lam": 6.0, "k1": 6.25, "k2": 5.0}, memory=1, positive=("lam", "k1", "k2"), degree=3)
+@law_function(
+    gains={
+        "lam": Gain(6.0, FORCE, positive=True),
+        "k1": Gain(6.25, RATE2, positive=True),
+        "k2": Gain(5.0, RATE, positive=True),
+    },
+    memory=1,
+    relative_degree=3,
+)
 def observer_free_third(y, gains, memory):
     s = y.a - y.ddr + gains.k2 * y.de + gains.k1 * y.e
     return command(y, -gains.lam * math.tanh(s)), s

@@ -10,14 +10,19 @@ Source: K. J. Astrom & T. Hagglund, PID Controllers: Theory, Design, and Tuning,
 """
 
 from smc_mujoco.control.law import command, input_gain, law_function
+from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, TIME, Gain, Unit
 
 
 @law_function(
-    gains={"kp": 10.0, "ki": 5.0, "kd": 6.0, "tau": 5e-3, "tt": 0.5},
+    gains={
+        "kp": Gain(10.0, FORCE_PER_POSITION, nonnegative=True),
+        "ki": Gain(5.0, Unit(force=1, position=-1, time=-1), nonnegative=True),
+        "kd": Gain(6.0, FORCE_PER_SPEED, nonnegative=True),
+        "tau": Gain(5e-3, TIME, nonnegative=True, held=True),
+        "tt": Gain(0.5, TIME, positive=True),
+    },
     memory=3,
-    positive=("tt",),
-    nonnegative=("kp", "ki", "kd", "tau"),
-    degree=2,
+    relative_degree=2,
     conditions={"kp kd > ki": lambda g: g.kp * g.kd > g.ki or g.ki == 0.0},
 )
 def pid(y, gains, memory):

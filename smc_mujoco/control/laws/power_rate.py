@@ -8,12 +8,15 @@ Electron. 40(1):45, 1993 (law); time and bounds: integrated here.
 """
 
 from smc_mujoco.control.law import command, law_function, power, sliding
+from smc_mujoco.control.units import RATE, Gain, force_per
 
 
 @law_function(
-    gains={"k": 6.0, "a": 0.5, "c": 2.5},
-    positive=("a",),
-    nonnegative=("k", "c"),
+    gains={
+        "k": Gain(6.0, force_per("a"), nonnegative=True),
+        "a": Gain(0.5, positive=True, held=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     conditions={"a < 1": lambda g: g.a < 1.0},
 )
 def power_rate(y, gains, memory):

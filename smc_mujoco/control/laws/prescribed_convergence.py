@@ -8,13 +8,13 @@ section 5 (the algorithm with a prescribed law of variation), following S. Emely
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE, PARABOLA, Gain
 
 
 @law_function(
-    gains={"a": 5.0, "b": 2.0},
+    gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, PARABOLA, positive=True)},
     memory=1,
-    positive=("a", "b"),
-    degree=2,
+    relative_degree=2,
     conditions={"a > b^2/2": lambda g: g.a > g.b**2 / 2.0},
 )
 def prescribed_convergence(y, gains, memory):

@@ -10,12 +10,16 @@ law.
 """
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
 
 
 @law_function(
-    gains={"T": 2.0, "m": 2.0, "k": 3.0, "c": 2.5},
-    positive=("T",),
-    nonnegative=("k", "c", "m"),
+    gains={
+        "T": Gain(2.0, TIME, positive=True),
+        "m": Gain(2.0, INERTIA, nonnegative=True),  # m s / (T - t) is a force
+        "k": Gain(3.0, FORCE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+    },
     conditions={"m >= 1, or u grows without bound towards T": lambda g: g.m >= 1.0},
 )
 def prescribed_time(y, gains, memory):

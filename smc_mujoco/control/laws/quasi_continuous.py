@@ -11,6 +11,7 @@ condition: A. Levant, "Principles of 2-sliding mode design", Automatica 43(4):57
 import math
 
 from smc_mujoco.control.law import command, law_function, power
+from smc_mujoco.control.units import FORCE, PARABOLA, Gain
 
 
 def brakes(gains):
@@ -21,10 +22,9 @@ def brakes(gains):
 
 
 @law_function(
-    gains={"a": 6.0, "b": 1.0},
+    gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, PARABOLA, positive=True)},
     memory=1,
-    positive=("a", "b"),
-    degree=2,
+    relative_degree=2,
     conditions={"a (r - b) / (r + b) > r^2/2 for some r > b": brakes},
 )
 def quasi_continuous(y, gains, memory):

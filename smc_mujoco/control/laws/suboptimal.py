@@ -10,13 +10,13 @@ Autom. Control 43(2):241, 1998; form and conditions of A. Levant, "Principles of
 """
 
 from smc_mujoco.control.law import command, law_function, sgn
+from smc_mujoco.control.units import FORCE, Gain
 
 
 @law_function(
-    gains={"r1": 4.0, "r2": 1.5},
+    gains={"r1": Gain(4.0, FORCE, positive=True), "r2": Gain(1.5, FORCE, positive=True)},
     memory=3,
-    positive=("r1", "r2"),
-    degree=2,
+    relative_degree=2,
     conditions={"r1 > r2": lambda g: g.r1 > g.r2},
 )
 def suboptimal(y, gains, memory):

@@ -16,9 +16,17 @@ gains); R. Seeber & M. Horn, "Stability proof for a well-established super-twist
 import math
 
 from smc_mujoco.control.law import command, law_function, sgn, sliding
+from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 
 
-@law_function(gains={"k1": 3.0, "k2": 4.4, "c": 2.5, "w_max": math.inf}, nonnegative=("k1", "k2", "c", "w_max"))
+@law_function(
+    gains={
+        "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),
+        "k2": Gain(4.4, FORCE_RATE, nonnegative=True),
+        "c": Gain(2.5, RATE, nonnegative=True),
+        "w_max": Gain(math.inf, FORCE, nonnegative=True, held=True),
+    }
+)
 def super_twisting(y, gains, memory):
     s, eq = sliding(y, gains.c)
     v = eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]

@@ -15,12 +15,18 @@ the torque at the pivot in place of the pivot's acceleration; the catch is deriv
 import math
 
 from smc_mujoco.control.law import law_function, sgn
+from smc_mujoco.control.units import FORCE_PER_SPEED, INERTIA, RATE, Gain, Unit
 
 
 @law_function(
-    gains={"k": 4.0, "q": 6.0, "J": 0.125, "w": 4.43, "part": 0.8},
-    positive=("k", "q", "J", "w", "part"),
-    degree=2,
+    gains={
+        "k": Gain(4.0, Unit(position=-1), positive=True),  # of the force k E
+        "q": Gain(6.0, FORCE_PER_SPEED, positive=True),
+        "J": Gain(0.125, INERTIA, positive=True, held=True),
+        "w": Gain(4.43, RATE, positive=True, held=True),
+        "part": Gain(0.8, positive=True, held=True),
+    },
+    relative_degree=2,
     conditions={"q > J w": lambda g: g.q > g.J * g.w, "part < 1": lambda g: g.part < 1.0},
     plants=("inverted_pendulum",),
 )

@@ -9,13 +9,18 @@ systems", Automatica 49(6):1715, 2013 (bound).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
+from smc_mujoco.control.units import FORCE, Gain, Unit
 
 
 @law_function(
-    gains={"k": 4.0, "b": 2.0, "p": 0.6, "bound": 20.0},
+    gains={
+        "k": Gain(4.0, FORCE, positive=True),
+        "b": Gain(2.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
+        "p": Gain(0.6, positive=True, held=True),
+        "bound": Gain(20.0, FORCE, positive=True),
+    },
     memory=1,
-    positive=("k", "b", "p", "bound"),
-    degree=2,
+    relative_degree=2,
     conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
 )
 def terminal(y, gains, memory):

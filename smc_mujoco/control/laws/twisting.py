@@ -8,13 +8,13 @@ Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control",
 """
 
 from smc_mujoco.control.law import command, law_function, sgn
+from smc_mujoco.control.units import FORCE, Gain
 
 
 @law_function(
-    gains={"r1": 3.7, "r2": 2.3},
+    gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
     memory=1,
-    positive=("r1", "r2"),
-    degree=2,
+    relative_degree=2,
     conditions={"r1 > r2": lambda g: g.r1 > g.r2},
 )
 def twisting(y, gains, memory):

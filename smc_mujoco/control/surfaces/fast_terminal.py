@@ -8,12 +8,17 @@ Circuits Syst. I 49(2):261, 2002.
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
 
 
 @surface_function(
-    gains={"a": 1.0, "b": 1.0, "p": 0.6, "bound": 20.0},
+    gains={
+        "a": Gain(1.0, RATE, positive=True),
+        "b": Gain(1.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
+        "p": Gain(0.6, positive=True, held=True),
+        "bound": Gain(20.0, ACCELERATION, positive=True),
+    },
     memory=1,
-    positive=("a", "b", "p", "bound"),
     conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
 )
 def fast_terminal(y, gains, memory):

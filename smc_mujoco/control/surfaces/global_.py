@@ -9,9 +9,10 @@ Int. J. Control 62(5):1001, 1995.
 import math
 
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import RATE, Gain
 
 
-@surface_function(gains={"c": 2.5, "q": 1.5}, memory=3, positive=("c", "q"))
+@surface_function(gains={"c": Gain(2.5, RATE, positive=True), "q": Gain(1.5, RATE, positive=True)}, memory=3)
 def global_(y, gains, memory):
     linear = y.de + gains.c * y.e
     if memory[0] == 0.0:  # the first sample

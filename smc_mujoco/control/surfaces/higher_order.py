@@ -10,9 +10,10 @@ Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decompositi
 """
 
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
-@surface_function(gains={"k1": 6.25, "k2": 5.0}, memory=1, positive=("k1", "k2"))
+@surface_function(gains={"k1": Gain(6.25, RATE2, positive=True), "k2": Gain(5.0, RATE, positive=True)}, memory=1)
 def higher_order(y, gains, memory):
     eq = -gains.k2 * y.de - gains.k1 * y.e
     return y.a - y.ddr - eq, eq

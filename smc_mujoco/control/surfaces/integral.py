@@ -7,9 +7,10 @@ CDC, 4591, 1996, with s0 = de and the nominal control that gives e'' = -k1 e - k
 """
 
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
-@surface_function(gains={"k1": 2.25, "k2": 3.0}, memory=3, positive=("k1", "k2"))
+@surface_function(gains={"k1": Gain(2.25, RATE2, positive=True), "k2": Gain(3.0, RATE, positive=True)}, memory=3)
 def integral(y, gains, memory):
     if memory[0] == 0.0:  # the first sample
         memory[0], memory[1] = 1.0, y.de + gains.k2 * y.e

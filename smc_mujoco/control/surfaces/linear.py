@@ -4,8 +4,9 @@ Source: V. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chap
 """
 
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import RATE, Gain
 
 
-@surface_function(gains={"c": 3.0}, positive=("c",))
+@surface_function(gains={"c": Gain(3.0, RATE, positive=True)})
 def linear(y, gains, memory):
     return y.de + gains.c * y.e, -gains.c * y.de

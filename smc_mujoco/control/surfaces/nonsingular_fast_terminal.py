@@ -8,12 +8,17 @@ Robust Nonlinear Control 21(16):1865, 2011.
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import Gain, Unit
 
 
 @surface_function(
-    gains={"a": 0.5, "q": 2.0, "b": 0.4, "p": 1.6},
+    gains={
+        "a": Gain(0.5, lambda g: Unit(position=1 - g.q), positive=True),
+        "q": Gain(2.0, positive=True, held=True),
+        "b": Gain(0.4, lambda g: Unit(position=1 - g.p, time=g.p), positive=True),
+        "p": Gain(1.6, positive=True, held=True),
+    },
     memory=1,
-    positive=("a", "q", "b", "p"),
     conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0, "q > p": lambda g: g.q > g.p},
 )
 def nonsingular_fast_terminal(y, gains, memory):

@@ -8,12 +8,15 @@ Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of 
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import Gain, Unit
 
 
 @surface_function(
-    gains={"B": 3.0, "p": 1.6},
+    gains={
+        "B": Gain(3.0, lambda g: Unit(position=g.p - 1, time=-g.p), positive=True),
+        "p": Gain(1.6, positive=True, held=True),
+    },
     memory=1,
-    positive=("B", "p"),
     conditions={"1 < p < 2": lambda g: 1.0 < g.p < 2.0},
 )
 def nonsingular_terminal(y, gains, memory):

@@ -7,9 +7,10 @@ Source: J.-J. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991, se
 """
 
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
-@surface_function(gains={"kp": 3.0, "ki": 2.0}, memory=1, positive=("kp", "ki"))
+@surface_function(gains={"kp": Gain(3.0, RATE, positive=True), "ki": Gain(2.0, RATE2, positive=True)}, memory=1)
 def pid(y, gains, memory):
     s = y.de + gains.kp * y.e + gains.ki * memory[0]
     memory[0] += y.dt * y.e

@@ -10,12 +10,16 @@ import math
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import ACCELERATION, TIME, Gain
 
 
 @surface_function(
-    gains={"T": 5.0, "p": 0.4, "bound": 20.0},
+    gains={
+        "T": Gain(5.0, TIME, positive=True),
+        "p": Gain(0.4, positive=True, held=True),
+        "bound": Gain(20.0, ACCELERATION, positive=True),
+    },
     memory=1,
-    positive=("T", "p", "bound"),
     conditions={"0 < p < 1/2": lambda g: 0.0 < g.p < 0.5},
 )
 def predefined_time(y, gains, memory):

@@ -9,12 +9,16 @@ systems", Automatica 49(6):1715, 2013 (bound).
 
 from smc_mujoco.control.law import power
 from smc_mujoco.control.surface import surface_function
+from smc_mujoco.control.units import ACCELERATION, Gain, Unit
 
 
 @surface_function(
-    gains={"b": 2.0, "p": 0.6, "bound": 20.0},
+    gains={
+        "b": Gain(2.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),
+        "p": Gain(0.6, positive=True, held=True),
+        "bound": Gain(20.0, ACCELERATION, positive=True),
+    },
     memory=1,
-    positive=("b", "p", "bound"),
     conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
 )
 def terminal(y, gains, memory):

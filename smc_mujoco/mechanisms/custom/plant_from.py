@@ -83,6 +83,12 @@ class OwnModel:
         spec.option.disableflags &= ~SENSORS
         return spec
 
+    @property
+    def argument(self) -> str:
+        """The model as the command line is given it, such as arm.xml:shoulder+elbow."""
+        path = os.path.relpath(self.source.path) if self.source.path else "FILE.xml"
+        return f"{path}:{'+'.join(joint for joint, _ in self.channels)}"
+
     def about(self) -> dict:
         """All that plant_from needs to make it again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}

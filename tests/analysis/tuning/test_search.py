@@ -12,6 +12,8 @@ from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective
 from smc_mujoco.analysis.tuning.search import FINALISTS, STAGE, compare, load, tune
 from smc_mujoco.cli import main
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.metrics.catalogue import itae, tv
 from smc_mujoco.studies.paper import scenarios
 
@@ -134,20 +136,22 @@ def test_the_search_knows_nothing_of_the_gains_it_is_given():
     assert one.before != other.before
 
 
-def test_a_law_of_ones_own_is_tuned_once_its_units_are_known(monkeypatch):
-    with pytest.raises(smc.ScenarioError, match=r"no unit of failing's gain 'when'.*SCALES"):
+def test_a_law_without_units_is_tuned_by_the_old_table_with_a_warning(monkeypatch):
+    with pytest.raises(smc.ScenarioError, match=r"no unit of failing's gain 'when'.*Gain\(.*in its decorator"):
         tune("duffing", failing(), budget=5, objective=LEAN)
-    monkeypatch.setitem(search_space.SCALES, "failing", {"when": None, "k": search_space.FORCE_PER_SPEED})
-    tuned = tune("duffing", failing(when=1.0), budget=5, objective=LEAN)
+    with pytest.warns(DeprecationWarning, match="now in smc_mujoco.control.units"):
+        monkeypatch.setitem(search_space.SCALES, "failing", {"when": None, "k": search_space.FORCE_PER_SPEED})
+    with pytest.warns(DeprecationWarning, match="in its decorator"):
+        tuned = tune("duffing", failing(when=1.0), budget=5, objective=LEAN)
     assert tuned.objective < FAILED
+    assert list(tuned.bounds) == ["k"]
 
 
-def test_an_optimum_at_a_bound_is_told_and_the_bound_moved(monkeypatch):
-    monkeypatch.setitem(
-        search_space.SCALES, "observer_free", {"lam": search_space.Unit(force=-2), "k1": search_space.RATE}
-    )
+def test_an_optimum_at_a_bound_is_told_and_the_bound_moved():
+    own = catalogue()["observer_free"]
+    odd = dataclasses.replace(own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)})
     goal, budgets = Objective(conditions=("nominal",), duration=1.5), (2 * STAGE, 3 * STAGE)
-    first, then = (tune("duffing", "observer_free", budget=budget, objective=goal) for budget in budgets)
+    first, then = (tune("duffing", odd, budget=budget, objective=goal) for budget in budgets)
     assert first.at_bound == {"lam": "upper"}
     assert first.searched == first.bounds == then.bounds
     assert then.widened == ["lam"]

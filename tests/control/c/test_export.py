@@ -74,7 +74,7 @@ def traces(compiled):
     for name, template in LAWS.items():
         for plant in template.plants or PLANTS:
             for way, more in enumerate(WAYS):
-                if "surface" in more and (template.degree != 1 or template.plants):
+                if "surface" in more and (template.relative_degree != 1 or template.plants):
                     continue
                 pairs[name, plant, way] = [scenario(law, plant, **more) for law in (template(), compiled[name]())]
     found = iter(smc.run([s for pair in pairs.values() for s in pair]))

@@ -4,9 +4,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.gain_sets import FORMS
+from smc_mujoco.control.gain_sets import FORMS, general_laws
 from smc_mujoco.control.law import catalogue
-from smc_mujoco.studies.paper.general_laws import general_laws
 
 
 def test_every_general_law_is_ranked_and_no_law_beside_itself():

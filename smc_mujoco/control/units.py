@@ -1,0 +1,72 @@
+"""Gains and their units.
+
+    @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
+
+A unit is a product of powers of force F, position X and time T. Tuning takes F, X and T from the plant, and so finds
+where to search each gain (`smc_mujoco.analysis.tuning.search_space`). Tests convert gains by their units and compare:
+a law does the same in every system of units.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import NamedTuple
+
+
+class Unit(NamedTuple):
+    """A unit, F^force X^position T^time."""
+
+    force: float = 0.0
+    position: float = 0.0
+    time: float = 0.0
+
+    def of(self, scales: Mapping[str, float]) -> float:
+        """Return its size, from the sizes of F, X and T."""
+        return scales["F"] ** self.force * scales["X"] ** self.position * scales["T"] ** self.time
+
+
+FORCE = Unit(force=1)
+POSITION = Unit(position=1)
+TIME = Unit(time=1)
+RATE = Unit(time=-1)  # slope of a linear surface, leak, bandwidth
+RATE2 = Unit(time=-2)
+SPEED = Unit(position=1, time=-1)  # of s = de + c e, its layers and dead zones
+ACCELERATION = Unit(position=1, time=-2)
+INERTIA = Unit(force=1, position=-1, time=2)
+FORCE_RATE = Unit(force=1, time=-1)
+FORCE_PER_POSITION = Unit(force=1, position=-1)  # also of a gain that grows by |s|: F/T per X/T
+FORCE_PER_SPEED = Unit(force=1, position=-1, time=1)
+FORCE_PER_ROOT = Unit(force=1, position=-0.5, time=0.5)  # of k in k [s]^(1/2)
+PARABOLA = Unit(position=0.5, time=-1)  # of b in de = -b [e]^(1/2)
+INPUT_GAIN = Unit(force=-1, position=1, time=-2)  # of b in e'' = b u
+
+Formula = Callable[[SimpleNamespace], Unit]
+
+
+@dataclasses.dataclass(frozen=True)
+class Gain:
+    """A gain of a law, a surface or an estimator.
+
+    Attributes:
+      default: its value where none is given.
+      unit: its unit. A function of all gains, read by attribute, where an exponent among them decides it. None: a
+        number without a unit, or not known; tuning refuses to search it.
+      positive: whether it must be greater than 0.
+      nonnegative: whether it must be at least 0.
+      held: whether tuning keeps it as it is: an initial value, an exponent, a table's size, a processor's range.
+    """
+
+    default: float
+    unit: Unit | Formula | None = None
+    positive: bool = False
+    nonnegative: bool = False
+    held: bool = False
+
+    def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
+        """Return the unit for these values of all gains."""
+        return self.unit(SimpleNamespace(**gains)) if callable(self.unit) else self.unit
+
+
+def force_per(exponent: str) -> Formula:
+    """Return the unit of k in the force k [s]^exponent, where the exponent is a gain of that name."""
+    return lambda g: Unit(force=1, position=-getattr(g, exponent), time=getattr(g, exponent))

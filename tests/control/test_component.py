@@ -1,0 +1,43 @@
+"""What decorators take and refuse: gains with units, old words, options of other kinds."""
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control.units import RATE, Gain
+
+
+def zero(y, gains, memory):
+    return 0.0, 0.0
+
+
+def test_gain_keeps_its_unit_and_the_decorators_sign():
+    made = smc.law_function(gains={"a": Gain(1.0, RATE), "b": 2.0}, positive=("a",), nonnegative=("b",))(zero)
+    assert made.gains == {"a": Gain(1.0, RATE, positive=True), "b": Gain(2.0, nonnegative=True)}
+    assert made.defaults == {"a": 1.0, "b": 2.0}
+    with pytest.raises(smc.ScenarioError, match="greater than 0"):
+        made(a=0.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "value", "new"), [("degree", 2, "relative_degree"), ("modelled", True, "requires_model")]
+)
+def test_old_word_works_with_a_deprecation_warning(old, value, new):
+    with pytest.warns(DeprecationWarning, match=f"{old} is now {new}"):
+        made = smc.law_function(**{old: value})(zero)
+    assert getattr(made, new) == value
+    for thing in (made, made()):
+        with pytest.warns(DeprecationWarning, match=f"{old} is now {new}"):
+            assert getattr(thing, old) == value
+
+
+@pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
+def test_option_of_no_such_component_is_a_type_error(decorator):
+    option = "colours" if decorator is smc.law_function else "plants"
+    with pytest.raises(TypeError, match=option):
+        decorator(**{option: ()})
+
+
+@pytest.mark.parametrize("option", [{"colour": "red"}, {"colour": 3}, {"label": 3}, {"short": None}])
+def test_word_that_cannot_be_drawn_is_refused(option):
+    with pytest.raises(smc.ScenarioError, match=next(iter(option))):
+        smc.law_function(**option)
