@@ -22,6 +22,7 @@ from smc_mujoco.cli.commands import (
     tune,
     view,
 )
+from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import printable
 
 app = typer.Typer(
@@ -67,19 +68,20 @@ def options(
     """Options before a command."""
 
 
-app.command("list")(catalogue.list_)
-for command in (
-    catalogue.laws,
-    run.run,
-    show.show,
-    tune.tune,
-    bench.bench,
-    margins.margins,
-    basin.basin,
-    claims.claims,
-    report.report,
-    view.view,
-):
-    app.command()(command)
-app.command("check-c")(check_c.check_c)
-app.command("export-c")(export_c.export_c)
+COMMANDS = {
+    "list": catalogue.list_,
+    "laws": catalogue.laws,
+    "run": run.run,
+    "show": show.show,
+    "tune": tune.tune,
+    "bench": bench.bench,
+    "margins": margins.margins,
+    "basin": basin.basin,
+    "claims": claims.claims,
+    "report": report.report,
+    "view": view.view,
+    "check-c": check_c.check_c,
+    "export-c": export_c.export_c,
+}
+for name, command in COMMANDS.items():
+    app.command(name)(mendable()(command))

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, show, tables
+from smc_mujoco.cli import main, tables
+from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -557,7 +558,7 @@ def test_a_command_put_wrongly_ends_with_code_2_and_shows_how_it_is_put(words, c
 
 HELP = """
 import contextlib, io, sys
-from smc_mujoco.cli import main
+from smc_mujoco.cli.main import main
 for words in (["--help"], ["run", "--help"], ["show", "--help"], ["list", "--help"], ["--version"]):
     said = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with contextlib.redirect_stdout(said):
@@ -671,7 +672,7 @@ run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, control_perio
 scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 if __name__ == "__main__":
     import threading, time
-    from smc_mujoco.cli import show
+    from smc_mujoco.cli import scene as show
     simulate = show.simulate
     def announced(*arguments):
         threading.Timer(0.3, lambda: print("simulating", flush=True)).start()
