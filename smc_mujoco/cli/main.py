@@ -24,6 +24,7 @@ from smc_mujoco.cli.commands import (
 )
 from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import printable
+from smc_mujoco.common.gl import choose_gl
 
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
@@ -42,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # 0 is what a terminal without a width says
+    choose_gl()  # before a command imports mujoco, which fails where MUJOCO_GL names no backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
 

@@ -260,7 +260,7 @@ def test_timing_names_the_stretches_and_they_add_up(call, scene):
 def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_to_install(
     call, scene, folder, monkeypatch
 ):
-    monkeypatch.setattr(gl, "choose", lambda: gl.Choice(wish="", backend="disabled"))
+    monkeypatch.setattr(gl, "choice", lambda: gl.Choice(wish="", backend="disabled"))
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     gl.missing.cache_clear()
     code, out, err = call("run", scene, "--out", "out")
