@@ -25,7 +25,7 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import cores
-from smc_mujoco.studies import executor
+from smc_mujoco.studies import executors
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.study import study
 
@@ -48,7 +48,7 @@ def slices() -> list[list[smc.Scenario]]:
 def bare(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     """Seconds of stepping the models of these scenarios, in the same batches, without the callback."""
     spent = 0.0
-    for batch in executor.batches(scenarios, threads):
+    for batch in executors.batches(scenarios, threads):
         with installed():
             chunk = Chunk([prepare(scenario) for scenario in batch], threads)
         start = time.perf_counter()

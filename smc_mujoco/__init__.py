@@ -14,7 +14,6 @@ import importlib
 import re
 from pathlib import Path
 
-from smc_mujoco.common import gl
 from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
@@ -31,10 +30,10 @@ __all__ = [*_HOMES, "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupport
 
 __path__.append(str(Path(__file__).parent / "moved"))  # old names of modules, for one release
 
-gl.choose()  # before anything imports mujoco
-
 
 def __getattr__(name: str) -> object:
+    if name == "__spec__":
+        return _spec()
     if name not in _HOMES and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     with held_back():
@@ -51,4 +50,17 @@ def __dir__() -> list[str]:
     return sorted({*_HOMES, *_MODULES, "__doc__", "__version__"})
 
 
-registration.attend()  # gymnasium.make("smc_mujoco:Duffing-v0") imports this package, and expects it to be known then
+def _spec() -> object:
+    """Return `__spec__`, at which Python looks in every further import of this package.
+
+    `gymnasium.make("smc_mujoco:Duffing-v0")` is such an import. If gymnasium has come since the first one, the ids are
+    registered now, and `__spec__` is put in its place.
+    """
+    if registration.register_if_imported():
+        globals()["__spec__"] = _SPEC
+    return _SPEC
+
+
+_SPEC = __spec__
+if not registration.register_if_imported():
+    del __spec__

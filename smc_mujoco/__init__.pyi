@@ -5,6 +5,7 @@ from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.cli.main import play as play
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.common.errors import ScenarioWarning as ScenarioWarning
+from smc_mujoco.common.gl import choose_gl as choose_gl
 from smc_mujoco.control.c.export import law_to_c as law_to_c
 from smc_mujoco.control.c.load import law_from_c as law_from_c
 from smc_mujoco.control.component import GainWarning as GainWarning

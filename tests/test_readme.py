@@ -14,7 +14,8 @@ import typer
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, show
+from smc_mujoco.cli import main
+from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.studies import scene
 

@@ -22,7 +22,9 @@ from smc_mujoco.cli.commands import (
     tune,
     view,
 )
+from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import printable
+from smc_mujoco.common.gl import choose_gl
 
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
@@ -41,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # 0 is what a terminal without a width says
+    choose_gl()  # before a command imports mujoco, which fails where MUJOCO_GL names no backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
 
@@ -67,19 +70,20 @@ def options(
     """Options before a command."""
 
 
-app.command("list")(catalogue.list_)
-for command in (
-    catalogue.laws,
-    run.run,
-    show.show,
-    tune.tune,
-    bench.bench,
-    margins.margins,
-    basin.basin,
-    claims.claims,
-    report.report,
-    view.view,
-):
-    app.command()(command)
-app.command("check-c")(check_c.check_c)
-app.command("export-c")(export_c.export_c)
+COMMANDS = {
+    "list": catalogue.list_,
+    "laws": catalogue.laws,
+    "run": run.run,
+    "show": show.show,
+    "tune": tune.tune,
+    "bench": bench.bench,
+    "margins": margins.margins,
+    "basin": basin.basin,
+    "claims": claims.claims,
+    "report": report.report,
+    "view": view.view,
+    "check-c": check_c.check_c,
+    "export-c": export_c.export_c,
+}
+for name, command in COMMANDS.items():
+    app.command(name)(mendable()(command))

@@ -1,39 +1,45 @@
-"""A function's code as a hash: two functions that may compute different things have different ones.
+"""Hashes of code: of a user's functions, of this package, and of the machine's arithmetic.
 
-    of(my_law.function)        # "5f0c..."; another after an edit of it, or of a helper that it calls
+    of(my_law.function)        # "5f0c..."; another one after an edit of it, or of a helper that it calls
 
-What counts: bytecode, constants, defaults, closed-over values, and whatever it reaches by a global name - constants by
-value, functions by their own code, objects by their class and what pickle would keep of them, down to functions and
-classes of Python and of the numerical packages, which a version tells. A law in C counts by its machine code. The names
-of files, lines and comments do not count. It holds for one version of Python.
+A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches by a global name:
+constants by value, functions by their own code, objects by their class and by what pickle keeps of them. Functions and
+classes of Python and of the numerical packages count by name, since the versions of those packages are recorded. A law
+in C counts by its machine code. File names, line numbers and comments do not count. Hashes hold for one version of
+Python.
 """
 
 import functools
 import hashlib
+import io
 import math
 import pickle
 import struct
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
+from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import shipped
 from smc_mujoco.common.jit import AtAddress
 
-VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages told by version, not by code
-SIMPLE = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic)
-CONTAINERS = (tuple, list, set, frozenset, Mapping)
-Seen = dict[int, tuple[int, Any]]  # id -> number, and the thing itself, so that no other one gets its id
+PACKAGE = Path(__file__).parents[1]
+BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
+PRESENTATION = ("studies/report", "cli")  # folders that show results and do not change them
+VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages identified by their version
+VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
+VALUES += (tuple, list, set, frozenset, Mapping)
 
 
 @functools.cache
 def arithmetic() -> str:
-    """How this machine rounds: a hash of what its C library's functions give.
+    """Return a hash of what the C library's functions give on this machine.
 
-    Their last bits differ between C libraries, and between processors with and without FMA (fused multiply-add); all
+    Their last bits differ between C libraries, and between processors with and without FMA (fused multiply-add). All
     else that a run computes is fixed by IEEE 754.
     """
     inputs = [1e-3 * 1.01**k for k in range(1000)]  # 1 mrad to 20 rad
@@ -42,112 +48,132 @@ def arithmetic() -> str:
     return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 
-def of(thing: Any) -> str:
-    """The hash of a function, a class (all its methods), an object that can be called, or a tuple of such.
+@functools.cache
+def package(*without: str) -> str:
+    """Return a hash of this package's code, models and gains.
 
-    Raises:
-      ScenarioError: it holds what can be neither read nor pickled.
+    It leaves out PRESENTATION and the folders named in `without`.
     """
-    kept = isinstance(thing, FunctionType | type | tuple)  # anything else may change
-    try:
-        return _kept(thing) if kept else _of(thing)
-    except TypeError:  # not hashable
-        return _of(thing)
-
-
-def _of(thing: Any) -> str:
+    left_out = (*BESIDE_PACKAGE, *PRESENTATION, *without)
+    files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*")}
+    files = {name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))}
+    files |= {Path("models") / path.name: path for path in shipped("models").rglob("*")}
     digest = hashlib.sha256()
-    for piece in _pieces(thing, {}):
-        digest.update(f"{len(piece)}:".encode() + piece)
+    for name, path in sorted(files.items()):
+        if path.suffix in (".py", ".xml", ".json"):
+            digest.update(name.as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
 
 
-_kept = functools.cache(_of)  # as a compiled law keeps the globals that it was compiled with
+def of(thing: Any) -> str:
+    """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
+
+    Raises:
+      ScenarioError: it holds something that can be neither read nor pickled.
+    """
+    unchanging = isinstance(thing, FunctionType | type | tuple)
+    try:
+        return _cached(thing) if unchanging else _hash(thing)
+    except TypeError:  # not hashable
+        return _hash(thing)
 
 
-def _pieces(thing: Any, seen: Seen) -> Iterator[bytes]:
-    """What makes the thing, piece by piece; one met before is told by its number, so that circles end."""
-    thing = _written(thing)
-    if isinstance(thing, SIMPLE):
-        yield f"{type(thing).__name__} {thing!r}".encode()
-        return
-    if not isinstance(thing, tuple | CodeType):  # of which equal ones may or may not be the same
-        if id(thing) in seen:
-            yield f"again {seen[id(thing)][0]}".encode()
-            return
-        seen[id(thing)] = len(seen), thing
-    if isinstance(thing, ModuleType):
-        yield f"module {thing.__name__}".encode()
-    elif _versioned(thing):
-        yield f"{thing.__module__}.{getattr(thing, '__qualname__', '')}".encode()
-    elif isinstance(thing, FunctionType):
-        yield from _function(thing, seen)
-    elif isinstance(thing, MethodType):
-        yield from _all((thing.__func__, thing.__self__), seen)
-    elif isinstance(thing, AtAddress):
-        yield f"machine code {thing.digest}".encode()
-    elif isinstance(thing, CodeType):
-        yield thing.co_code + thing.co_exceptiontable
-        yield from _all([*thing.co_names, *thing.co_varnames, thing.co_argcount, *thing.co_consts], seen)
-    elif isinstance(thing, type):
-        yield from _class(thing, seen)
-    elif isinstance(thing, CONTAINERS):
-        yield from _container(thing, seen)
-    else:
-        yield from _object(thing, seen)
+def _hash(thing: Any) -> str:
+    buffer = io.BytesIO()
+    try:
+        _CodePickler(buffer, pickle.DEFAULT_PROTOCOL).dump(thing)
+    except Exception as error:  # whatever an object's own methods raise
+        why = " ".join(str(error).split())
+        cure = "use plain functions and numbers"
+        raise ScenarioError(f"cannot tell {shown(thing)} from others ({why}): {cure}") from None
+    return hashlib.sha256(buffer.getvalue()).hexdigest()
 
 
-def _container(thing: Any, seen: Seen) -> Iterator[bytes]:
-    yield type(thing).__name__.encode()
-    if isinstance(thing, Mapping):
-        for item in sorted(thing.items(), key=lambda item: repr(item[0])):
-            yield from _all(item, seen)
-    else:
-        yield from _all(thing if isinstance(thing, tuple | list) else sorted(thing, key=repr), seen)
+_cached = functools.cache(_hash)  # a compiled law keeps the globals that it was compiled with, so does its hash
 
 
-def _all(things: Iterable[Any], seen: Seen) -> Iterator[bytes]:
-    for thing in things:
-        yield from _pieces(thing, seen)
-    yield b"end"
+class _CodePickler(pickle._Pickler):
+    """Pickles functions and classes by what is in them, where pickle would write their names.
+
+    The result is only hashed, never loaded.
+    """
+
+    def memoize(self, obj: Any) -> None:
+        """Note an object as written, unless equal ones may or may not be the same object, as constants."""
+        if not isinstance(obj, tuple | str | bytes | CodeType):
+            super().memoize(obj)
+
+    def persistent_id(self, obj: Any) -> str | None:
+        """Return the name of what a name identifies, or None."""
+        obj = _as_written(obj)
+        if isinstance(obj, ModuleType):
+            return f"module {obj.__name__}"
+        if isinstance(obj, AtAddress):
+            return f"machine code {obj.digest}"
+        return f"{obj.__module__}.{obj.__qualname__}" if _versioned(obj) else None
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Return how an object is written: a kind, and contents that may lead back to the object."""
+        obj, kind = _as_written(obj), ""
+        contents: Any = NotImplemented
+        if isinstance(obj, FunctionType):
+            contents = _function_contents(obj)
+        elif isinstance(obj, MethodType):
+            contents = obj.__func__, obj.__self__
+        elif isinstance(obj, CodeType):
+            names = obj.co_names, obj.co_varnames, obj.co_argcount
+            contents = obj.co_code, obj.co_exceptiontable, *names, obj.co_consts
+        elif isinstance(obj, type):
+            kind, contents = obj.__qualname__, _class_contents(obj)
+        elif isinstance(obj, set | frozenset):
+            contents = sorted(obj, key=repr)
+        elif isinstance(obj, Mapping):
+            contents = sorted(obj.items(), key=lambda item: repr(item[0]))
+        return contents if contents is NotImplemented else (str, (f"{type(obj).__name__} {kind}",), contents)
 
 
-def _written(thing: Any) -> Any:
-    """The function as it was written, of one that is compiled, a static method, kept results or a public one."""
-    thing = getattr(thing, "explains", thing) if isinstance(thing, FunctionType) else thing
-    if not isinstance(thing, FunctionType | MethodType | type):
+def _as_written(thing: Any) -> Any:
+    """Return the function that the user wrote, of one that is compiled, a static method, cached or explained."""
+    if isinstance(thing, FunctionType):
+        return getattr(thing, "explains", thing)
+    if not isinstance(thing, MethodType | type):
         for name in ("py_func", "__func__", "__wrapped__"):
             thing = getattr(thing, name, thing)
     return thing
 
 
 def _versioned(thing: Any) -> bool:
-    """Whether it is a function or class of a package whose version says what it is."""
+    """Return whether a thing is a function or class of a package that its version identifies."""
     module = getattr(thing, "__module__", None)
     return hasattr(thing, "__qualname__") and isinstance(module, str) and module.split(".")[0] in VERSIONED
 
 
-def _function(function: FunctionType, seen: Seen) -> Iterator[bytes]:
-    yield from _pieces(function.__code__, seen)
-    yield from _all((function.__defaults__, function.__kwdefaults__), seen)
-    yield from _all((_content(cell) for cell in function.__closure__ or ()), seen)
+def _function_contents(function: FunctionType) -> list[Any]:
     names = _names(function.__code__)
-    for name in sorted(names & function.__globals__.keys()):
-        yield name.encode()
-        yield from _reached(function.__globals__[name], names, seen)
+    closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
+    return [
+        function.__code__,
+        function.__defaults__,
+        function.__kwdefaults__,
+        closure,
+        *_reached(function.__globals__, names, set()),
+    ]
 
 
-def _reached(value: Any, names: set[str], seen: Seen) -> Iterator[bytes]:
-    """What a function reaches by these names: a value, and of a module what is in it."""
-    known = id(value) in seen
-    yield from _pieces(value, seen)
-    if isinstance(value, ModuleType) and not known and value.__name__.split(".")[0] not in VERSIONED:
-        for name in sorted(names & vars(value).keys()):
-            yield name.encode()
-            yield from _reached(vars(value)[name], names, seen)
+def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list[Any]:
+    """Return the values that these names have in a namespace, and in the modules that some of them are."""
+    found: list[Any] = []
+    for name in sorted(names & space.keys()):
+        value = space[name]
+        found.append((name, value))
+        own = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
+        if own and id(value) not in known:
+            known.add(id(value))
+            found += _reached(vars(value), names, known)
+    return found
 
 
-def _content(cell: Any) -> Any:
+def _cell_contents(cell: Any) -> Any:
     try:
         return cell.cell_contents
     except ValueError:  # not filled yet
@@ -155,34 +181,16 @@ def _content(cell: Any) -> Any:
 
 
 def _names(code: CodeType) -> set[str]:
-    """The names that code uses, and the functions within it."""
+    """Return the names that code uses, with those of the functions within it."""
     return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
-def _class(kind: type, seen: Seen) -> Iterator[bytes]:
-    """A class by the functions that it was written with, and its bases."""
-    yield kind.__qualname__.encode()
-    yield from _all((base for base in kind.__bases__ if not _versioned(base)), seen)
-    for name, held in sorted(vars(kind).items()):
-        value = _written(held.fget if isinstance(held, property) else held)
+def _class_contents(kind: type) -> list[Any]:
+    """Return the bases of a class, and the functions and values that it was written with."""
+    found: list[Any] = [base for base in kind.__bases__ if not _versioned(base)]
+    for name, value in sorted(vars(kind).items()):
+        content = _as_written(value.fget if isinstance(value, property) else value)
         written = name == "__call__" or not name.startswith("__")
-        if written and isinstance(value, (FunctionType, np.ndarray, *CONTAINERS, *SIMPLE)):
-            yield name.encode()
-            yield from _pieces(value, seen)
-
-
-def _object(thing: Any, seen: Seen) -> Iterator[bytes]:
-    """Anything else: arrays by their bytes, objects by what pickle would keep of them, functions by their code."""
-    yield from _pieces(type(thing), seen)
-    if isinstance(thing, np.ndarray) and thing.dtype != object:
-        yield f"{thing.dtype} {thing.shape}".encode() + thing.tobytes()
-        return
-    try:
-        reduced = thing.__reduce_ex__(pickle.DEFAULT_PROTOCOL)
-        parts = [reduced] if isinstance(reduced, str) else [list(p) if isinstance(p, Iterator) else p for p in reduced]
-    except Exception as error:  # whatever its class raises
-        why = " ".join(str(error).split())
-        raise ScenarioError(
-            f"cannot tell {shown(thing)} from others ({why}): use plain functions and numbers"
-        ) from None
-    yield from _all(parts, seen)
+        if written and isinstance(content, (FunctionType, *VALUES)):
+            found.append((name, content))
+    return found

@@ -1,19 +1,30 @@
-"""Which OpenGL library MuJoCo renders with; chosen before the first `import mujoco`, which reads MUJOCO_GL.
+"""The OpenGL backend that pictures are rendered with: EGL, OSMesa, or one that opens a window.
 
-`import mujoco` fails when MUJOCO_GL names a backend that it does not know or cannot load, and without
-the variable it takes the one that needs a display. Here a backend that loads is kept; else EGL is
-taken, else OSMesa, else none: everything but films works without. Only Linux has this choice.
+MuJoCo reads MUJOCO_GL when it is imported; where the variable is unset it takes a backend that needs a display.
+Importing smc_mujoco leaves the variable alone. The backend is chosen when the first picture is rendered: the one that
+MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even where MuJoCo took another one.
+
+`import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load. `choose_gl` prevents that;
+the command line calls it. Only Linux has a choice of backends. This module stays light: it imports mujoco when needed.
 """
 
+import atexit
 import ctypes
 import dataclasses
 import functools
+import importlib
 import os
 import sys
+import threading
+import weakref
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import mujoco
 
 OFF = ("disable", "disabled", "off", "false", "0")
 DISPLAY = ("enable", "enabled", "on", "true", "1", "glfw", "glx")
-LIBRARIES = {  # what mujoco's import loads, backend by backend: one library of each group
+LIBRARIES = {  # what mujoco loads for each backend: one library of each group
     "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1")),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
 }
@@ -25,28 +36,41 @@ context.make_current()
 mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), mujoco.mjtFontScale.mjFONTSCALE_50)
 """
 
+_LOCK = threading.Lock()  # one renderer is made at a time
+_RENDERERS: "weakref.WeakSet[mujoco.Renderer]" = weakref.WeakSet()  # to be closed at exit
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Choice:
-    """MUJOCO_GL as it was found ("" when unset) and as it is now."""
+    """The backend that MUJOCO_GL names ("" when unset) and the backend that is used."""
 
     wish: str
     backend: str
 
 
 @functools.cache
-def choose() -> Choice:
-    """Set MUJOCO_GL to a backend with which `import mujoco` works; nothing once mujoco is imported."""
+def choice() -> Choice:
+    """Return the backend for this process. The first call decides."""
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if sys.platform != "linux" or "mujoco" in sys.modules:
+    if sys.platform != "linux":
         return Choice(wish=wish, backend=wish)
-    backend = next((name for name in (wish, "egl", "osmesa") if usable(name)), "disabled")
-    os.environ["MUJOCO_GL"] = backend
-    return Choice(wish=wish, backend=backend)
+    return Choice(wish=wish, backend=next((name for name in (wish, "egl", "osmesa") if usable(name)), "disabled"))
+
+
+def choose_gl() -> str:
+    """Set MUJOCO_GL to a backend that loads here, and return its name ("disabled" for none).
+
+    Call it before mujoco is imported, for renderers of your own; afterwards, and on other systems than Linux, it sets
+    nothing. Films, stills and environments of this package render without it.
+    """
+    backend = choice().backend
+    if sys.platform == "linux" and "mujoco" not in sys.modules:
+        os.environ["MUJOCO_GL"] = backend
+    return backend
 
 
 def usable(backend: str) -> bool:
-    """Whether `import mujoco` works with this backend."""
+    """Return whether `import mujoco` works with this backend."""
     if backend not in LIBRARIES:
         return backend in OFF + DISPLAY
     if os.environ.get("PYOPENGL_PLATFORM", "").lower() not in ("", backend):
@@ -55,7 +79,7 @@ def usable(backend: str) -> bool:
 
 
 def loads(library: str) -> bool:
-    """Whether the dynamic linker finds this library and all that it needs."""
+    """Return whether the dynamic linker finds this library and all that it needs."""
     try:
         ctypes.CDLL(library)
     except OSError:
@@ -64,47 +88,96 @@ def loads(library: str) -> bool:
 
 
 def note() -> str | None:
-    """One sentence when MUJOCO_GL held a value that had to be replaced."""
-    choice = choose()
-    if choice.wish in ("", choice.backend):
+    """Return one sentence if MUJOCO_GL names a backend that cannot be used, else None."""
+    chosen = choice()
+    if chosen.wish in ("", chosen.backend):
         return None
-    why = "does not load here" if choice.wish in LIBRARIES else "is no backend of MuJoCo"
-    then = "films are off" if choice.backend in OFF else f"{choice.backend} is used instead"
-    return f"MUJOCO_GL={choice.wish} {why}: {then}"
+    why = "does not load here" if chosen.wish in LIBRARIES else "is no backend of MuJoCo"
+    then = "films are off" if chosen.backend in OFF else f"{chosen.backend} is used instead"
+    return f"MUJOCO_GL={chosen.wish} {why}: {then}"
 
 
 @functools.cache
 def missing() -> str | None:
-    """None when a film can be rendered, else one sentence that says why not and what to do.
+    """Return None if pictures can be rendered, else one sentence: why not, and what to do.
 
     Renders for real, in a process of its own: a broken driver can end the process it runs in.
     """
-    choice = choose()
-    if choice.wish in OFF:
-        return f"no film: MUJOCO_GL={choice.wish} turns rendering off: unset it"
-    found = f" (and MUJOCO_GL={choice.wish} cannot be used)" if note() else ""
-    if choice.backend in OFF:
+    chosen = choice()
+    if chosen.wish in OFF:
+        return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
+    found = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
+    if chosen.backend in OFF:
         platform = os.environ.get("PYOPENGL_PLATFORM")
         if platform:
             return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{found}: unset it"
         return f"no film: neither libEGL with libGL nor libOSMesa is here{found}: {PACKAGES}"
-    error = probe()
+    error = probe(chosen.backend)
     if error is None:
         return None
-    if choice.backend in LIBRARIES:
-        return f"no film: {choice.backend} does not render{found} ({error}): {PACKAGES}"
-    cure = "set MUJOCO_GL=egl before mujoco is imported" if sys.platform == "linux" else "unset MUJOCO_GL"
+    if chosen.backend in LIBRARIES:
+        return f"no film: {chosen.backend} does not render{found} ({error}): {PACKAGES}"
+    cure = "set MUJOCO_GL=egl" if sys.platform == "linux" else "unset MUJOCO_GL"
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 
 
-def probe() -> str | None:
-    """None when an empty model can be drawn, else how it failed."""
+def probe(backend: str) -> str | None:
+    """Return None if a new process can draw an empty model with this backend, else how it failed."""
     import subprocess
 
+    environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
+    command = [sys.executable, "-c", PROBE]
     try:
-        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"a trial failed: {error}"
     if done.returncode == 0:
         return None
     return (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+
+
+def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "mujoco.Renderer":
+    """Return a mujoco.Renderer with the backend that was chosen, whichever one MuJoCo took when it was imported.
+
+    A mujoco.Renderer takes its context class from the module `gl_context`. The class is replaced there while the
+    renderer is made, and put back.
+
+    Args:
+      height, width: of the picture, px.
+
+    Raises:
+      ScenarioError: nothing renders here; the sentence of `missing`.
+    """
+    import mujoco
+
+    from smc_mujoco.common.errors import ScenarioError
+
+    if why := missing():
+        raise ScenarioError(why)
+
+    if sys.platform != "linux":
+        return mujoco.Renderer(model, height, width)
+    backend = choice().backend
+    theirs = sys.modules[mujoco.Renderer.__module__].gl_context
+    with _LOCK:
+        before = getattr(theirs, "GLContext", None)  # none where MUJOCO_GL turned rendering off
+        try:
+            theirs.GLContext = importlib.import_module(
+                f"mujoco.{backend if backend in LIBRARIES else 'glfw'}"
+            ).GLContext
+            made = mujoco.Renderer(model, height, width)
+        finally:
+            if before is not None:
+                theirs.GLContext = before
+            elif hasattr(theirs, "GLContext"):
+                del theirs.GLContext
+    _RENDERERS.add(made)
+    atexit.unregister(_close_all)
+    atexit.register(_close_all)  # runs before MuJoCo's own function, registered by now, which ends EGL
+    return made
+
+
+def _close_all() -> None:
+    """Close the renderers that are still open, while OpenGL is there."""
+    for opened in list(_RENDERERS):
+        opened.close()

@@ -133,9 +133,7 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
         if self.render_mode is None:
             return None
         if self.renderer is None:
-            if why := gl.missing():
-                raise ScenarioError(why)
-            self.renderer = mujoco.Renderer(self.setting.model)
+            self.renderer = gl.renderer(self.setting.model)
         mujoco.mj_forward(self.setting.model, self.data)
         self.renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
         return self.renderer.render()

@@ -2,7 +2,7 @@
 
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None inside the noise
-    rich.print(leaderboard_table(boards))              # of `leaderboard_table`
+    rich.print(tables.leaderboard(boards))             # of `cli.tables`
 
 What intervals, ranks and winners mean: `statistics`, `ranking`. A board is one metric in one group of runs; laws are
 compared in each of its blocks, a plant in a condition, and the correction for many comparisons is over all pairs of

@@ -5,7 +5,7 @@ import hashlib
 import json
 from typing import Any
 
-from smc_mujoco.common import fingerprint, source
+from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.mechanisms.custom.channels import recorded
@@ -18,7 +18,7 @@ from smc_mujoco.studies.paper import scenarios
 OURS = "smc_mujoco."
 # Of a description: what tells no condition from another, for it is of the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
-TELL = ("claims", "draw", "testing", "tuned_gains")  # folders that say something of runs, and change none
+UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that change no run
 LONGEST = 60  # characters of a condition's name
 
 
@@ -64,7 +64,7 @@ def condition(scenario: Scenario) -> str:
 def _key(scenario: Scenario, data: dict[str, Any]) -> str:
     if scenario.condition in NAMED:  # which the fields tell
         data = data | {"condition": None}
-    text = to_json([data, _codes(scenario), source.code(*TELL)], sort_keys=True)
+    text = to_json([data, _codes(scenario), fingerprint.package(*UNRELATED)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

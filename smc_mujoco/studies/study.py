@@ -1,11 +1,12 @@
-"""The study: a grid of runs, computed so that nothing is lost, to a table of scores.
+"""A study: many runs, computed so that nothing is lost, to a table of scores.
 
     scenarios = smc.grid(["duffing"], ["observer_free", "classical"], ["noise", "coulomb"], seeds=20)
     table = smc.study(scenarios, "study")          # study/results.parquet; killed, it continues where it was
     print(table.select(law="classical").column("ultimate_bound"))
 
-Runs are told apart by all that decides their outcome: the scenario, the code of its law, signals and other parts of
-yours, and the versions of the packages. A run that is there is not run again; one whose law was edited is.
+A run is identified by everything that decides its outcome: the scenario, the code of its law, signals and other parts
+of yours, and the versions of the packages. A run whose result is in the folder is not run again, unless its law was
+edited.
 """
 
 import dataclasses
@@ -22,9 +23,8 @@ from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import cluster, keep, run_key
-from smc_mujoco.studies import executor as executors
-from smc_mujoco.studies.executor import Batch, Outcome
+from smc_mujoco.studies import executors, run_key, saved_traces
+from smc_mujoco.studies.executors import Batch, Outcome
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
@@ -34,7 +34,7 @@ key, condition = run_key.key, run_key.condition
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Extent:
-    """What a study spans, see `grid`."""
+    """The grid of a study; arguments as of `grid`."""
 
     plants: tuple[str, ...] = paper.PLANTS
     laws: tuple[str, ...] = LAWS
@@ -43,7 +43,7 @@ class Extent:
     duration: float = paper.DURATION
 
 
-# Of the paper's conditions one of a kind; of a real machine's, friction, drive, gear, sensor and obstacles.
+# One condition of each kind: of the paper's; and of a real machine's friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
@@ -64,10 +64,11 @@ def study(
     progress: bool = False,
     traces: str = "none",
 ) -> Table:
-    """Run scenarios, score them, and write their table, out/results.parquet: a row each, in order, equal ones once.
+    """Run scenarios, score them, and write a table with a row for each, out/results.parquet.
 
-    Finished runs are kept in out/parts, some seconds of work a file. A study that was killed, or found the disk full,
-    and is started again with the same arguments goes on from there and ends with the same file, bit for bit.
+    Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored in out/parts, some
+    seconds of work in each file. A study that was killed, or found the disk full, can be started again with the same
+    arguments: it goes on from there and ends with the same file, bit for bit.
 
     Args:
       out: the folder; it may hold the parts of other studies.
@@ -86,7 +87,7 @@ def study(
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     where = executors.checked(executor)
-    find("choice of traces", traces, dict.fromkeys(keep.CHOICES))
+    find("choice of traces", traces, dict.fromkeys(saved_traces.CHOICES))
     threads = cores(threads)
     store = Store(Path(out))
     named = _named(scenarios)
@@ -96,18 +97,18 @@ def study(
         print(f"{len(named) - len(missing)} of {len(named)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
         if where == "local":
-            folder = keep.folder(out) if traces == "all" else None
-            _compute(missing, store, threads, counts, folder)
+            folder = saved_traces.folder(out) if traces == "all" else None
+            _compute_here(missing, store, threads, counts, folder)
         else:
-            _send(missing, store, where, counts)
+            _compute_elsewhere(missing, store, where, counts)
     store.collect(list(named))
     table = dataclasses.replace(Table.read(store.results), known=named)
-    keep.save(table, traces, keep.folder(out), threads, progress)
+    saved_traces.save(table, traces, saved_traces.folder(out), threads, progress)
     return table
 
 
 def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
-    """Hash -> scenario, in order; of equal ones the first."""
+    """Return key -> scenario, in order; of equal ones the first."""
     found: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
     for scenario in scenarios if several else ():  # one by one, as they may be without end
@@ -119,30 +120,29 @@ def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     return found
 
 
-def _compute(scenarios: list[Scenario], store: Store, threads: int, counts: Counter, folder: Path | None) -> None:
-    """Run scenarios here."""
+def _compute_here(scenarios: list[Scenario], store: Store, threads: int, counts: Counter, folder: Path | None) -> None:
+    """Run scenarios in this process; with a folder also save their traces there."""
 
     def finish(batch: Batch, traces: Sequence[Trace]) -> None:
         if folder:
             for scenario, trace in zip(batch, traces, strict=True):
-                trace.save(keep.path(folder, run_key.row(scenario)))
-        store.add([_row(s, executors.outcome(trace)) for s, trace in zip(batch, traces, strict=True)])
-        counts.finished(len(batch))
+                trace.save(saved_traces.path(folder, run_key.row(scenario)))
+        _store_rows(store, counts, batch, [executors.outcome(trace) for trace in traces])
 
-    executors.local(executors.batches(scenarios, threads), threads, finish, counts.stepped)
+    executors.compute_here(executors.batches(scenarios, threads), threads, finish, counts.stepped)
 
 
-def _send(scenarios: list[Scenario], store: Store, where: str | Executor, counts: Counter) -> None:
-    """Have others run scenarios."""
+def _compute_elsewhere(scenarios: list[Scenario], store: Store, where: str | Executor, counts: Counter) -> None:
+    """Have the workers of an executor run scenarios."""
 
     def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
-        store.add([_row(s, outcome) for s, outcome in zip(batch, outcomes, strict=True)])
+        _store_rows(store, counts, batch, outcomes)
         counts.stepped(sum(s.work for s in batch))
-        counts.finished(len(batch))
 
-    with cluster.connected(where) if isinstance(where, str) else nullcontext(where) as pool:
-        executors.remote(executors.batches(scenarios, 1), pool, finish)
+    with executors.dask_executor(where) if isinstance(where, str) else nullcontext(where) as pool:
+        executors.compute_elsewhere(executors.batches(scenarios, 1), pool, finish)
 
 
-def _row(scenario: Scenario, outcome: Outcome) -> dict:
-    return run_key.row(scenario) | outcome
+def _store_rows(store: Store, counts: Counter, batch: Batch, outcomes: Sequence[Outcome]) -> None:
+    store.add([run_key.row(scenario) | outcome for scenario, outcome in zip(batch, outcomes, strict=True)])
+    counts.finished(len(batch))

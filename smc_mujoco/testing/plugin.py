@@ -4,9 +4,8 @@
         r = step_response("inverted_pendulum", my_law, step=0.2, friction=smc.Coulomb(0.05))
         assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
 
-pytest loads this file in every session of whoever has the package installed (entry point `pytest11`). It therefore
-imports nothing heavy until a test uses a fixture or the marker. As any import of the package does, it chooses MUJOCO_GL
-where that is unset and EGL works: a test's `import mujoco` comes after it and would find none.
+pytest loads this file in every session of everybody who has the package installed (entry point `pytest11`). It
+therefore imports nothing heavy until a test uses a fixture or the marker, and leaves MUJOCO_GL alone.
 """
 
 from __future__ import annotations

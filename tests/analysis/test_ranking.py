@@ -18,7 +18,7 @@ from smc_mujoco.analysis.differences import OF_VALUE, coarse, exceeds, least_dif
 from smc_mujoco.analysis.friedman import friedman
 from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, holm
 from smc_mujoco.analysis.ranking import ranks as places
-from smc_mujoco.cli.leaderboard_table import leaderboard_table
+from smc_mujoco.cli.tables import leaderboard as leaderboard_table
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise

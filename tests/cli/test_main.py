@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, show, tables
+from smc_mujoco.cli import main, tables
+from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -259,7 +260,7 @@ def test_timing_names_the_stretches_and_they_add_up(call, scene):
 def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_to_install(
     call, scene, folder, monkeypatch
 ):
-    monkeypatch.setattr(gl, "choose", lambda: gl.Choice(wish="", backend="disabled"))
+    monkeypatch.setattr(gl, "choice", lambda: gl.Choice(wish="", backend="disabled"))
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     gl.missing.cache_clear()
     code, out, err = call("run", scene, "--out", "out")
@@ -671,7 +672,7 @@ run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, control_perio
 scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 if __name__ == "__main__":
     import threading, time
-    from smc_mujoco.cli import show
+    from smc_mujoco.cli import scene as show
     simulate = show.simulate
     def announced(*arguments):
         threading.Timer(0.3, lambda: print("simulating", flush=True)).start()

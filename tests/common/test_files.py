@@ -20,7 +20,7 @@ from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.files import from_json, plain, reading, to_json
 from smc_mujoco.simulation import serialise
-from smc_mujoco.studies.paper.claims.show import document
+from smc_mujoco.studies.paper.claims.audit import document
 from smc_mujoco.studies.paper.claims.verdict import Claim
 from smc_mujoco.studies.report.kept import kept
 from smc_mujoco.testing import golden

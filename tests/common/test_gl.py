@@ -1,4 +1,4 @@
-"""`import smc_mujoco` never fails for want of OpenGL; where films cannot be made, one sentence says why."""
+"""The OpenGL backend: nothing is chosen before the first picture, which then works whatever MuJoCo took."""
 
 import os
 import subprocess
@@ -10,9 +10,9 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has 
 
 REPORT = """
 import os, smc_mujoco.common.gl as gl
-gl.choose()
+gl.choose_gl()
 import mujoco
-print(os.environ["MUJOCO_GL"], gl.note(), gl.missing(), sep="\\n")
+print(os.environ.get("MUJOCO_GL"), gl.note(), gl.missing(), sep="\\n")
 """
 # the dynamic linker's answer on a machine without these libraries
 HIDE = """
@@ -27,15 +27,20 @@ ctypes.CDLL = Linker
 ALL = ("EGL", "OSMesa")
 
 
+def fresh(code: str, **variables: str) -> str:
+    """What a new process prints, which complains of nothing, at its end neither."""
+    clean = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=clean | variables, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
 def report(hidden: tuple[str, ...] = (), first: str = "", **variables: str) -> tuple[str, str, str]:
     """MUJOCO_GL, the note and the missing sentence of a new process ("None" for none)."""
-    clean = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")}
     code = first + (HIDE.format(words=hidden) if hidden else "") + REPORT
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=clean | variables, capture_output=True, text=True, check=True
-    )
-    assert done.stderr == ""
-    backend, note, missing = done.stdout.splitlines()
+    backend, note, missing = fresh(code, **variables).splitlines()
     return backend, note, missing
 
 
@@ -108,6 +113,65 @@ def test_a_conflicting_pyopengl_platform_is_named():
     assert missing == "no film: PYOPENGL_PLATFORM=glx rules out what is installed: unset it"
 
 
-def test_nothing_changes_once_mujoco_is_imported():
-    first = "import os, mujoco; os.environ['MUJOCO_GL'] = 'glfw'\n"
-    assert report(first=first)[0] == "glfw"
+def test_choose_gl_sets_nothing_once_mujoco_is_imported():
+    assert report(first="import mujoco\n")[0] == "None"
+    assert report(first="import os, mujoco; os.environ['MUJOCO_GL'] = 'glfw'\n")[0] == "glfw"
+
+
+IMPORT = """
+import os, sys
+before = dict(os.environ), list(sys.meta_path), list(sys.path_hooks)
+import smc_mujoco as smc
+smc.Scenario(plant="duffing", law="none")
+assert (dict(os.environ), sys.meta_path, sys.path_hooks) == before, "something changed"
+assert type(smc) is type(sys)
+assert smc.__spec__.name == "smc_mujoco"
+"""
+
+
+@pytest.mark.parametrize("wish", [None, "glfw", "disabled"])
+def test_importing_the_package_changes_nothing_of_the_process(wish):
+    assert fresh(IMPORT, **({"MUJOCO_GL": wish} if wish else {})) == ""
+
+
+PICTURE = """
+import sys, mujoco
+held = dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context))
+from smc_mujoco.common import gl
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
+renderer = gl.renderer(model, 48, 64)
+renderer.update_scene(mujoco.MjData(model))
+assert renderer.render().shape == (48, 64, 3)
+assert dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context)) == held, "something is left in MuJoCo"
+other = gl.renderer(model)  # closed by nobody
+"""
+
+
+@pytest.mark.parametrize("wish", [None, "egl"])
+def test_a_renderer_works_whatever_mujoco_was_imported_with(default, wish):
+    if default[2] != "None":
+        pytest.skip(default[2])
+    assert fresh(PICTURE, **({"MUJOCO_GL": wish} if wish else {})) == ""
+
+
+def test_a_renderer_works_where_mujoco_was_imported_without_one(default):
+    if default[2] != "None":
+        pytest.skip(default[2])
+    first = "import os, mujoco; del os.environ['MUJOCO_GL']\n"
+    assert fresh(first + PICTURE, MUJOCO_GL="disabled") == ""
+
+
+def test_a_renderer_that_fails_leaves_nothing_in_mujoco(default):
+    if default[2] != "None":
+        pytest.skip(default[2])
+    code = PICTURE.replace("renderer = gl.renderer(model, 48, 64)", WRONG)
+    assert fresh(code.partition("renderer.update")[0] + "assert dict(vars(module)) == held") == ""
+
+
+WRONG = """
+module = sys.modules[mujoco.Renderer.__module__].gl_context
+try:
+    gl.renderer(model, 48, 10**6)
+except ValueError as error:
+    assert "width" in str(error)
+"""

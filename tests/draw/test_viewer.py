@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, show
+from smc_mujoco.cli import main
+from smc_mujoco.cli import scene as show
 from smc_mujoco.draw import display
 from smc_mujoco.draw import viewer as live
 from smc_mujoco.simulation import reference

@@ -284,6 +284,15 @@ def test_a_model_is_tuned_in_conditions_of_ones_own(arm):
     assert found.scales["X"] == 0.4
 
 
+def test_tune_has_the_bound_of_a_grid(arm):
+    starts = smc.starts(x0=0.4)
+    found = smc.tune(arm, "pid", 2, conditions="nominal", starts=starts)
+    (run,) = smc.grid(arm, found.law, starts=starts)
+    assert found.definition.u_max == run.u_max == 20.0
+    assert "|u| <= 20" in str(found.definition)
+    assert smc.tune(arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts).definition.u_max == 5.0
+
+
 def test_an_objective_of_ones_own_is_saved_and_read_back(arm, tmp_path):
     goal = Objective(conditions=("nominal", WORN), duration=0.5, starts=smc.starts(x0=0.4, by=0.1))
     found = smc.tune("duffing", "observer_free", 4, objective=goal)

@@ -19,14 +19,14 @@ ROOT = Path(__file__).parents[2]
 LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path
-from smc_mujoco.studies import executor, store
+from smc_mujoco.studies import executors, store
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import key, study
 from smc_mujoco.simulation.callback import callback as compiled_callback, silence
 from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
 
-out, executor.STEPS = Path(sys.argv[1]), 60
+out, executors.STEPS = Path(sys.argv[1]), 60
 plants, laws, conditions = ["duffing", "van_der_pol"], ["observer_free", "classical"], ["nominal", "noise"]
 scenarios = grid(plants, laws, conditions, 15, "study", 0.05)
 """
@@ -41,7 +41,7 @@ def told(pipe):
     # what a life does, as it does it: "run", "write", "wrote <hashes>", "collect"
     def tell(*words):
         os.write(pipe, " ".join(words).encode() + b"\\n")
-    run, add, collect = executor.simulated, store.Store.add, store.Store.collect
+    run, add, collect = executors.simulated, store.Store.add, store.Store.collect
     def simulated(*rest):
         tell("run")
         return run(*rest)
@@ -52,7 +52,7 @@ def told(pipe):
     def collecting(self, hashes):
         tell("collect")
         collect(self, hashes)
-    executor.simulated, store.Store.add, store.Store.collect = simulated, adding, collecting
+    executors.simulated, store.Store.add, store.Store.collect = simulated, adding, collecting
 
 def live(folder, doomed):
     # one life of the study; doomed(line) says whether it dies there

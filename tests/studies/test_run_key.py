@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.common import fingerprint, source
+from smc_mujoco.common import fingerprint
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.paper import scenarios
@@ -202,17 +202,17 @@ def test_an_object_that_changed_is_another():
 def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(monkeypatch, tmp_path):
     scenario = smc.Scenario(plant="duffing", law="classical", duration=1.0)
     package = tmp_path / "smc_mujoco"
-    shutil.copytree(source.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains"))
-    monkeypatch.setattr(source, "PACKAGE", package)
+    shutil.copytree(fingerprint.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains"))
+    monkeypatch.setattr(fingerprint, "PACKAGE", package)
 
     def now() -> str:
-        source.code.cache_clear()
+        fingerprint.package.cache_clear()
         return key(scenario)
 
     same = now()
-    (package / "report" / "words.py").write_text("# other words")
-    (package / "claims" / "abstract.py").write_text("# other claims")
+    (package / "studies" / "report" / "words.py").write_text("# other words")
+    (package / "studies" / "paper" / "claims" / "abstract.py").write_text("# other claims")
     assert now() == same
-    (package / "harness.py").write_text("# another loop")
+    (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
-    source.code.cache_clear()
+    fingerprint.package.cache_clear()

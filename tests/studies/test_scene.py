@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import show
+from smc_mujoco.cli import scene as show
 from smc_mujoco.studies import scene as scenes
 
 FOLDER = Path(smc.__file__).parents[1] / "scenes"

@@ -14,7 +14,7 @@ from smc_mujoco.cli.commands.bench import bench
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.model import check_starts
-from smc_mujoco.studies import executor, keep, run_key, store
+from smc_mujoco.studies import executors, run_key, saved_traces, store
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.study import condition, study
 from smc_mujoco.studies.table import Table
@@ -41,7 +41,7 @@ def none_runs(monkeypatch):
     def refuse(*_: object) -> None:
         raise AssertionError("a finished run is run again")
 
-    return lambda: monkeypatch.setattr(executor, "simulated", refuse)
+    return lambda: monkeypatch.setattr(executors, "simulated", refuse)
 
 
 @smc.law_function(gains={"k": 1.0, "when": 0.02})
@@ -155,7 +155,7 @@ def test_the_command_takes_no_names_for_none(tmp_path, capsys):
 def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path, monkeypatch):
     runs = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
     study(runs, tmp_path / "together")
-    monkeypatch.setattr(executor, "STEPS", 1)
+    monkeypatch.setattr(executors, "STEPS", 1)
     table = study(runs, tmp_path / "alone")
     assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
     said = table.column("failure")
@@ -187,8 +187,8 @@ def test_a_study_says_how_many_runs_were_there(tmp_path, capsys):
 def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     study(small(seeds=2), tmp_path)
     ran = []
-    honest = executor.simulated
-    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    honest = executors.simulated
+    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
     study(small(seeds=3), tmp_path)
     assert sorted(s.seed for s in ran) == [2] * 4
     study(small(seeds=3), tmp_path / "anew")
@@ -199,8 +199,8 @@ def test_without_resume_everything_is_run_anew_and_foreign_files_stay(tmp_path, 
     study(small(), tmp_path)
     (tmp_path / "parts" / "mine.parquet").write_text("not a part")
     ran = []
-    honest = executor.simulated
-    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    honest = executors.simulated
+    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
     study(small(), tmp_path, resume=False)
     assert len(ran) == len(small())
     assert (tmp_path / "parts" / "mine.parquet").exists()
@@ -225,14 +225,14 @@ def other_scores(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [cut, foreign, other_scores, lambda path: path.write_bytes(b"")])
 def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
-    monkeypatch.setattr(executor, "STEPS", 50)
+    monkeypatch.setattr(executors, "STEPS", 50)
     study(small(), tmp_path)
     before, parts = bytes_of(tmp_path), sorted((tmp_path / "parts").iterdir())
     assert len(parts) > 3
     harm(parts[1])
     ran = []
-    honest = executor.simulated
-    monkeypatch.setattr(executor, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    honest = executors.simulated
+    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
     study(small(), tmp_path)
     assert 0 < len(ran) < len(small())
     assert bytes_of(tmp_path) == before
@@ -276,7 +276,7 @@ def test_what_a_kill_left_half_written_is_cleared_away_in_time(tmp_path):
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
     study(scenarios, tmp_path / "one")
-    monkeypatch.setattr(executor, "STEPS", 1)
+    monkeypatch.setattr(executors, "STEPS", 1)
     monkeypatch.setattr(store, "PARTS_HELD", 1)
     shuffled = [scenarios[i] for i in np.random.default_rng(0).permutation(len(scenarios))]
     study(shuffled, tmp_path / "two")
@@ -307,7 +307,7 @@ def test_what_failed_is_worst_then_what_never_settles_then_the_largest_bound_or_
         "ultimate_bound": np.array([0.0045, 0.0007, 0.1, *[np.nan] * 3, 9.0, np.nan]),
         "overshoot": np.array([1.0, 1.0, 1.0, 5.0, 20.0, 90.0, 1.0, np.nan]),
     }
-    assert keep.worst(SimpleNamespace(column=columns.get)) == [1, 4, 7]
+    assert saved_traces.worst(SimpleNamespace(column=columns.get)) == [1, 4, 7]
 
 
 def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
@@ -318,6 +318,6 @@ def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
     study(small(), tmp_path / "a", traces="all")
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()} == before
     row = run_key.row(small()[0])
-    file = keep.path(tmp_path / "a" / "traces", row)
+    file = saved_traces.path(tmp_path / "a" / "traces", row)
     assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"
     assert dataclasses.replace(smc.load(file).scenario) == small()[0]

@@ -26,7 +26,6 @@ from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
-from smc_mujoco.simulation.coerce import U_MAX
 from smc_mujoco.simulation.conditions import NAMED, Condition, find_condition
 from smc_mujoco.simulation.grid import CONTROL_PERIOD
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
@@ -50,7 +49,7 @@ class Objective:
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
-      u_max: bound on |u| of every law, N or N m.
+      u_max: bound on |u| of every law, N or N m; None: as in a grid, 6 or what the motors of a model of yours give.
 
     Raises:
       ScenarioError: an unknown condition, or a number out of its range.
@@ -61,7 +60,7 @@ class Objective:
     weight: float = 1e-3
     duration: float = DURATION
     control_period: float = CONTROL_PERIOD
-    u_max: float = U_MAX
+    u_max: float | None = None
 
     def __post_init__(self):
         found = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
@@ -72,11 +71,13 @@ class Objective:
             raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
         number("weight", self.weight, least=0.0)
         for name in ("duration", "control_period", "u_max"):
-            number(name, getattr(self, name), above=0.0)
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), above=0.0)
 
     def __str__(self) -> str:
         terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
-        return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}, |u| <= {self.u_max:g}"
+        bound = "" if self.u_max is None else f", |u| <= {self.u_max:g}"
+        return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
     def described(self) -> dict[str, Any]:
         """As plain data that JSON holds, from which `described` makes it again."""
@@ -118,7 +119,8 @@ class Objective:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
         tracking = min(metrics.itae(trace) / start, FAILED)
-        return tracking, metrics.tv(trace) / (self.u_max * self.duration)
+        bound = trace.scenario.u_max if self.u_max is None else self.u_max
+        return tracking, metrics.tv(trace) / (bound * self.duration)
 
 
 def described(data: Mapping[str, Any]) -> Objective:

@@ -93,8 +93,10 @@ def tune(
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, coerce.component(law, "law"), seed)
     plant, law = cases[0].plant, cases[0].law
+    bound = float(coerce.u_max(goal.u_max, plant))
+    goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
-    scales = search_space.scales(plant, goal.u_max, cases[0].model == "nominal", reach)
+    scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
     before = goal.terms(run(cases, threads))
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:

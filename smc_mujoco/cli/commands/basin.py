@@ -5,20 +5,20 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import asked
-from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Clock, loading, wrote
 
 
 def basin(
     plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint.")],
-    law: Annotated[str, typer.Option(help=f"One that `laws` shows. {asked.OWN_GAINS}")] = "observer_free",
+    law: Annotated[str, typer.Option(help=f"One that `laws` shows. {options.OWN_GAINS}")] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Positions, and as many velocities.")] = 50,
-    gains: Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")] = "tuned",
+    gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Of the longest runs, s.")] = 10.0,
     out: Annotated[Path | None, typer.Option(help="Also draw the map, to a .png or .svg file.")] = None,
     json: Annotated[Path | None, typer.Option(help="Also write the map to a .json file.")] = None,
-    condition: asked.During = "nominal",
-    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    condition: options.During = "nominal",
+    threads: options.Threads = None,
 ) -> None:
     """Map a region of attraction: run a grid of initial positions and velocities, and tell which come to rest at 0.
 
@@ -28,41 +28,40 @@ def basin(
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """
-    with mendable():
-        with loading():
-            from rich.console import Console
+    with loading():
+        from rich.console import Console
 
-            from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
-            from smc_mujoco.analysis.region_of_attraction import basin as search
-            from smc_mujoco.common.files import ended, writable
-            from smc_mujoco.common.progress import bar
-            from smc_mujoco.draw import region
+        from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
+        from smc_mujoco.analysis.region_of_attraction import basin as search
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.draw import region
 
-        clock, console = Clock(), Console()
-        if out:
-            region.checked(out)
-            writable(out)
-        if json:
-            writable(ended(json, ".json"))
-        chosen = asked.law(law)
-        with clock("in all"), bar(f"{law} on {plant}") as drawn:
-            found = search(
-                asked.plant(plant),
-                chosen,
-                (points, points),
-                gains=gains,
-                duration=duration,
-                threads=threads,
-                report=drawn.reached,
-                condition=condition,
-            )
-        counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
-        share = f"{100 * found.share:.3g} % of the states converge"
-        console.print(f"{found.law} on {found.plant}: {share}", highlight=False)
-        said = "{} converge, {} do not, {} undecided".format(*counts)
-        said += f" after {duration:g} s; {asked.origin([chosen], gains)}, {clock.spent['in all']:.0f} s"
-        console.print(said, style="dim", soft_wrap=True, highlight=False)
-        written = [found.save(json)] if json else []
-        written += [region.draw([found], out)] if out else []
-        for path in written:
-            wrote(console, path)
+    clock, console = Clock(), Console()
+    if out:
+        region.checked(out)
+        writable(out)
+    if json:
+        writable(ended(json, ".json"))
+    chosen = options.law(law)
+    with clock("in all"), bar(f"{law} on {plant}") as drawn:
+        found = search(
+            options.plant(plant),
+            chosen,
+            (points, points),
+            gains=gains,
+            duration=duration,
+            threads=threads,
+            report=drawn.reached,
+            condition=condition,
+        )
+    counts = [int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)]
+    share = f"{100 * found.share:.3g} % of the states converge"
+    console.print(f"{found.law} on {found.plant}: {share}", highlight=False)
+    said = "{} converge, {} do not, {} undecided".format(*counts)
+    said += f" after {duration:g} s; {options.origin([chosen], gains)}, {clock.spent['in all']:.0f} s"
+    console.print(said, style="dim", soft_wrap=True, highlight=False)
+    written = [found.save(json)] if json else []
+    written += [region.draw([found], out)] if out else []
+    for path in written:
+        wrote(console, path)

@@ -1,21 +1,42 @@
 """smc-mujoco list, laws: what there is to choose from."""
 
+import sys
 from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading, mendable
+from smc_mujoco.cli.terminal import loading
 
 
 def list_() -> None:
     """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study."""
-    with mendable():
-        with loading():
-            from rich.console import Console
+    with loading():
+        from rich.console import Console
 
-            from smc_mujoco.cli import show
+        from smc_mujoco.cli import tables
+        from smc_mujoco.control.estimator import catalogue as estimators
+        from smc_mujoco.control.law import catalogue as laws
+        from smc_mujoco.control.surface import catalogue as surfaces
+        from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.studies import scene
+        from smc_mujoco.studies.paper import scenarios
 
-        show.catalogues(Console())
+    console = Console()
+
+    def first(doc: str | None) -> str:
+        return (doc or "").strip().partition("\n")[0].rstrip(":")  # before a formula
+
+    known = {
+        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
+        "Laws": ((name, first(t.doc)) for name, t in laws().items()),
+        "Surfaces": ((name, first(t.doc)) for name, t in surfaces().items()),
+        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
+        "Scenes, for smc-mujoco run": ((name, scene.question(path)) for name, path in scene.scenes().items()),
+    }
+    for title, rows in known.items():
+        console.print(tables.catalogue(title, rows), "")
+    names = ", ".join(scenarios.CONDITIONS)
+    console.print(tables.catalogue("Conditions, for smc.paper.comparison(plant, condition)", [("", names)]))
 
 
 def laws(
@@ -30,10 +51,9 @@ def laws(
 
     Example: smc-mujoco laws super_twisting
     """
-    with mendable():
-        with loading():
-            from rich.console import Console
+    with loading():
+        from rich.console import Console
 
-            from smc_mujoco.cli import lawbook
+        from smc_mujoco.cli import law_pages
 
-        lawbook.show(name, Console())
+    law_pages.print_pages(name, Console())

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading, mendable
+from smc_mujoco.cli.terminal import loading
 from smc_mujoco.common.errors import ScenarioError
 
 OPTIONS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # arguments of law_from_c, with which its sentences end
@@ -34,14 +34,13 @@ def check_c(
 
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
-    with mendable():
-        with loading():
-            from smc_mujoco.control.c.child import checked
-            from smc_mujoco.control.c.said import parsed
+    with loading():
+        from smc_mujoco.control.c.child import checked
+        from smc_mujoco.control.c.said import parsed
 
-        given = parsed(gains, "--gains") if gains else None
-        try:
-            for line in checked(file, given, memory, symbol, flag or (), timeout):
-                print(line)
-        except ScenarioError as error:
-            raise ScenarioError(OPTIONS.sub(r"--\1", str(error))) from None
+    given = parsed(gains, "--gains") if gains else None
+    try:
+        for line in checked(file, given, memory, symbol, flag or (), timeout):
+            print(line)
+    except ScenarioError as error:
+        raise ScenarioError(OPTIONS.sub(r"--\1", str(error))) from None

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import Clock, loading, mendable
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Clock, loading
 from smc_mujoco.common.errors import printable
 
 
@@ -21,7 +22,7 @@ def claims(
     table: Annotated[Path | None, typer.Option(help="results.parquet of a bench: its runs are not made again.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    threads: options.Threads = None,
 ) -> None:
     """Audit the paper's claims: each measured against the threshold that was fixed for it before any run.
 
@@ -31,31 +32,31 @@ def claims(
 
     Example: smc-mujoco claims 3 18 --gains tuned
     """
-    with mendable():
-        with loading():
-            from rich.console import Console
+    with loading():
+        from rich.console import Console
 
-            from smc_mujoco.common.files import writable
-            from smc_mujoco.common.progress import bar
-            from smc_mujoco.studies.paper.claims import show
-            from smc_mujoco.studies.paper.claims.audit import claims as audit
-            from smc_mujoco.studies.paper.claims.audit import evaluations
-            from smc_mujoco.studies.table import Table
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import replacing, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.studies.paper.claims.audit import claims as audit
+        from smc_mujoco.studies.paper.claims.audit import document, evaluations
+        from smc_mujoco.studies.table import Table
 
-        clock, console = Clock(), Console()
-        names = None if gains is None else [name.strip() for name in gains.split(",") if name.strip()]
-        known = None if table is None else Table.read(table)
-        if out:
-            writable(out)
-        with clock("in all"), bar("claims", evaluations(ids or None, names, quick), counted=True) as drawn:
-            found = audit(known, ids or None, names, quick, threads=threads, report=drawn.advance)
-        text = show.document(found)
-        if out:
-            show.write(text, out)
-        if json:
-            print(text)
-        else:
-            show.tell(found, console, full=bool(ids))
-            written = f"; wrote {printable(str(out))}" if out else ""
-            where = "; quick: coarser grids than the claims say" * quick + written
-            console.print(f"{clock.spent['in all']:.0f} s{where}", style="dim", soft_wrap=True, highlight=False)
+    clock, console = Clock(), Console()
+    names = None if gains is None else options.names(gains)
+    known = None if table is None else Table.read(table)
+    if out:
+        writable(out)
+    with clock("in all"), bar("claims", evaluations(ids or None, names, quick), counted=True) as drawn:
+        found = audit(known, ids or None, names, quick, threads=threads, report=drawn.advance)
+    text = document(found)
+    if out:
+        with replacing(out) as file:
+            file.write_text(text + "\n")
+    if json:
+        print(text)
+    else:
+        tables.print_claims(found, console, full=bool(ids))
+        written = f"; wrote {printable(str(out))}" if out else ""
+        where = "; quick: coarser grids than the claims say" * quick + written
+        console.print(f"{clock.spent['in all']:.0f} s{where}", style="dim", soft_wrap=True, highlight=False)

@@ -4,11 +4,12 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading, mendable
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import loading
 
 
 def export_c(
-    law: Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")],
+    law: options.LawName,
     gains: Annotated[str, typer.Option(metavar="NAME=VALUE,...", help="Gains; the law's own where left out.")] = "",
     numbers: Annotated[
         str, typer.Option("--type", metavar="double|float|q15", help="Numbers; q15 for observer_free only.")
@@ -22,10 +23,9 @@ def export_c(
 
     Example: smc-mujoco export-c observer_free --gains lam=6,k1=3 --type float > observer_free.c
     """
-    with mendable():
-        with loading():
-            from smc_mujoco.control.c.export import law_to_c
-            from smc_mujoco.control.c.said import parsed
-            from smc_mujoco.control.law import law as find
+    with loading():
+        from smc_mujoco.control.c.export import law_to_c
+        from smc_mujoco.control.c.said import parsed
+        from smc_mujoco.control.law import law as find
 
-        print(law_to_c(find(law, **parsed(gains, "--gains")), numbers), end="")
+    print(law_to_c(find(law, **parsed(gains, "--gains")), numbers), end="")

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading, mendable
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import loading
 from smc_mujoco.common.errors import printable
 
 
@@ -15,7 +16,7 @@ def report(
     seeds: Annotated[
         int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 name no winner.")
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in some 20 minutes, and write it as one HTML file: which controller, where, how sure.
 
@@ -25,9 +26,8 @@ def report(
 
     Example: smc-mujoco report --quick --out look
     """
-    with mendable():
-        with loading():
-            from smc_mujoco.studies.report import report as make
+    with loading():
+        from smc_mujoco.studies.report import report as make
 
-        path = make(out, quick, seeds, threads, progress=True)
-        print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
+    path = make(out, quick, seeds, threads, progress=True)
+    print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

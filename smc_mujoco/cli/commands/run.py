@@ -5,15 +5,16 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import Clock, loading, mendable
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Clock, loading
 
 
 def run(
-    name: Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")],
+    name: options.SceneName,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,
     video: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers instead of the scene's.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    threads: options.Threads = None,
     export: Annotated[
         str | None,
         typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat or parquet, beside its .npz."),
@@ -27,21 +28,20 @@ def run(
 
     Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
     """
-    with mendable():
-        clock = Clock()
-        with clock("loading"), loading():
-            from rich.console import Console
+    clock = Clock()
+    with clock("loading"), loading():
+        from rich.console import Console
 
-            from smc_mujoco.cli import show
-            from smc_mujoco.simulation.trace import formats
-            from smc_mujoco.studies import scene as scenes
+        from smc_mujoco.cli.scene import perform
+        from smc_mujoco.simulation.trace import formats
+        from smc_mujoco.studies import scene as scenes
 
-        exported = () if export is None else formats(export)
-        path = scenes.find(name)
-        scene = scenes.read(path)
-        if seed is not None:
-            scene = scene.seeded(seed)
-        console = Console()
-        show.perform(scene, out or Path("videos") / path.stem, video, threads, clock, console, exported)
-        if timing:
-            console.print(str(clock), style="dim", soft_wrap=True, highlight=False)
+    exported = () if export is None else formats(export)
+    path = scenes.find(name)
+    scene = scenes.read(path)
+    if seed is not None:
+        scene = scene.seeded(seed)
+    console = Console()
+    perform(scene, out or Path("videos") / path.stem, video, threads, clock, console, exported)
+    if timing:
+        console.print(str(clock), style="dim", soft_wrap=True, highlight=False)

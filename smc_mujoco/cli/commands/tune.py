@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import asked
-from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Clock, loading, wrote
 
 
 def tune(
     plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint+joint.")],
-    law: Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")],
+    law: options.LawName,
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
     ] = "balanced",
@@ -24,10 +24,10 @@ def tune(
     conditions: Annotated[
         str | None, typer.Option(help="Names, as a,b, in place of the objective's seven, which are given at the end.")
     ] = None,
-    condition: asked.Conditions = None,
-    x0: asked.Middle = None,
-    spread: asked.Spread = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")] = None,
+    condition: options.Conditions = None,
+    x0: options.Middle = None,
+    spread: options.Spread = None,
+    threads: options.Threads = None,
 ) -> None:
     """Find a law's gains on a plant by the rule that is the same for every law.
 
@@ -37,43 +37,43 @@ def tune(
 
     Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
-    with mendable():
-        with loading():
-            from rich.console import Console
+    with loading():
+        from rich.console import Console
 
-            from smc_mujoco.analysis.tuning import result, search
-            from smc_mujoco.common.files import writable
+        from smc_mujoco.analysis.tuning import result, search
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import writable
 
-        for file in (out, front):
-            if file:
-                writable(file)
-        path, clock, console = out and result.checked(out), Clock(), Console()
-        with clock("tuning"):
-            found = search.tune(
-                asked.plant(plant),
-                law,
-                budget,
-                seed,
-                objective,
-                threads,
-                progress=True,
-                conditions=asked.conditions(asked.names(conditions), condition) or None,
-                starts=asked.starts(x0, spread),
-            )
-        console.print(result.table(found))
-        console.print(f"{found.definition}", soft_wrap=True, highlight=False)
-        console.print(
-            f"objective {found.objective:.4g} s², with the law's default gains {found.before:.4g}; "
-            f"{len(found.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {clock.spent['tuning']:.1f} s",
-            soft_wrap=True,
-            highlight=False,
+    for file in (out, front):
+        if file:
+            writable(file)
+    path, clock, console = out and result.checked(out), Clock(), Console()
+    with clock("tuning"):
+        found = search.tune(
+            options.plant(plant),
+            law,
+            budget,
+            seed,
+            objective,
+            threads,
+            progress=True,
+            conditions=options.conditions(options.names(conditions), condition) or None,
+            starts=options.starts(x0, spread),
         )
-        if found.objective > found.before:
-            console.print("no set of gains tried is better than the default ones: give a larger --budget")
-        if path:
-            wrote(console, found.save(path))
-        if front:
-            from smc_mujoco.draw.pareto import pareto
+    console.print(tables.tuning(found))
+    console.print(f"{found.definition}", soft_wrap=True, highlight=False)
+    console.print(
+        f"objective {found.objective:.4g} s², with the law's default gains {found.before:.4g}; "
+        f"{len(found.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {clock.spent['tuning']:.1f} s",
+        soft_wrap=True,
+        highlight=False,
+    )
+    if found.objective > found.before:
+        console.print("no set of gains tried is better than the default ones: give a larger --budget")
+    if path:
+        wrote(console, found.save(path))
+    if front:
+        from smc_mujoco.draw.pareto import pareto
 
-            for drawn in pareto([found], front):
-                wrote(console, drawn)
+        for drawn in pareto([found], front):
+            wrote(console, drawn)

@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading, mendable
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import loading
 
 
 def view(
-    name: Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")],
+    name: options.SceneName,
     condition: Annotated[
         str | None, typer.Option(help="Which of the scene's conditions; default: the one that its film shows.")
     ] = None,
@@ -31,22 +32,21 @@ def view(
 
     Example: smc-mujoco view inverted_pendulum --label super_twisting
     """
-    with mendable():
-        from smc_mujoco.common.errors import ScenarioError, find
-        from smc_mujoco.draw import display
+    from smc_mujoco.common.errors import ScenarioError, find
+    from smc_mujoco.draw import display
 
-        no_window = display.missing()
-        if sys.platform == "linux" and not no_window:
-            os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
-        with loading():
-            from smc_mujoco.draw import viewer
-            from smc_mujoco.studies import scene as scenes
+    no_window = display.missing()
+    if sys.platform == "linux" and not no_window:
+        os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
+    with loading():
+        from smc_mujoco.draw import viewer
+        from smc_mujoco.studies import scene as scenes
 
-        scene = scenes.read(scenes.find(name))
-        runs = scene.conditions[scene.film]
-        if condition is not None:
-            runs = find(f"condition of {name}", condition, scene.conditions)
-        scenario = next(iter(runs.values())) if label is None else find(f"label in {name}", label, runs)
-        if no_window:
-            raise ScenarioError(no_window)
-        viewer.watch(scenario)
+    scene = scenes.read(scenes.find(name))
+    runs = scene.conditions[scene.film]
+    if condition is not None:
+        runs = find(f"condition of {name}", condition, scene.conditions)
+    scenario = next(iter(runs.values())) if label is None else find(f"label in {name}", label, runs)
+    if no_window:
+        raise ScenarioError(no_window)
+    viewer.watch(scenario)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import mjcb
+from smc_mujoco.common import gl, mjcb
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, own
 from smc_mujoco.draw.states import shapes
@@ -63,7 +63,7 @@ class Stage:
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
         seen = [camera.project(points, turn, place, size) for points in corners]
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in seen])
-        self.renderer = mujoco.Renderer(self.model, size[1], size[0])
+        self.renderer = gl.renderer(self.model, size[1], size[0])
 
     def __enter__(self) -> "Stage":
         return self

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.analysis.tuning.result import versions
-from smc_mujoco.common import source
+from smc_mujoco.common import fingerprint
 
 T = TypeVar("T")
 
@@ -28,7 +28,7 @@ def kept(
       path: of the file; before its ending the hash is put.
       depends: what the result depends on beside the code, JSON-able.
     """
-    text = json.dumps([depends, source.code(), versions()], sort_keys=True, default=str)
+    text = json.dumps([depends, fingerprint.package(), versions()], sort_keys=True, default=str)
     own = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
     if own.exists():
         with contextlib.suppress(Exception):  # whatever damaged bytes raise: it is computed again

@@ -14,6 +14,7 @@ from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics import catalogue
+from smc_mujoco.studies.paper.claims.verdict import MARKS
 
 # What the overview compares, and what each asks for; the tables' columns.
 HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
@@ -45,11 +46,10 @@ KINDS = {
     "mass": "mass",
     "noise": "position noise",
 }
-MARKS = {"supported": "●", "partly supported": "◐", "refuted": "○", "not testable": "–"}
 ABBREVIATIONS = {"pid": "PID", "lqr": "LQR"}
 PROPER = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
 
-__all__ = ["style"]
+__all__ = ["MARKS", "style"]
 
 
 def number(value: float) -> str:

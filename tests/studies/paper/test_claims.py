@@ -12,16 +12,17 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import lam_range
+from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.claims import claims as command
+from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.paper.claims import audit, evidence, lyapunov, search, show, verdict
-from smc_mujoco.studies.paper.claims.audit import catalogue, claims, evaluations
-from smc_mujoco.studies.paper.claims.checks import Beside, check, ratio
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Runs
+from smc_mujoco.studies.paper.claims import audit, lyapunov, searches
+from smc_mujoco.studies.paper.claims import runs as claim_runs
+from smc_mujoco.studies.paper.claims.audit import catalogue, claim, claims, evaluations
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs
 from smc_mujoco.studies.paper.claims.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.studies.paper.claims.verdict import (
     EXISTENTIAL,
@@ -31,8 +32,12 @@ from smc_mujoco.studies.paper.claims.verdict import (
     REFUTED,
     SUPPORTED,
     UNIVERSAL,
+    Beside,
+    check,
     combined,
     numbers,
+    ratio,
+    verdict,
 )
 from smc_mujoco.studies.paper.scenarios import PLANTS
 from smc_mujoco.studies.run_key import key
@@ -41,7 +46,6 @@ LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 
           45 46 48 49 50 51 52 55 56 57 59 61 T"""
 UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
 CHEAP = ("3", "5", "18", "25")
-OURS = "observer_free"
 
 # checks
 
@@ -189,7 +193,7 @@ def test_what_decides_where_all_holds_is_the_nearest_to_its_limit(only):
 
 def test_claims_are_json_without_loss(only):
     only(entry(found=[check("a", math.inf, "<", 1.0), check("b", math.nan, "<", -math.inf), ASIDE]))
-    text = show.document(claims(gains="study"))
+    text = audit.document(claims(gains="study"))
     told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))["claims"][0]
     assert float(told["numbers"]["study"]["a"]["value"]) == math.inf
     assert math.isnan(float(told["numbers"]["study"]["b"]["value"]))
@@ -249,8 +253,8 @@ def short(runs, name="duffing", **changes):
 
 def test_a_run_is_made_once(runs, monkeypatch):
     made = []
-    stream = evidence.stream
-    monkeypatch.setattr(evidence, "stream", lambda some, threads: made.extend(some) or stream(some, threads))
+    stream = claim_runs.stream
+    monkeypatch.setattr(claim_runs, "stream", lambda some, threads: made.extend(some) or stream(some, threads))
     first = runs.scores([short(runs), short(runs), short(runs, seed=1)])
     assert first[0] == first[1]
     assert runs.scores([short(runs, seed=1), short(runs)]) == [first[2], first[0]]
@@ -263,7 +267,7 @@ def test_a_run_that_fails_is_infinitely_bad_in_everything(runs):
         return math.nan, 0.0
 
     (scores,) = runs.scores([short(runs, law=lost())])
-    assert set(scores) == {m.name for m in metrics() if not m.network}
+    assert set(scores) >= {m.name for m in metrics() if not m.network}
     assert set(scores.values()) == {math.inf}
 
 
@@ -271,7 +275,7 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
     scenario = short(runs)
     row = {m.name: None if m.network else 1.5 for m in metrics()}
     row |= {"hash": key(scenario), "law": OURS, "gains": '{"lam": 6.0}', "failure": None}
-    held = evidence.of_table(SimpleNamespace(rows=lambda: [row]))
+    held = claim_runs.of_table(SimpleNamespace(rows=lambda: [row]))
     table = Runs("study", table=held)
     assert table.scores([scenario])[0]["itae"] == 1.5
     assert [one.gains for one in table.held()] == [{"lam": 6.0}]
@@ -367,17 +371,17 @@ def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
 
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory(monkeypatch):
     single = ("inverted_pendulum", "van_der_pol", "duffing")
-    monkeypatch.setattr(search, "PLANTS", single)
+    monkeypatch.setattr(searches, "PLANTS", single)
     runs = Runs("study")
-    for name, found in search.smallest_stable(runs).items():
-        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], search.PERIOD)
+    for name, found in searches.smallest_stable(runs).items():
+        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], searches.PERIOD)
         assert theory <= found <= 1.02 * theory, name
 
 
 def test_a_law_without_effect_stabilises_what_hangs_alone(monkeypatch):
-    monkeypatch.setattr(search, "PLANTS", ("duffing", "pendulum_network"))
-    found = search.smallest_stable(Runs("study", quick=True, substitute={OURS: zero_gain}))
-    assert found == {"duffing": math.inf, "pendulum_network": search.LEAST}
+    monkeypatch.setattr(searches, "PLANTS", ("duffing", "pendulum_network"))
+    found = searches.smallest_stable(Runs("study", quick=True, substitute={OURS: zero_gain}))
+    assert found == {"duffing": math.inf, "pendulum_network": searches.LEAST}
 
 
 # the audit
@@ -427,7 +431,7 @@ def test_a_command_beyond_lambda_is_seen():
         def scores(self, scenarios):
             return [found | {"max_u": 2.0 * found["max_u"]} for found in super().scores(scenarios)]
 
-    assert verdict(catalogue()["4"](Louder("study", quick=True, substitute={OURS: louder}))) != SUPPORTED
+    assert verdict(catalogue()["4"].evidence(Louder("study", quick=True, substitute={OURS: louder}))) != SUPPORTED
 
 
 # the command
@@ -437,7 +441,7 @@ def test_a_command_beyond_lambda_is_seen():
 def terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     app = typer.Typer()
-    app.command()(command)
+    app.command()(mendable()(command))
     return lambda *arguments: CliRunner().invoke(app, list(arguments))
 
 
@@ -461,15 +465,15 @@ def test_an_overview_has_a_line_a_claim(only, capsys):
     from rich.console import Console
 
     only(entry("3", found={"study": [YES], "tuned": [NO]}), entry("18", found=[], note="Nothing to see."))
-    show.tell(claims(gains=["study", "tuned"]), Console(width=120), full=False)
+    tables.print_claims(claims(gains=["study", "tuned"]), Console(width=120), full=False)
     text = capsys.readouterr().out
     for part in ("partly supported, flips", "● ", "no = 3 (asked: < 2)", "Nothing to see.", "1 not testable"):
         assert part in text
 
 
 def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
-    late = show.sentence(check("settling time, s", math.inf, "<", 10.0))
-    far = show.sentence(check("deviation", math.inf, "<", 0.01))
+    late = tables.check_sentence(check("settling time, s", math.inf, "<", 10.0))
+    far = tables.check_sentence(check("deviation", math.inf, "<", 0.01))
     assert (late, far) == ("settling time, s = never (asked: < 10)", "deviation = inf (asked: < 0.01)")
 
 

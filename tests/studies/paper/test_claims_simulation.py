@@ -14,19 +14,18 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.paper.claims import (
-    compare,
     contributions,
-    delays,
     lyapunov,
     practical,
     robustness,
+    searches,
     table_one,
 )
+from smc_mujoco.studies.paper.claims import runs as claim_runs
 from smc_mujoco.studies.paper.claims.audit import catalogue, claims
-from smc_mujoco.studies.paper.claims.checks import Check
-from smc_mujoco.studies.paper.claims.evidence import Runs
+from smc_mujoco.studies.paper.claims.runs import Runs
 from smc_mujoco.studies.paper.claims.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.studies.paper.claims.verdict import PARTLY, REFUTED, SUPPORTED, verdict
+from smc_mujoco.studies.paper.claims.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.studies.paper.scenarios import LAWS
 
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)
@@ -62,12 +61,12 @@ class Stub(Runs):
 
 def of(runs: Runs, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
-    return [one for one in catalogue()[id](runs) if isinstance(one, Check)]
+    return [one for one in catalogue()[id].evidence(runs) if isinstance(one, Check)]
 
 
 def judged(runs: Runs, id: str) -> str:
     """The verdict on a claim under one set of gains."""
-    return verdict(catalogue()[id](runs), catalogue()[id].quantifier)
+    return verdict(catalogue()[id].evidence(runs), catalogue()[id].quantifier)
 
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
@@ -233,7 +232,7 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
     for name in SETS:
         runs = Stub(lambda s: {"tv_rate": 7919.0 * s.law.gains["lam"] * (1.0 + s.input_delay) % 1.0})
         runs.gains = name
-        named.add(tuple(one.what for one in catalogue()[id](runs)))
+        named.add(tuple(one.what for one in catalogue()[id].evidence(runs)))
     assert len(named) == 1
 
 
@@ -412,17 +411,19 @@ def bearing(most: dict[str, float]) -> Told:
 @pytest.mark.parametrize("periods", [0, 1, 3, 7, 20, 33, 61, 99, 100, 499, 500])
 def test_the_search_finds_the_largest_delay_to_one_control_period(periods):
     runs = Stub(bearing({OURS: periods * 1e-3}))
-    assert delays.largest(runs, ["duffing"], [OURS]) == {("duffing", OURS): pytest.approx(periods * 1e-3)}
+    assert searches.largest_delays(runs, ["duffing"], [OURS]) == {("duffing", OURS): pytest.approx(periods * 1e-3)}
 
 
 def test_a_law_that_bears_nothing_and_one_that_bears_all_end_the_search():
-    found = delays.largest(Stub(bearing({OURS: -1.0, CLASSICAL: 9.0})), ["duffing"], [OURS, CLASSICAL])
+    found = searches.largest_delays(Stub(bearing({OURS: -1.0, CLASSICAL: 9.0})), ["duffing"], [OURS, CLASSICAL])
     assert found == {("duffing", OURS): 0.0, ("duffing", CLASSICAL): DELAYS[-1]}
 
 
 def test_a_quick_search_ends_within_eight_periods_below():
     for periods in (13, 61, 333):
-        (found,) = delays.largest(Stub(bearing({OURS: periods * 1e-3}), quick=True), ["duffing"], [OURS]).values()
+        (found,) = searches.largest_delays(
+            Stub(bearing({OURS: periods * 1e-3}), quick=True), ["duffing"], [OURS]
+        ).values()
         assert periods - 8 < round(found * 1e3) <= periods
 
 
@@ -437,8 +438,8 @@ def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
-    assert delays.critical(Runs("study"), "duffing") == pytest.approx(0.178, abs=0.002)
-    assert math.isnan(delays.critical(Runs("study", substitute={OURS: zero_gain}), "duffing"))
+    assert searches.critical_delay(Runs("study"), "duffing") == pytest.approx(0.178, abs=0.002)
+    assert math.isnan(searches.critical_delay(Runs("study", substitute={OURS: zero_gain}), "duffing"))
 
 
 # table I
@@ -530,8 +531,8 @@ def test_every_claim_of_the_simulations_is_there_and_says_what_it_measures():
 
 def test_of_two_laws_that_never_settle_none_is_slower_or_like_the_other():
     told = {("duffing", name): {"settling_time": never} for name in (OURS, CLASSICAL)}
-    assert not compare.slower("duffing", CLASSICAL, told).holds
-    assert not compare.alike("duffing", CLASSICAL, OURS, told, 0.25).holds
+    assert not claim_runs.slower("duffing", CLASSICAL, told).holds
+    assert not claim_runs.alike("duffing", CLASSICAL, OURS, told, 0.25).holds
 
 
 def test_real_runs_give_the_verdicts_of_the_first_gains():

@@ -7,12 +7,11 @@ import numpy as np
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
-from smc_mujoco.studies.paper.claims.compare import NETWORKS
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import NETWORKS, OURS, Runs, scale
+from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import CONDITIONS, PLANTS, REALISTIC
 
-OURS = "observer_free"
 NOISY = Noise(position=0.01)  # the study's, on the position alone
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
 DISTURBED = ("sine", "constant", "step", "pulse", "process_noise")

@@ -1,37 +1,77 @@
-"""The audit of a paper: the verdicts on its claims.
+"""The audit of the paper: its claims, each a function of runs, and the verdicts on them.
 
     claims(only=["3", "18"])                       # the verdicts on two claims, under every set of gains
 
-A claim is one function in a file of this package, which is walked to find them: see `entry`.
+    @claim("3", "reduces chattering", where="abstract", measured="TV rate against classical SMC, nominal",
+           holds_if="< 1 % of classical")
+    def reduces_chattering(runs: Runs) -> list[Check]: ...
+
+Every claim is a function in a module of this folder; `catalogue` finds them. Thresholds were fixed before any run, and
+are not moved. How verdicts follow from checks: `verdict`.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, find, taken, unknown
+from smc_mujoco.common.files import to_json
 from smc_mujoco.common.registry import modules
+from smc_mujoco.common.version import __version__
 from smc_mujoco.control.gain_sets import SETS
-from smc_mujoco.studies.paper.claims.entry import Entry
-from smc_mujoco.studies.paper.claims.verdict import Claim, Found, combined, numbers, verdict
+from smc_mujoco.studies.paper.claims.verdict import NAMED, Claim, Found, combined, numbers, verdict
 
 if TYPE_CHECKING:
-    from smc_mujoco.studies.paper.claims.evidence import Held, Substitute
+    from smc_mujoco.studies.paper.claims.runs import Held, Runs, Substitute
     from smc_mujoco.studies.table import Table
 
+Evidence = Callable[["Runs"], Found]
 QUICK_SETS = ("tuned",)
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A claim in the catalogue.
+
+    Attributes:
+      id: its number in the list of claims.
+      text: what the paper says, in a few words.
+      where: the section of the paper.
+      measured: what is run, and what is measured on it.
+      holds_if: the threshold, in words.
+      evidence: from runs under one set of gains to checks and the numbers beside them.
+      note: what a reader must know to judge the numbers: why a part is not testable, what stands for what.
+      late: whether it looks at the runs of all other claims, and so comes after them.
+      quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
+    """
+
+    id: str
+    text: str
+    where: str
+    measured: str
+    holds_if: str
+    evidence: Evidence
+    note: str = ""
+    late: bool = False
+    quantifier: str = NAMED
+
+
+def claim(id: str, text: str, **fields: Any) -> Callable[[Evidence], Entry]:
+    """Decorator: enter a function from runs to checks in the catalogue; fields as of `Entry`."""
+    return lambda evidence: Entry(id=id, text=text, evidence=evidence, **fields)
+
+
 def _order(id: str) -> tuple[int, str]:
-    """Numbers first, by size, then letters: the order of the list."""
+    """Return the sort key of an id: numbers by size, then letters."""
     return (int(id), "") if id.isdigit() else (1_000_000, id)
 
 
 @functools.cache
 def catalogue() -> dict[str, Entry]:
-    """Every claim found in this package, by id, in the order of the list.
+    """Return every claim of this folder by its id, in the order of the list.
 
     Raises:
       ScenarioError: two claims of one id.
@@ -55,7 +95,7 @@ def claims(
     threads: int | None = None,
     report: Callable[[int], None] = lambda done: None,
 ) -> list[Claim]:
-    """The verdicts on the paper's claims, with the numbers behind them, in the order of the list.
+    """Return the verdicts on the paper's claims, with the numbers behind them, in the order of the list.
 
     Args:
       table: of a study, whose runs are then not made again.
@@ -69,9 +109,9 @@ def claims(
     Raises:
       ScenarioError: an unknown id or set of gains.
     """
-    from smc_mujoco.studies.paper.claims.evidence import Runs, of_table
+    from smc_mujoco.studies.paper.claims.runs import Runs, of_table
 
-    # a table tells of the laws as they are: nothing of it stands for a mutant's runs
+    # a table has runs of the laws as they are, not of their mutants
     rows: dict[str, Held] = {} if table is None or substitute else of_table(table)
     shared: dict[str, Held] = {}
     entries = wanted(only)
@@ -79,13 +119,13 @@ def claims(
     for name in sets(gains, quick):
         runs = Runs(name, quick, substitute, threads, rows, shared)
         for entry in sorted(entries, key=lambda entry: entry.late):
-            found[entry.id][name] = entry(runs)
+            found[entry.id][name] = entry.evidence(runs)
             report(1)
     return [judged(entry, found[entry.id]) for entry in entries]
 
 
 def wanted(only: Iterable[str | int] | None) -> list[Entry]:
-    """The entries of some ids, all for None, in the order of the list; an unknown id is a ScenarioError."""
+    """Return the entries of some ids, or all for None, in the order of the list; refuse an unknown id."""
     known = catalogue()
     if only is None:
         return list(known.values())
@@ -96,7 +136,7 @@ def wanted(only: Iterable[str | int] | None) -> list[Entry]:
 
 
 def sets(gains: str | Sequence[str] | None, quick: bool) -> list[str]:
-    """The sets of gains that `claims` takes for these arguments; an unknown one is a ScenarioError."""
+    """Return the sets of gains that `claims` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(QUICK_SETS if quick else SETS)
     names = [gains] if isinstance(gains, str) else taken("gains", gains)
@@ -110,12 +150,12 @@ def sets(gains: str | Sequence[str] | None, quick: bool) -> list[str]:
 def evaluations(
     only: Iterable[str | int] | None = None, gains: str | Sequence[str] | None = None, quick: bool = False
 ) -> int:
-    """How often `claims` reports, for a progress bar."""
+    """Return how often `claims` reports, for a progress bar."""
     return len(wanted(only)) * len(sets(gains, quick))
 
 
 def judged(entry: Entry, found: dict[str, Found]) -> Claim:
-    """A claim's verdict from what was found, set by set."""
+    """Return a claim with its verdict, from what was found under each set of gains."""
     verdicts = {name: verdict(some, entry.quantifier) for name, some in found.items()}
     overall, flips, sentence = combined(verdicts, entry.quantifier)
     told = {name: numbers(some) for name, some in found.items()}
@@ -133,3 +173,8 @@ def judged(entry: Entry, found: dict[str, Found]) -> Claim:
         quantifier=entry.quantifier,
         note=" ".join(filter(None, (entry.note, sentence))),
     )
+
+
+def document(claims: Sequence[Claim]) -> str:
+    """Return claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
+    return to_json({"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}, indent=1)

@@ -3,15 +3,13 @@
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.studies.paper.claims.compare import UNCLAMPED
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import OURS, UNCLAMPED, Runs, scale
 from smc_mujoco.studies.paper.claims.timing import nanoseconds
 from smc_mujoco.studies.paper.claims.variants import squeezed
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL
+from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
-OURS = "observer_free"
 RIVALS = ("classical", "adaptive", "super_twisting")  # the paper's
 MENDED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
 SENTENCES = {"TV rate": "smoothness", "steady error under d": "robustness"}

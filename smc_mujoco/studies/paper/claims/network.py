@@ -5,10 +5,9 @@ claim is supported where it holds on both.
 """
 
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.studies.paper.claims.checks import about
-from smc_mujoco.studies.paper.claims.compare import HOSMC, NETWORKS, OURS, alike, scores, slower
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Check, Runs, check
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import HOSMC, NETWORKS, OURS, Runs, alike, scores, slower
+from smc_mujoco.studies.paper.claims.verdict import Check, about, check
 
 COUPLINGS = (0.0, 0.5, 5.0)  # N m/rad; the study's is 0.5
 

@@ -13,12 +13,11 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue, command, law_function, sliding
 from smc_mujoco.metrics import conventions, settling_time
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.paper.claims.compare import OURS, RIVALS, UNCLAMPED, bound, deviation
-from smc_mujoco.studies.paper.claims.delays import critical, largest
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, bound, deviation, scale
+from smc_mujoco.studies.paper.claims.searches import critical_delay, largest_delays
 from smc_mujoco.studies.paper.claims.variants import with_gains
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL
+from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
@@ -187,7 +186,7 @@ def _peak_after_jump(trace: Trace) -> float:
 )
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
     """Largest delay of the paper's law against each rival's; beside it linear theory's, sampled and held."""
-    borne, below = (largest(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (BEARS, 1.0))
+    borne, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (BEARS, 1.0))
     found: list[Check | Beside] = []
     for plant in PLANTS:
         for law in RIVALS:
@@ -198,5 +197,7 @@ def delay_tolerant(runs: Runs) -> list[Check | Beside]:
             for law in LAWS
         ]
         found.append(Beside(f"{plant}: largest delay of {UNCLAMPED}, s", borne[plant, UNCLAMPED]))
-        found.append(Beside(f"{plant}: critical delay of the paper's law by linear theory, s", critical(runs, plant)))
+        found.append(
+            Beside(f"{plant}: critical delay of the paper's law by linear theory, s", critical_delay(runs, plant))
+        )
     return found

@@ -7,10 +7,9 @@ import numpy as np
 
 from smc_mujoco.metrics.catalogue import HIGH, conventions
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.paper.claims.checks import about
-from smc_mujoco.studies.paper.claims.compare import OURS, RIVALS, UNCLAMPED, deviation, given, scores
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, actual_bound, deviation, scale, scores
+from smc_mujoco.studies.paper.claims.verdict import Beside, Check, about, check, ratio
 from smc_mujoco.studies.paper.scenarios import LAWS
 
 PLANT = "van_der_pol"
@@ -74,7 +73,7 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
     """How u of the paper's law fluctuates about rest; see `fluctuation`."""
     (trace,) = runs.traces([runs.scenario(PLANT, OURS, "noise")])
     std, step, share = fluctuation(trace)
-    most, over = given(runs, PLANT), "over min(lambda, u_max)"
+    most, over = actual_bound(runs, PLANT), "over min(lambda, u_max)"
     return [
         check(f"{PLANT}: standard deviation of u with noise, {over}", ratio(std, most), "<", 0.1, "small fluctuations"),
         check(f"{PLANT}: largest step of u with noise, {over}", ratio(step, most), "<", 0.1, "smooth"),
@@ -95,7 +94,7 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
 )
 def continuous(runs: Runs) -> list[Check]:
     """Largest step of u over min(lambda, u_max)."""
-    step = ratio(runs.score(PLANT, OURS, "sine")["max_step"], given(runs, PLANT))
+    step = ratio(runs.score(PLANT, OURS, "sine")["max_step"], actual_bound(runs, PLANT))
     return [check(f"{PLANT}: largest step of u under d, over min(lambda, u_max)", step, "<", 0.02)]
 
 

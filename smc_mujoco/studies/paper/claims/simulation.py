@@ -6,21 +6,21 @@ less is better it is inf of a run that does not settle. "Slower" is a larger set
 by more than the least relevant difference, see `differences`.
 """
 
-from smc_mujoco.studies.paper.claims.checks import about
-from smc_mujoco.studies.paper.claims.compare import (
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import (
     HOSMC,
     OURS,
     RIVALS,
     UNCLAMPED,
-    Table,
+    Runs,
+    ScoresOfPairs,
     alike,
     larger_than,
     overshoot,
     scores,
     slower,
 )
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check
+from smc_mujoco.studies.paper.claims.verdict import Beside, Check, about, check
 from smc_mujoco.studies.paper.scenarios import LAWS
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"
@@ -195,13 +195,13 @@ def classical_deviates(runs: Runs) -> list[Check]:
     ]
 
 
-def _overshoot(plant: str, law: str, got: Table, relation: str, limit: float) -> Check:
+def _overshoot(plant: str, law: str, got: ScoresOfPairs, relation: str, limit: float) -> Check:
     """A law's overshoot against a limit; to stay below one it must settle."""
     value = overshoot(got[plant, law]) if relation in ("<", "<=") else got[plant, law]["overshoot"]
     return check(f"{plant}: overshoot of {law}, %", value, relation, limit)
 
 
-def _above(plant: str, law: str, other: str, got: Table) -> Check:
+def _above(plant: str, law: str, other: str, got: ScoresOfPairs) -> Check:
     """Whether a law's overshoot is larger, by a relevant difference, than another's, which must settle."""
     limit = larger_than(overshoot(got[plant, other]), of=100.0)
     return check(f"{plant}: overshoot of {law} against {other}'s, %", got[plant, law]["overshoot"], ">", limit)

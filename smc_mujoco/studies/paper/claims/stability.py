@@ -6,13 +6,12 @@ from smc_mujoco.analysis.linear_theory import smallest_lam
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.paper.claims import lyapunov
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs, scale
 from smc_mujoco.studies.paper.claims.variants import reversed_gain, with_gains
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL
+from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
-OURS = "observer_free"
 NEAR = 1e-6  # |s| at and below which the claim says nothing
 RISE = 1e-12  # of the run's largest V: less is rounding
 RATIOS = (0.5, 0.8, 1.0, 1.2)  # lambda over the smallest that linear theory finds stable

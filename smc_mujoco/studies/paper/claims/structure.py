@@ -6,14 +6,13 @@ from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, scale
+from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.lyapunov import input_gain
-from smc_mujoco.studies.paper.claims.search import LEAST, smallest_stable
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs, scale
+from smc_mujoco.studies.paper.claims.searches import LEAST, smallest_stable
+from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS, U_MAX
 
-OURS = "observer_free"
 SINGLE = ("inverted_pendulum", "van_der_pol", "duffing")
 LAG = 0.05  # s, chosen: an actuator's
 SHARE = 1.5  # times the largest jerk that the lag allows, g u_max / LAG: what the differentiator is told to expect

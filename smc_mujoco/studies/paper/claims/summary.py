@@ -1,9 +1,8 @@
 """What the paper's summary of its benchmarks says, on all five plants of the study, nominal."""
 
-from smc_mujoco.studies.paper.claims.compare import HOSMC, OURS, overshoot, scores
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Check, Runs, check, ratio
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import HOSMC, OURS, Runs, overshoot, scores
+from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
 

@@ -22,10 +22,10 @@ import numpy as np
 from smc_mujoco.common.remade import remade
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.studies.paper.claims.compare import UNCLAMPED, Table, scores
-from smc_mujoco.studies.paper.claims.delays import largest
-from smc_mujoco.studies.paper.claims.entry import claim
-from smc_mujoco.studies.paper.claims.evidence import Beside, Check, Runs, check, ratio, scale
+from smc_mujoco.studies.paper.claims.audit import claim
+from smc_mujoco.studies.paper.claims.runs import UNCLAMPED, Runs, ScoresOfPairs, scale, scores
+from smc_mujoco.studies.paper.claims.searches import largest_delays
+from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import CONTROL_PERIOD, LAWS, PLANTS
 
 # columns of the paper's table, and its rows: property -> a mark a column
@@ -88,26 +88,26 @@ def table_one(runs: Runs) -> list[Check | Beside]:
     return [*found, Beside(f"bounded input: {UNCLAMPED}, growth of max |u|", unclamped)]
 
 
-def chattering(nominal: Table) -> dict[str, float]:
+def chattering(nominal: ScoresOfPairs) -> dict[str, float]:
     """Law -> TV rate over classical's, worst plant."""
     return {
         law: max(_over(nominal, p, law, "tv_rate", nominal[p, "classical"]["tv_rate"]) for p in PLANTS) for law in LAWS
     }
 
 
-def roughness(nominal: Table) -> dict[str, float]:
+def roughness(nominal: ScoresOfPairs) -> dict[str, float]:
     """Law -> largest step of u over max |u|, worst plant."""
     return {law: max(_over(nominal, p, law, "max_step", nominal[p, law]["max_u"]) for p in PLANTS) for law in LAWS}
 
 
-def _over(got: Table, plant: str, law: str, metric: str, reference: float) -> float:
+def _over(got: ScoresOfPairs, plant: str, law: str, metric: str, reference: float) -> float:
     found = ratio(got[plant, law][metric], reference)
     return math.inf if math.isnan(found) else found
 
 
 def tolerance(runs: Runs) -> dict[str, float]:
     """Law -> largest delay less classical's, s, worst plant."""
-    borne = largest(runs, PLANTS, LAWS)
+    borne = largest_delays(runs, PLANTS, LAWS)
     return {law: min(borne[p, law] - borne[p, "classical"] for p in PLANTS) for law in LAWS}
 
 

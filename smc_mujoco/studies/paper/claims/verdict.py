@@ -1,4 +1,4 @@
-"""From checks to verdicts: under one set of gains, and over several.
+"""From checks to verdicts: a measured number against its limit, a claim under one set of gains, and over several.
 
 A claim consists of one sentence or of several. A sentence holds where all its checks hold; an existential one ("may",
 "there is") where one does. Under one set of gains a claim is supported where all its sentences hold, refuted where none
@@ -10,16 +10,78 @@ An existential one is supported by an example under one set.
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from smc_mujoco.common import files
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.studies.paper.claims.checks import Beside, Check
+from smc_mujoco.common.errors import ScenarioError, find
 
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
+MARKS = {SUPPORTED: "●", PARTLY: "◐", REFUTED: "○", NOT_TESTABLE: "–"}
 
 UNIVERSAL, NAMED, EXISTENTIAL = QUANTIFIERS = ("universal", "of what it names", "existential")
+
+RELATIONS: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+class Check(NamedTuple):
+    """A measured number against its limit: `value relation limit`. `sentence`: which of the claim's it is about."""
+
+    what: str
+    value: float
+    relation: str
+    limit: float
+    holds: bool
+    sentence: str = ""
+
+    @property
+    def slack(self) -> float:
+        """By how much it holds, as a share of the limit, or of 1 where that is 0; negative where it is missed."""
+        room = self.limit - self.value if self.relation in ("<", "<=") else self.value - self.limit
+        if math.isnan(room):
+            return -math.inf
+        return room / (abs(self.limit) or 1.0) if math.isfinite(self.limit) else room
+
+
+class Beside(NamedTuple):
+    """A number that decides nothing: what theory says, or how a law does that the paper does not have."""
+
+    what: str
+    value: float
+
+
+def check(what: str, value: float, relation: str, limit: float, sentence: str = "") -> Check:
+    """Return the check of a value against its limit.
+
+    NaN never holds. Nor does infinity against infinity: of two laws that never settle, neither is faster.
+
+    Raises:
+      ScenarioError: a relation other than <, <=, > and >=.
+    """
+    compare = find("relation", relation, RELATIONS)
+    value, limit = float(value), float(limit)
+    undecided = math.isinf(value) and value == limit
+    return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence)
+
+
+def about(sentence: str, *checks: Check) -> list[Check]:
+    """Return the checks as checks of one of the claim's sentences."""
+    return [one._replace(sentence=sentence) for one in checks]
+
+
+def ratio(value: float, reference: float) -> float:
+    """Return value / reference; x / 0 is infinite, 0 / 0 and inf / inf are NaN."""
+    if reference == 0.0:
+        return math.nan if value == 0.0 else math.copysign(math.inf, value)
+    return value / reference
+
 
 Numbers = dict[str, dict[str, dict[str, Any]]]  # set of gains -> what -> value, relation, limit, holds
 Found = Sequence[Check | Beside]
@@ -54,20 +116,20 @@ class Claim:
     quantifier: str = NAMED
 
     def checks(self, gains: str) -> list[Check]:
-        """The checks under a set of gains."""
+        """Return the checks under a set of gains."""
         return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
 
     def decisive(self, gains: str) -> Check | None:
-        """The check missed by most, or the one with the least room, under a set of gains; None without checks."""
+        """Return the check missed by most, else that with the least room, under a set of gains; None without checks."""
         return min(self.checks(gains), key=lambda one: (one.holds, one.slack), default=None)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON without loss: numbers that JSON lacks become "Infinity", "-Infinity" and "NaN"."""
+        """Return the claim as JSON data; numbers that JSON lacks become "Infinity", "-Infinity" and "NaN"."""
         return files.plain(dataclasses.asdict(self))
 
 
 def verdict(found: Found, quantifier: str = NAMED) -> str:
-    """The verdict under one set of gains."""
+    """Return the verdict under one set of gains."""
     sentences: dict[str, list[bool]] = {}
     for one in found:
         if isinstance(one, Check):
@@ -80,7 +142,7 @@ def verdict(found: Found, quantifier: str = NAMED) -> str:
 
 
 def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str, bool, str]:
-    """The verdict over all sets of gains, whether it flips between them, and the sentence that says so."""
+    """Return the verdict over all sets of gains, whether it flips between them, and a sentence about that."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
@@ -92,7 +154,7 @@ def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str,
 
 
 def numbers(found: Found) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
-    """Checks and what stands beside them, by what they measure.
+    """Return checks and the numbers beside them, by what they measure.
 
     Raises:
       ScenarioError: two of one name.

@@ -1,13 +1,23 @@
-"""How a study's runs are computed: in batches, on threads of this process, or by the workers of an Executor.
+"""How a study's runs are computed: in batches, on threads of this process or by the workers of an Executor.
 
-    local(batches(scenarios, threads), threads, finish)
-    remote(batches(scenarios, 1), ProcessPoolExecutor(8), finish)
+    compute_here(batches(scenarios, threads), threads, finish)
+    compute_elsewhere(batches(scenarios, 1), ProcessPoolExecutor(8), finish)
 
-A batch is a list of scenarios of one layout, which is run, scored and kept as a whole: what a kill loses at most. An
-outcome is the part of a table's row that only the run can tell: its scores and how it failed. It does not depend on the
-batch in which the run was, nor on where that was computed.
+A batch is a list of scenarios of one layout. It is run, scored and stored as a whole, so a kill loses at most one.
+An outcome is the part of a table's row that only the run can tell: its scores and how it failed. It depends neither on
+the batch nor on the place where the run was computed.
+
+A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the same versions, and
+
+    dask scheduler                                         # prints its address
+    dask worker tcp://HOST:PORT                            # on every machine
+    smc-mujoco bench --executor dask://HOST:PORT
+
+A batch whose worker dies is run by another one. Four deaths over one batch end the study, which can be started again.
 """
 
+import contextlib
+import logging
 import pickle
 import platform
 import sys
@@ -24,6 +34,7 @@ from concurrent.futures import (
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.extras import extra
 from smc_mujoco.metrics.catalogue import score
 from smc_mujoco.simulation.batch import Report
 from smc_mujoco.simulation.prepare import prepare
@@ -32,11 +43,12 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
 
-# Of a batch: `Scenario.work` a thread, 2 to 5 s of a core; in all, for what logs and scores take; runs.
+# Size of a batch: `Scenario.work` per thread, 2 to 5 s of a core; in all, for the memory of logs and scores; runs.
 STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
-PLAIN = 40  # times slower than compiled laws is the plain loop, roughly
+LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
 UNDER_WAY = 1000  # batches sent and not finished, that workers may share; chosen
 ADDRESS = "dask://"
+WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 Outcome = dict[str, Any]
 Batch = Sequence[Scenario]
@@ -44,7 +56,7 @@ Finish = Callable[[Batch, Sequence[Trace]], None]
 
 
 def outcome(trace: Trace) -> Outcome:
-    """The scores of a run, or how it failed."""
+    """Return the scores of a run, or how it failed."""
     failed: Outcome = {"diverged_at": trace.diverged_at, "failure": trace.failure}
     if trace.failure is not None:
         return failed
@@ -55,7 +67,7 @@ def outcome(trace: Trace) -> Outcome:
 
 
 def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Scenario]]:
-    """The scenarios, sorted into batches of one layout, each several seconds of work."""
+    """Sort scenarios into batches of one layout, each several seconds of work."""
     groups: dict[Hashable, list[Scenario]] = {}
     slow: dict[Hashable, bool] = {}
     for s in scenarios:
@@ -65,18 +77,20 @@ def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Scenar
         slow[key] = bool(prepared.why_not)
     most = min(STEPS * threads, LOG_STEPS)
     for key, group in groups.items():
-        each = max(1, group[0].work) * (PLAIN * threads if slow[key] else 1)
+        each = max(1, group[0].work) * (LOOP_SLOWDOWN * threads if slow[key] else 1)
         size = max(1, min(RUNS, most // each))
         yield from (group[i : i + size] for i in range(0, len(group), size))
 
 
 def simulated(batch: Batch, threads: int | None, report: Report = lambda steps: None) -> list[Trace]:
-    """The traces of a batch, in its order."""
+    """Return the traces of a batch, in its order."""
     traces = dict(stream(batch, threads, report))
     return [traces[i] for i in range(len(batch))]
 
 
-def local(batches: Iterable[Batch], threads: int | None, finish: Finish, report: Report = lambda steps: None) -> None:
+def compute_here(
+    batches: Iterable[Batch], threads: int | None, finish: Finish, report: Report = lambda steps: None
+) -> None:
     """Run batches one after the other; a thread scores and writes each while the next one runs.
 
     Args:
@@ -94,7 +108,9 @@ def local(batches: Iterable[Batch], threads: int | None, finish: Finish, report:
             last.result()
 
 
-def remote(batches: Iterable[Batch], pool: Executor, finish: Callable[[Batch, Sequence[Outcome]], None]) -> None:
+def compute_elsewhere(
+    batches: Iterable[Batch], pool: Executor, finish: Callable[[Batch, Sequence[Outcome]], None]
+) -> None:
     """Have the workers of an Executor run batches. They send back outcomes, not traces.
 
     Args:
@@ -110,7 +126,7 @@ def remote(batches: Iterable[Batch], pool: Executor, finish: Callable[[Batch, Se
         """Finish batches until at most `most` are under way."""
         while len(sent) > most:
             done = wait(sent, return_when=FIRST_COMPLETED).done
-            for future in sorted(done, key=_failed):  # before one raises, the others are kept
+            for future in sorted(done, key=_failed):  # before one raises, the others are stored
                 finish(sent.pop(future), future.result())
 
     try:
@@ -137,7 +153,7 @@ def _failed(future: Future) -> bool:
 
 
 def _packed(batch: Batch) -> bytes:
-    """The batch as bytes: a worker that could not read a message itself would die of it."""
+    """Return the batch as bytes: a worker that could not read a message itself would die of it."""
     try:
         return pickle.dumps(batch)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -147,11 +163,11 @@ def _packed(batch: Batch) -> bytes:
 
 
 def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
-    """What a worker does: run and score a batch.
+    """Run and score a batch, on a worker.
 
     Args:
       packed: the batch, pickled.
-      keys: of its scenarios, where they were sent from; see `identity.key`.
+      keys: keys of its scenarios in the process that sent them; see `run_key.key`.
 
     Raises:
       ScenarioError: the worker cannot load the batch, or other code or versions give its scenarios other keys here.
@@ -169,7 +185,7 @@ def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
 
 
 def _threads() -> int:
-    """As many as a dask worker was given; else one, for an Executor has a worker a core."""
+    """Return the threads of a dask worker; else one, for other executors have a worker per core."""
     if (distributed := sys.modules.get("distributed")) is None:
         return 1
     try:
@@ -178,15 +194,70 @@ def _threads() -> int:
         return 1
 
 
-def checked(given: object) -> str | Executor:
-    """The executor, or its name, if it is one; else the sentence that says what they are called."""
-    if isinstance(given, Executor):
-        return given
-    if isinstance(given, str):
-        host, _, port = given.removeprefix(ADDRESS).rpartition(":")
-        remote = given.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
-        if remote or given == "local":
-            return given
+def checked(executor: object) -> str | Executor:
+    """Return "local", an address or an Executor as it is; refuse anything else."""
+    if isinstance(executor, Executor):
+        return executor
+    if isinstance(executor, str):
+        host, _, port = executor.removeprefix(ADDRESS).rpartition(":")
+        remote = executor.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
+        if remote or executor == "local":
+            return executor
     raise ScenarioError(
-        f"executor is {shown(given)}: give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"
+        f"executor is {shown(executor)}: give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"
     )
+
+
+@contextlib.contextmanager
+def dask_executor(address: str) -> Iterator[Executor]:
+    """Open an Executor of a dask scheduler's workers.
+
+    Args:
+      address: dask://HOST:PORT.
+
+    Raises:
+      ScenarioError: no package for it, no scheduler there, no workers, or workers that die of what they run.
+    """
+    with extra("cluster", f"executor {address!r}"):
+        from distributed import Client
+        from distributed.scheduler import KilledWorker
+    log = logging.getLogger("distributed.client")  # an error is one sentence here, not also a traceback
+    before = log.level
+    try:
+        log.setLevel(logging.CRITICAL)
+        with Client(f"tcp://{address.removeprefix(ADDRESS)}", timeout=WAIT, set_as_default=False) as client:
+            with contextlib.suppress(TimeoutError):
+                client.wait_for_workers(1, timeout=WAIT)
+            if not client.ncores():
+                raise ScenarioError(f"dask at {address} has no workers: start `dask worker` with its address")
+            yield _DaskExecutor(client)
+    except KilledWorker as error:
+        raise ScenarioError(f"{error}: read the workers' logs, and start the study again to go on") from None
+    except OSError as error:  # a timeout is one
+        raise ScenarioError(f"no dask at {address} ({error}): start `dask scheduler` and `dask worker` there") from None
+    finally:
+        log.setLevel(before)
+
+
+class _DaskExecutor(Executor):
+    """A dask client's workers. `Client.get_executor()` waits for ever for a result if the scheduler dies meanwhile."""
+
+    def __init__(self, client: Any):
+        self.client = client
+
+    def submit(self, fn: Callable, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Have one of the workers call fn(*args, **kwargs)."""
+        found: Future[Any] = Future()
+
+        def told(done: Any) -> None:
+            if not found.set_running_or_notify_cancel():  # nobody waits for it any more
+                return
+            try:
+                found.set_result(done.result())
+            except CancelledError:
+                found.set_exception(BrokenExecutor("dask is no longer there"))
+            except BaseException as error:  # whatever it is, somebody waits for it
+                found.set_exception(error)
+
+        self.client.submit(fn, *args, pure=False, **kwargs).add_done_callback(told)
+        return found

@@ -1,4 +1,4 @@
-"""Which traces of a study are saved, and where."""
+"""The traces of a study that are saved as files."""
 
 import os
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ import numpy as np
 
 from smc_mujoco.common.progress import counter
 from smc_mujoco.simulation.run import stream
-from smc_mujoco.studies.executor import batches
+from smc_mujoco.studies.executors import batches
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.table import Table
 
@@ -17,19 +17,21 @@ CHOICES = ("none", "worst", "all")
 
 
 def folder(out: str | os.PathLike) -> Path:
-    """Where a study keeps traces."""
+    """Return the folder of a study's traces."""
     return Path(out) / "traces"
 
 
 def path(folder: Path, row: Mapping[str, Any]) -> Path:
-    """The file of a row's trace."""
+    """Return the file of a row's trace."""
     names = "-".join(slug(row[column]) for column in ("plant", "condition", "law"))
     return folder / f"{names}-{row['seed']}-{row['hash'][:8]}.npz"
 
 
 def worst(table: Table) -> list[int]:
-    """For every plant and condition the first row that failed, else of those that never settle, else of all, the one
-    with the largest ultimate bound, or where channels of two units have none, with the largest overshoot.
+    """Return the row of the worst run for every plant and condition.
+
+    Runs that failed come first, then those that never settle, then all others. Among equals it is the one with the
+    largest ultimate bound; where channels of two units have none, with the largest overshoot.
     """
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
@@ -43,7 +45,7 @@ def worst(table: Table) -> list[int]:
 
 
 def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
-    """Save the chosen traces that are not there, by running them again.
+    """Save the chosen traces that have no file yet, by running them again.
 
     Raises:
       ScenarioError: the folder cannot be written.

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import lawbook, main
+from smc_mujoco.cli import law_pages, main
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import estimators
 from smc_mujoco.control.law import catalogue, law_function, laws
 from smc_mujoco.control.surface import surfaces
 
 ROOT = Path(smc.__file__).parents[1]
-EVERY = [(name, t) for name, templates in lawbook.catalogue().items() for t in templates]
+EVERY = [(name, t) for name, templates in law_pages.catalogue().items() for t in templates]
 ONE_BY_ONE = pytest.mark.parametrize(("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind)
 
 
@@ -75,7 +75,7 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
     text = flat(out)
-    said = lawbook.entry(template)
+    said = law_pages.entry(template)
     for part in (said.formula, said.title, said.source, said.known, said.discretisation, *template.conditions):
         assert flat(part) in text
     for gain, value in template.defaults.items():
@@ -85,7 +85,7 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
 
 @ONE_BY_ONE
 def test_a_page_loses_no_word_of_the_docstring(name, template: Template):
-    said = lawbook.entry(template)
+    said = law_pages.entry(template)
     words = re.findall(r"\w+", " ".join(said))
     for word in re.findall(r"\w+", template.doc):
         assert word in words or word in ("Source", "Sources"), word
@@ -94,7 +94,7 @@ def test_a_page_loses_no_word_of_the_docstring(name, template: Template):
 @ONE_BY_ONE
 def test_a_formula_is_an_equation(name, template: Template):
     """The first sentence of the docstring is `Name: formula`; of the velocity sensor there is no formula."""
-    said = lawbook.entry(template)
+    said = law_pages.entry(template)
     if name != "measured":
         assert "=" in said.formula or said.formula.startswith("derivatives"), said.formula
         assert said.title
@@ -156,7 +156,7 @@ def test_help_teaches(call):
     ],
 )
 def test_a_source_in_short_is_its_first_authors_and_their_year(source, short):
-    assert lawbook.brief(source) == short
+    assert law_pages.brief(source) == short
 
 
 def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
@@ -169,7 +169,7 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
         """
         return -gains.k * y.e, y.e
 
-    said = lawbook.entry(own)
+    said = law_pages.entry(own)
     assert said == (
         "Own law",
         "u = -k e",
@@ -177,7 +177,7 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
         "It is odd.",
         'A. Author, "Title", J. Things 1(2):3, 1999.',
     )
-    assert lawbook.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
+    assert law_pages.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
 
 
 # adding a law touches one file
@@ -241,16 +241,15 @@ for words in (["list"], ["laws"], ["laws", "brand_new"]):
 
 
 def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
-    tests = ROOT / "tests"
-    own = tests / "cli" / "test_lawbook.py", tests / "simulation" / "test_references.py"
-    files = [str(path) for path in (*sorted((tests / "control").glob("test_laws*.py")), *own)]
+    files = [*map(str, (ROOT / "tests" / "control").glob("test_laws*.py"))]
+    files += [str(ROOT / "tests" / name) for name in ("cli/test_law_pages.py", "simulation/test_references.py")]
     out = python(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
                  "-k", "brand_new", *files)  # fmt: skip
     cases = [line for line in out.splitlines() if "::" in line]
     assert len(cases) >= 10
-    found = {case.partition("::")[0].rpartition("/")[2] for case in cases}
-    assert {"test_lawbook.py", "test_references.py"} < found
-    assert any(name.startswith("test_laws") for name in found)
+    found = {case.partition("::")[0].removeprefix("tests/") for case in cases}
+    assert {"cli/test_law_pages.py", "simulation/test_references.py"} < found
+    assert any(name.startswith("control/test_laws") for name in found)
 
 
 def test_the_catalogue_of_this_process_is_left_alone():

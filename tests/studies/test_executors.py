@@ -17,7 +17,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies import cluster, executor, run_key
+from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.study import study
 
@@ -43,9 +43,9 @@ def slow(y, gains, memory):
 
 @pytest.mark.parametrize("steps", [1, 200, 10**9])
 def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, steps):
-    monkeypatch.setattr(executor, "STEPS", steps)
+    monkeypatch.setattr(executors, "STEPS", steps)
     scenarios = mixed()
-    found = list(executor.batches(scenarios, threads=2))
+    found = list(executors.batches(scenarios, threads=2))
     assert sorted(map(id, scenarios)) == sorted(id(s) for batch in found for s in batch)
     for batch in found:
         assert len({(s.plant.name, s.integrator, s.physics_step) for s in batch}) == 1
@@ -54,25 +54,25 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
 
 def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():
     scenarios = [paper.scenario("duffing", "classical", seed=seed) for seed in range(400)]
-    assert max(len(batch) for batch in executor.batches(scenarios, threads=512)) <= executor.LOG_STEPS / 10_000
+    assert max(len(batch) for batch in executors.batches(scenarios, threads=512)) <= executors.LOG_STEPS / 10_000
 
 
 def test_what_does_not_compile_goes_in_small_batches():
     scenarios = [smc.Scenario(plant="duffing", law=slow(), seed=seed) for seed in range(4)]
-    assert [len(batch) for batch in executor.batches(scenarios, threads=2)] == [1, 1, 1, 1]
+    assert [len(batch) for batch in executors.batches(scenarios, threads=2)] == [1, 1, 1, 1]
 
 
 def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
     batch = [smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05) for w in (1.0, 0.01, 0.02)]
-    together = [executor.outcome(trace) for trace in executor.simulated(batch, 2)]
-    assert together == [executor.outcome(trace) for s in batch for trace in executor.simulated([s], 1)]
+    together = [executors.outcome(trace) for trace in executors.simulated(batch, 2)]
+    assert together == [executors.outcome(trace) for s in batch for trace in executors.simulated([s], 1)]
     assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
 
 
 def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_heard():
-    batches = list(executor.batches(mixed(), threads=1))
+    batches = list(executors.batches(mixed(), threads=1))
     finished = []
-    executor.local(batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces])))
+    executors.compute_here(batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces])))
     assert [batch for batch, _ in finished] == [done for _, done in finished] == batches
 
     for doomed in (batches[0], batches[-1]):
@@ -82,7 +82,7 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
                 raise smc.ScenarioError("no room")
 
         with pytest.raises(smc.ScenarioError, match="no room"):
-            executor.local(batches, 1, full)
+            executors.compute_here(batches, 1, full)
 
 
 # addresses
@@ -93,7 +93,7 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
 )
 def test_an_executor_that_there_is_not_is_one_sentence(name):
     with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"):
-        executor.checked(name)
+        executors.checked(name)
 
 
 def test_without_the_package_the_sentence_says_what_to_install(tmp_path, monkeypatch):
@@ -136,7 +136,7 @@ def refused() -> Future:
 
 
 def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
-    monkeypatch.setattr(executor, "STEPS", 200)
+    monkeypatch.setattr(executors, "STEPS", 200)
     with Elsewhere(2) as pool:
         study(mixed(), tmp_path / "elsewhere", executor=pool)
         assert pool.submit(abs, -1).result() == 1  # it stays open
@@ -147,7 +147,7 @@ def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
 
 
 def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
-    monkeypatch.setattr(executor, "UNDER_WAY", 2)
+    monkeypatch.setattr(executors, "UNDER_WAY", 2)
     finished = []
     with Elsewhere(1) as pool:
 
@@ -156,14 +156,14 @@ def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
                 assert pool.tasks - len(finished) <= 2
                 yield [scenario]
 
-        executor.remote(batches(), pool, lambda batch, outcomes: finished.append(batch[0]))
+        executors.compute_elsewhere(batches(), pool, lambda batch, outcomes: finished.append(batch[0]))
     assert sorted(map(repr, finished)) == sorted(map(repr, mixed()))
 
 
 @pytest.mark.parametrize("end", [died, cancelled, refused])
 def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(end, tmp_path, monkeypatch):
-    monkeypatch.setattr(executor, "STEPS", 200)
-    monkeypatch.setattr(executor, "UNDER_WAY", 1)
+    monkeypatch.setattr(executors, "STEPS", 200)
+    monkeypatch.setattr(executors, "UNDER_WAY", 1)
     with Elsewhere(1) as pool:
         pool.last, pool.end = 4, end
         with pytest.raises(
@@ -181,7 +181,7 @@ def test_what_ended_well_is_kept_before_an_error_is_told(monkeypatch):
     pool = Elsewhere(1)
     pool.last, pool.end = 1, iter(ends).__next__
     with pool, pytest.raises(smc.ScenarioError, match="a worker was killed"):
-        executor.remote(batches, pool, lambda batch, outcomes: kept.append(batch))
+        executors.compute_elsewhere(batches, pool, lambda batch, outcomes: kept.append(batch))
     assert len(kept) == 5
 
 
@@ -201,13 +201,13 @@ def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, mo
     packed = pickle.dumps(batch)
     monkeypatch.setattr(*change)
     with pytest.raises(smc.ScenarioError, match=said):
-        executor.work(packed, keys)
+        executors.work(packed, keys)
 
 
 def test_a_law_without_a_module_cannot_be_sent():
     law = smc.law_function(lambda y, gains, memory: (0.0, y.e))()
     with Elsewhere(1) as pool, pytest.raises(smc.ScenarioError, match="define it at the top of a module"):
-        executor.remote([[smc.Scenario(plant="duffing", law=law)]], pool, lambda *found: None)
+        executors.compute_elsewhere([[smc.Scenario(plant="duffing", law=law)]], pool, lambda *found: None)
 
 
 # a cluster
@@ -216,11 +216,11 @@ CLIENT = """
 import sys
 from pathlib import Path
 import smc_mujoco as smc
-from smc_mujoco.studies import cluster, executor
+from smc_mujoco.studies import executors
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import study
 
-out, address, executor.STEPS, cluster.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
+out, address, executors.STEPS, executors.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
 scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)
 try:
     study(scenarios, out / "remote", executor=address)
@@ -322,7 +322,7 @@ def test_a_result_that_comes_after_its_study_has_ended_is_dropped():
             return 1
 
     client = Late()
-    found = cluster._Workers(client).submit(abs, -1)
+    found = executors._DaskExecutor(client).submit(abs, -1)
     assert found.cancel()
     client.told(client)
     assert found.cancelled()

@@ -1,7 +1,5 @@
-"""What the commands do: a scene from its declaration to files, a trace in the terminal, the catalogues."""
+"""Performing a scene: from its declaration to printed scores, traces, figures and a film."""
 
-import itertools
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -12,15 +10,9 @@ from smc_mujoco.cli import tables
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.progress import bar
-from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import scene
-from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.scene import Scene, slug
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
@@ -66,7 +58,7 @@ def perform(
 
 
 def tell(scene: Scene, traces: Traces, console: Console) -> None:
-    """What answers the scene's question: its metrics, run by run, and its facts."""
+    """Print what answers the scene's question: its metrics, run by run, and its facts."""
     for table in tables.answers(scene.answers, traces) if scene.answers else ():
         console.print(table, "")
     for label, sentence in scene.facts.items():
@@ -87,13 +79,13 @@ def _title(scene: Scene, condition: str) -> str:
 
 
 def compile_laws(scene: Scene) -> None:
-    """Compile what the scene's runs name, ahead of running them; what does not compile runs in the plain loop."""
+    """Compile the laws of the scene's runs in advance; those that do not compile run in the reference loop."""
     for _, _, scenario in scene.runs():
         prepare(scenario)
 
 
 def simulate(scene: Scene, threads: int | None) -> Traces:
-    """Every run of the scene, in one call, with a progress bar."""
+    """Run all scenarios of the scene, in one call, with a progress bar."""
     runs = list(scene.runs())
     traces = run([scenario for _, _, scenario in runs], threads, progress=True)
     found: dict[str, dict[str, Trace]] = {}
@@ -103,7 +95,7 @@ def simulate(scene: Scene, threads: int | None) -> Traces:
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
-    """One .npz a run, and one file for each format of Trace.export."""
+    """Save each run as .npz, and in each format of Trace.export; return the files."""
     written: list[Path] = []
     for condition, runs in traces.items():
         for label, trace in runs.items():
@@ -114,7 +106,7 @@ def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
 
 
 def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
-    """The scene's figures, SVG and PNG."""
+    """Draw the scene's figures, SVG and PNG; return the files."""
     from smc_mujoco.draw.figure import figure, signals
 
     if scene.figure == "signals":
@@ -128,14 +120,14 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
 
 
 def _labels(runs: Mapping[str, Trace]) -> list[str]:
-    """The labels of a condition as pictures have them: a law's own name, as `paper.comparison` gives, in words."""
+    """Return the labels of a condition for pictures; a label that is the law's own name is put in words."""
     from smc_mujoco.draw.style import law_name
 
     return [law_name(label) if label == trace.scenario.law.name else label for label, trace in runs.items()]
 
 
 def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path]:
-    """The film of the scene's filmed condition; none, and a line that says why, where nothing can render."""
+    """Film the scene's filmed condition; where nothing can render, print why and return no file."""
     from smc_mujoco.draw.film import film as video
 
     if sentence := video.missing() or gl.note():
@@ -147,43 +139,3 @@ def film(scene: Scene, traces: Traces, out: Path, console: Console) -> list[Path
     with bar("film", len(video.clock(shown, video.FPS))) as drawn:
         path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
         return [video.film(shown, path, _labels(runs), title, report=drawn.advance)]
-
-
-def summary(trace: Trace, console: Console) -> None:
-    """What a trace is of, the course of its channels, where a group has many of its first one, and its scores."""
-    s = trace.scenario
-    console.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
-    for group, heading in tables.headings(s.plant).items():
-        if heading:
-            console.print(f"{heading}:", highlight=False, markup=False)
-        channels = list(group.channels if len(group.channels) <= tables.MOST else group.channels[:1])
-        rubs = trace.reaction[:, channels].any()
-        for name, i in itertools.product(("x", "v", *("u", "s") * group.driven, *["reaction"] * bool(rubs)), channels):
-            column = getattr(trace, name)[:, i]
-            label = f"{name}{i}" if s.plant.n > 1 else name  # as columns of an export are called
-            line = f"{label} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}"
-            console.print(line, highlight=False, soft_wrap=True)
-    if trace.failure:
-        console.print(f"failed: {trace.failure}", style="red", highlight=False, markup=False)
-    else:
-        for table in tables.trace_summary(trace):
-            console.print(table)
-
-
-def catalogues(console: Console) -> None:
-    """Everything there is to choose from, with a line about each."""
-
-    def first(doc: str | None) -> str:
-        return (doc or "").strip().partition("\n")[0].rstrip(":")  # before a formula
-
-    known = {
-        "Plants": ((name, first(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()),
-        "Laws": ((name, first(t.doc)) for name, t in laws().items()),
-        "Surfaces": ((name, first(t.doc)) for name, t in surfaces().items()),
-        "Velocity estimators": ((name, first(t.doc)) for name, t in estimators().items()),
-        "Scenes, for smc-mujoco run": ((name, scene.question(path)) for name, path in scene.scenes().items()),
-    }
-    for title, rows in known.items():
-        console.print(tables.catalogue(title, rows), "")
-    names = ", ".join(scenarios.CONDITIONS)
-    console.print(tables.catalogue("Conditions, for smc.paper.comparison(plant, condition)", [("", names)]))

@@ -1,4 +1,4 @@
-"""What several commands are asked for in the same words: plants, conditions, starts."""
+"""Options and arguments that several commands share, and what their texts stand for."""
 
 import ast
 import os
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.conditions import Condition
     from smc_mujoco.simulation.initial_states import Starts
 
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")]
+LawName = Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")]
+Gains = Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 Conditions = Annotated[
     list[str] | None,
     typer.Option(
@@ -38,24 +42,17 @@ Middle = Annotated[
 Spread = Annotated[
     float | None, typer.Option("--spread", help="By how much of x0 seeds move the start to either side; default 0.2.")
 ]
-
-
 SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma that is in no brackets
 OWN_GAINS = "With gains of its own: pid(kp=50, ki=1), or the .json file that tune wrote."
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
-    """The names in a,b; the default if none is given."""
+    """Return the names in a,b, or the default if no text is given."""
     return default if text is None else [name.strip() for name in SEPARATOR.split(text) if name.strip()]
 
 
-def laws(texts: Sequence[str]) -> "list[str | Law]":
-    """Laws by name, or with gains of their own; see `law`."""
-    return [law(text) for text in texts]
-
-
 def law(text: str) -> "str | Law":
-    """One law: by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
+    """Return a law by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
 
     The text is parsed and never evaluated.
 
@@ -82,21 +79,16 @@ def law(text: str) -> "str | Law":
 
 
 def origin(chosen: "Sequence[str | Law]", gains: str) -> str:
-    """Where the gains of laws are from, in words: the set, unless every law has gains of its own."""
+    """Return where the gains of laws are from, in words: the set, unless every law has gains of its own."""
     return f"gains {gains!r}" if any(isinstance(one, str) for one in chosen) else "gains as given"
 
 
-def plants(texts: Sequence[str]) -> "list[str | Plant]":
-    """Plants by name, or as FILE.xml:joint+joint, an MJCF model of which these joints are controlled.
+def plant(text: str) -> "str | Plant":
+    """Return a plant by its name, or from FILE.xml:joint+joint, an MJCF model with the joints to control.
 
     Raises:
       ScenarioError: a model without joints, or one that cannot be a plant.
     """
-    return [plant(text) for text in texts]
-
-
-def plant(text: str) -> "str | Plant":
-    """One plant; see `plants`."""
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
@@ -109,7 +101,7 @@ def plant(text: str) -> "str | Plant":
 
 
 def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Condition]":
-    """Conditions by name, then those of the option --condition.
+    """Return conditions by name, then those of the option --condition.
 
     Raises:
       ScenarioError: an unknown name, or a text or file that cannot be read.
@@ -123,7 +115,7 @@ def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Conditi
 
 
 def starts(x0: float | None, spread: float | None) -> "Starts | None":
-    """Where runs begin; None: where they do by default."""
+    """Return where runs begin; None where neither is given."""
     from smc_mujoco.simulation.initial_states import SPREAD
     from smc_mujoco.simulation.initial_states import starts as made
 

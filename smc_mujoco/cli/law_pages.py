@@ -1,6 +1,6 @@
-"""The catalogue of laws, surfaces and velocity estimators in the terminal: a line of each, or one in full.
+"""Laws, surfaces and velocity estimators in the terminal: a line for each, or a page about one.
 
-All of it is read off the templates and their docstrings, which are written alike: `Name: formula` first, then what is
+Everything is read from the templates and their docstrings. These have one form: `Name: formula` first, then what is
 known, then `Source:`.
 """
 
@@ -8,12 +8,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from rich import box
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -24,7 +24,6 @@ SOURCE = re.compile(r"(?<![\w.])Sources?: ")
 SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
 DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled)", re.I)
 INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
-LEAN = {"show_edge": False, "padding": (0, 2, 0, 0), "pad_edge": False}
 HEADINGS = {"Laws": laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 WAYS = {
     "law": "smc.law({call})",
@@ -44,7 +43,7 @@ class Entry(NamedTuple):
 
 
 def catalogue() -> dict[str, list[Template]]:
-    """Name -> the law, the surface and the velocity estimator of that name."""
+    """Return name -> the law, the surface and the velocity estimator of that name."""
     found: dict[str, list[Template]] = {}
     for known in (laws(), surfaces(), estimators()):
         for name, template in known.items():
@@ -53,7 +52,7 @@ def catalogue() -> dict[str, list[Template]]:
 
 
 def entry(template: Template) -> Entry:
-    """What the docstring of a template says."""
+    """Return the parts of a template's docstring."""
     said, *source = SOURCE.split(template.doc, maxsplit=1)
     first, *paragraphs = (" ".join(p.split()) for p in said.strip().split("\n\n"))
     head, *more = SENTENCE.split(first, maxsplit=1)
@@ -72,7 +71,7 @@ def entry(template: Template) -> Entry:
 
 
 def brief(source: str) -> str:
-    """A source in short: its first author, or two, and its year."""
+    """Return a source in short: its first author, or two, and its year."""
     first = INITIALS.sub("", source).partition(";")[0]
     authors, *others = re.split(r", | \(", first.partition('"')[0])
     if authors.startswith("the law of "):  # and what follows is of others
@@ -83,30 +82,24 @@ def brief(source: str) -> str:
     return " ".join([authors.removeprefix("after ").strip(), *years[-1:]])
 
 
-def show(name: str | None, console: Console) -> None:
-    """One of the catalogue in full, or without a name a line of each.
+def print_pages(name: str | None, console: Console) -> None:
+    """Print a page about one law, surface or estimator; without a name a line about each.
 
     Raises:
-      ScenarioError: there is none of that name.
+      ScenarioError: nothing has that name.
     """
-    if name is None:
-        overview(console)
-    else:
+    if name is not None:
         for template in find("law, surface or velocity estimator", name, catalogue()):
             page(template, console)
-
-
-def overview(console: Console) -> None:
-    """A table of every law, then of the surfaces and the estimators."""
+        return
     for heading, known in HEADINGS.items():
-        console.print(_table(heading, known()), "")
+        console.print(_overview(heading, known()), "")
     console.print("One in full: [cyan]smc-mujoco laws NAME[/]", highlight=False)
 
 
-def _table(heading: str, templates: Mapping[str, Template]) -> Table:
+def _overview(heading: str, templates: Mapping[str, Template]) -> Table:
     graded = any(t.kind == "law" for t in templates.values())
-    title = f"{heading} ({len(templates)})"
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, **LEAN)
+    table = titled(f"{heading} ({len(templates)})", show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
     table.add_column("name", no_wrap=True, style="cyan")
     if graded:
         table.add_column("deg", justify="right", style="dim")
@@ -120,7 +113,7 @@ def _table(heading: str, templates: Mapping[str, Template]) -> Table:
 
 
 def page(template: Template, console: Console) -> None:
-    """All there is to know of one law, surface or estimator."""
+    """Print everything about one law, surface or estimator."""
     said = entry(template)
     console.print(Text.assemble((template.name, "bold cyan"), f"  {said.title}", (f"  {template.kind}", "dim")))
     console.print(Padding(Text(said.formula, style="bold"), (0, 0, 1, 2)))
@@ -133,7 +126,7 @@ def page(template: Template, console: Console) -> None:
     rows += [("discretisation", said.discretisation), ("known", said.known), ("source", said.source)]
     gains = [f"{key}={value:g}" for key, value in list(template.defaults.items())[:2]]
     rows.append(("use", WAYS[template.kind].format(call=", ".join([f'"{template.name}"', *gains]))))
-    table = Table(box=None, show_header=False, padding=(0, 2, 1, 0), pad_edge=False)
+    table = plain(padding=(0, 2, 1, 0))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
     for label, value in rows:
@@ -144,7 +137,7 @@ def page(template: Template, console: Console) -> None:
 
 
 def _gains(template: Template) -> Iterable[str]:
-    """A line per gain: its default and its range."""
+    """Yield a line for each gain: its default and its range."""
     width = max((len(name) for name in template.defaults), default=0)
     for name, value in template.defaults.items():
         least = "  > 0" if name in template.positive else "  >= 0" if name in template.nonnegative else ""
@@ -154,7 +147,7 @@ def _gains(template: Template) -> Iterable[str]:
 
 
 def _degree(template: Template) -> str:
-    """The relative degree in words: what a law asks of its sliding variable, or what a surface gives."""
+    """Return the relative degree in words: what a law acts on, or what a surface gives."""
     what = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}.get(template.relative_degree, "")
     if template.kind == "surface":
         return f"{template.relative_degree}: for the laws of that degree"
