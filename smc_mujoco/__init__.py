@@ -10,6 +10,7 @@
 that importing the package costs nothing.
 """
 
+import functools
 import importlib
 import re
 from pathlib import Path
@@ -36,14 +37,18 @@ def __getattr__(name: str) -> object:
         return _spec()
     if name not in _HOMES and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = _load(name)
+    return value
+
+
+@functools.cache
+def _load(name: str) -> object:
+    """Return a public function, class or module from its home."""
     with held_back():
         if name in _MODULES:
-            value = importlib.import_module(_MODULES[name])
-        else:
-            value = getattr(importlib.import_module(_HOMES[name]), name)
-            value = importlib.import_module("smc_mujoco.common.arguments").explained(value)
-    globals()[name] = value
-    return value
+            return importlib.import_module(_MODULES[name])
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+        return importlib.import_module("smc_mujoco.common.arguments").explained(value)
 
 
 def __dir__() -> list[str]:

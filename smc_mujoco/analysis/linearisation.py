@@ -83,19 +83,10 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
     return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0)
 
 
-# law -> of its gains g and the error x at rest: lam and k1 of its linear part, and its force towards 0
-LOCAL: dict[str, tuple[Callable, Callable]] = {
-    "observer_free": (lambda g: (g["lam"], g["k1"]), lambda g, x: g["lam"] * np.tanh(g["k1"] * x)),
-    "boundary_layer": (
-        lambda g: (g["k"] / g["phi"], g["c"]),
-        lambda g, x: g["k"] * np.clip(g["c"] * x / g["phi"], -1.0, 1.0),
-    ),
-}
-
-
 def local(law: Law) -> tuple[float, float] | None:
-    """lam and k1 of u = -lam (e' + k1 e), which the law is near s = 0; None for one that has no such part."""
-    return LOCAL[law.name][0](law.gains) if law.name in LOCAL else None
+    """Return lam and k1 of u = -lam (e' + k1 e), which the law is near s = 0; None where it is not linear there."""
+    rest = law.template and law.template.rest
+    return rest.linear(SimpleNamespace(**law.gains)) if rest else None
 
 
 def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
@@ -118,7 +109,8 @@ def _moved(k: float, d: float, h: float, inertia: float) -> tuple[np.ndarray, np
 
 def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
     """The force that holds every channel at the same x > 0, N or N m, as a function of x; None for other laws."""
-    if law.name not in LOCAL:
+    rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
+    if not rest:
         return None
     linear(plant)  # or refuses
     p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
@@ -128,7 +120,7 @@ def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.nda
 
     def force(x: np.ndarray) -> np.ndarray:
         own = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
-        return np.minimum(LOCAL[law.name][1](law.gains, x), u_max) - np.array([f / g for f, g in own])
+        return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in own])
 
     return force
 

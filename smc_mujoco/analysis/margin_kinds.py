@@ -32,6 +32,7 @@ class Kind:
     """A thing to be borne.
 
     Attributes:
+      label: its name in tables and figures.
       unit: {x} stands for the unit of x, {u} for that of u.
       levels: those looked at first, from small to large.
       put: a scenario with a level of it.
@@ -40,6 +41,7 @@ class Kind:
       theory: the largest level by linear theory, or None where there is none; it may refuse the plant.
     """
 
+    label: str
     unit: str
     levels: tuple[float, ...]
     put: Callable[[Scenario, float], Scenario]
@@ -113,6 +115,7 @@ def _heavier(base: Scenario, level: float) -> Scenario:
 
 SPECS: dict[str, Kind] = {
     "delay": Kind(
+        label="input delay",
         unit="s",
         levels=DELAYS,
         put=lambda base, level: dataclasses.replace(base, input_delay=level),
@@ -120,24 +123,28 @@ SPECS: dict[str, Kind] = {
         theory=_critical_delay,
     ),
     "disturbance": Kind(
+        label="constant disturbance",
         unit="{u}",
         levels=_doubled(LARGEST),
         put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
         theory=_at_rest,
     ),
     "friction": Kind(
+        label="dry friction",
         unit="{u}",
         levels=_doubled(LARGEST),
         put=_rubbing,
         theory=_at_rest,
     ),
     "mass": Kind(
+        label="mass",
         unit="1",
         levels=tuple(float(factor) for factor in np.geomspace(1.0, HEAVIEST, 10)[1:]),
         put=_heavier,
         none=1.0,
     ),
     "noise": Kind(
+        label="position noise",
         unit="{x}",
         levels=_doubled(NOISIEST),
         put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),

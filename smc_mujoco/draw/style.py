@@ -1,45 +1,29 @@
 """How laws, units and pages look, in figures and films alike.
 
-Colours are those of Okabe and Ito (Color Universal Design, 2008), told apart by colour-blind readers; a law keeps its
-colour everywhere. The fonts ship with matplotlib.
+Laws and plants say their labels and colours themselves, in their files. The laws' colours are those of Okabe and Ito
+(Color Universal Design, 2008), which colour-blind readers can tell apart. A law keeps its colour everywhere. The fonts
+ship with matplotlib.
 """
 
+import colorsys
 import functools
+import itertools
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown, taken
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import Trace
 
-COLOURS = {
-    "observer_free": "#0072B2",
-    "adaptive": "#D55E00",
-    "classical": "#E69F00",
-    "super_twisting": "#009E73",
-    "conditioned_super_twisting": "#6A4C93",
-    "boundary_layer": "#CC79A7",
-    "adaptive_leak": "#56B4E9",
-    "none": "#6E7781",
-}
-# Of a grid of colours those farthest in CIEDE2000 from the ones above, from each other and from what else is drawn,
-# as seen by most eyes (18 and more) and with any colour blindness (7.5; red or green 9). A just noticeable difference
-# is about 1, and the closest two above are at 16 and 6.
+# Colours of laws that say none themselves. Of a grid of colours those farthest in CIEDE2000 from those that laws say,
+# from each other and from what else is drawn, as seen by most eyes (18 and more) and with any colour blindness (7.5;
+# red or green 9). A just noticeable difference is about 1, and the closest two that laws say are at 16 and 6.
 OTHERS = ("#005A3C", "#960000", "#96B469", "#78784B", "#B42D69", "#7887FF")
-NAMES = {  # a law of your own is called as you call it
-    "observer_free": "Observer-free",
-    "classical": "Classical",
-    "adaptive": "Adaptive",
-    "super_twisting": "Super-twisting",
-    "super_twisting_unclamped": "Super-twisting, unclamped",
-    "conditioned_super_twisting": "Conditioned super-twisting",
-    "boundary_layer": "Boundary layer",
-    "adaptive_leak": "Adaptive + leak",
-    "none": "No control",
-}
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact: of a grid of colours one of the farthest in CIELAB from the laws', the disturbance's and
@@ -84,29 +68,58 @@ def page():
     return rc_context(RC)  # pyright: ignore[reportArgumentType]
 
 
-def law_colour(law: str) -> str:
-    """The colour of a law, "#RRGGBB"; a law of your own always gets the same one."""
-    return COLOURS.get(law, OTHERS[zlib.crc32(law.encode()) % len(OTHERS)])
+def law_colour(law: Component | str) -> str:
+    """Return the colour of a law, "#RRGGBB": its own, or always the same one of OTHERS."""
+    template, name = _known(law)
+    return (template and template.colour) or OTHERS[zlib.crc32(name.encode()) % len(OTHERS)]
 
 
 def colours(traces: Sequence[Trace]) -> list[str]:
-    """One colour a trace: its law's, or another where an earlier trace has taken that."""
-    return law_colours([trace.scenario.law.name for trace in traces])
+    """Return one colour a trace: its law's, or another where an earlier trace has taken that."""
+    return law_colours([trace.scenario.law for trace in traces])
 
 
-def law_colours(laws: Sequence[str]) -> list[str]:
-    """One colour for each of these laws in one picture: its own, or another where an earlier one has taken that."""
+def law_colours(laws: Sequence[Component | str]) -> list[str]:
+    """Return one colour a law for one picture: its own, or another where an earlier law has taken that."""
     wanted = [law_colour(law) for law in laws]
-    free = [c for c in (*OTHERS, *COLOURS.values()) if c not in wanted]
+    free = (colour for colour in _palette() if colour not in wanted)
     given: list[str] = []
     for colour in wanted:
-        given.append(free.pop(0) if colour in given and free else colour)
+        given.append(next(free) if colour in given else colour)
     return given
 
 
-def law_name(law: str) -> str:
-    """A law's name as people write it."""
-    return NAMES.get(law, law)
+def _palette() -> Iterator[str]:
+    """Yield OTHERS, then the colours that laws of the library say, then colours without end that differ in hue."""
+    yield from OTHERS
+    yield from dict.fromkeys(template.colour for template in catalogue().values() if template.colour)
+    for k in itertools.count():
+        hue, lightness = k * 0.618 % 1.0, (0.45, 0.3, 0.6)[k % 3]
+        yield "#" + "".join(f"{round(255 * part):02X}" for part in colorsys.hls_to_rgb(hue, lightness, 0.6))
+
+
+def law_name(law: Component | str) -> str:
+    """Return a law's label: its own, or its name in words; a law of a user's is called as the user calls it."""
+    template, name = _known(law)
+    return (template and template.label) or (in_words(name) if name in catalogue() else name)
+
+
+def law_initials(law: str) -> str:
+    """Return a law's name in two or three letters, for where there is room for no more."""
+    template, name = _known(law)
+    return (template and template.short) or "".join(word[:1] for word in name.split("_")).upper()[:3] or "?"
+
+
+def _known(law: Component | str) -> tuple[Template | None, str]:
+    """Return what the author of a law said of it, where that is at hand, and its name."""
+    if isinstance(law, str):
+        return catalogue().get(law), law
+    return law.template or catalogue().get(law.name), law.name
+
+
+def in_words(name: str) -> str:
+    """Return a name of the code as words: boundary_layer as "Boundary layer"."""
+    return name[:1].upper() + name[1:].replace("_", " ")
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
@@ -115,12 +128,11 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     Raises:
       ScenarioError: not as many labels as traces.
     """
-    own = [trace.scenario.law.name for trace in traces]
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
         return [str(label) for label in given]
-    names = [law_name(law) for law in own]
+    names = [law_name(trace.scenario.law) for trace in traces]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
 
 
@@ -210,13 +222,9 @@ def letter(group: Group) -> str:
 
 
 def plant_name(trace: Trace) -> str:
-    """The plant's name as people write it; that of your own model as you do."""
-    if trace.scenario.plant.direct:
-        return trace.scenario.plant.name
-    words = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
-    name = " ".join(words.get(w, w) for w in trace.scenario.plant.name.split("_"))
-    name += " oscillator" if name in ("Van der Pol", "Duffing") else ""
-    return name[0].upper() + name[1:]
+    """Return the plant's label: its own, or its name in words; a model of the user's is called as the user calls it."""
+    plant = trace.scenario.plant
+    return plant.label or (plant.name if plant.direct else in_words(plant.name))
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

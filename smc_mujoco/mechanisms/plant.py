@@ -100,6 +100,8 @@ class Plant:
       smooth: whether its equation is without limits, contacts and dry friction of its own.
       unmodelled: why there is no nominal model, or "".
       limits: what the motors of the driven channels give at most, N m or N each; empty: no limits of their own.
+      label, short: its name in figures, and where there is less room; "": its name in words.
+      jumps: size, "mild" or "hard" -> parameter -> factor on it, of the suite's conditions of that name.
       ranges: joint, least and largest position of each channel, rad or m; empty: none has limits of its own.
     """
 
@@ -124,10 +126,14 @@ class Plant:
     unmodelled: str = ""
     limits: tuple[float, ...] = ()
     ranges: tuple[tuple[str, float, float], ...] = ()
+    label: str = ""
+    short: str = ""
+    jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "jumps", frozen({size: frozen(factors) for size, factors in self.jumps.items()}))
 
     def __repr__(self) -> str:
         values = [f"{name}={value:g}" for name, value in self.parameters.items()]

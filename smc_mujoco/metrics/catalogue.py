@@ -130,19 +130,19 @@ def ripple(trace: Trace) -> float:
     return np.ptp(error(trace)[last(trace)], axis=0).max()
 
 
-@metric("({x})^2 s")
+@metric("({x})^2 s", label="ISE")
 def ise(trace: Trace) -> float:
     """Integral of e^2 dt, summed over the channels (trapezoid)."""
     return np.trapezoid((error(trace) ** 2).sum(axis=1), trace.t)
 
 
-@metric("{x} s")
+@metric("{x} s", label="IAE")
 def iae(trace: Trace) -> float:
     """Integral of |e| dt, summed over the channels (trapezoid)."""
     return np.trapezoid(np.abs(error(trace)).sum(axis=1), trace.t)
 
 
-@metric("{x} s^2")
+@metric("{x} s^2", label="ITAE")
 def itae(trace: Trace) -> float:
     """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
     since = trace.t - trace.t[0]
@@ -161,7 +161,7 @@ def reaching_time(trace: Trace) -> float:
     return last_exit(trace.t, size, BAND * (size[0] or size.max()))
 
 
-@metric("{u}", command=True)
+@metric("{u}", label="max |u|", command=True)
 def max_u(trace: Trace) -> float:
     """Largest |u|, worst channel."""
     return np.abs(trace.u).max()
@@ -173,13 +173,13 @@ def max_step(trace: Trace) -> float:
     return np.abs(np.diff(trace.u, axis=0)).max(initial=0.0)
 
 
-@metric("{u}", command=True)
+@metric("{u}", label="TV", command=True)
 def tv(trace: Trace) -> float:
     """Total variation of u: sum of |u[k+1] - u[k]| over the run, worst channel."""
     return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
 
 
-@metric("{u}/s", command=True)
+@metric("{u}/s", label="TV rate", command=True)
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 

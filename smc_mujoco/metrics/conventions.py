@@ -57,6 +57,7 @@ class Metric:
 
     Attributes:
       name: the function's name.
+      label: its name in tables and figures.
       unit: may contain {x} and {u}, see `unit_for`.
       summary: first line of the docstring.
       network: True if it compares channels and so needs several of a kind.
@@ -66,6 +67,7 @@ class Metric:
     """
 
     name: str
+    label: str
     unit: str
     summary: str
     network: bool
@@ -105,12 +107,13 @@ class Metric:
 
 
 def metric(
-    unit: str, *, network: bool = False, realistic: bool = False, command: bool = False
+    unit: str, *, label: str = "", network: bool = False, realistic: bool = False, command: bool = False
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
 
     Args:
       unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
+      label: its name in tables and figures. Default: the function's name with spaces.
       network: True if the metric compares channels.
       realistic: True if it is told only of realistic mechanisms.
       command: True if it is of the command or the sliding variable.
@@ -128,6 +131,7 @@ def metric(
 
         entry = CATALOGUE[name] = Metric(
             name=name,
+            label=label or name.replace("_", " "),
             unit=unit,
             summary=doc.partition("\n")[0],
             network=network,

@@ -1,6 +1,6 @@
-"""Old names of modules, such as smc_mujoco.law, for one release: each hands on its module's new place, and warns.
+"""Old names of modules, such as smc_mujoco.law, for one release. They work, with a DeprecationWarning.
 
-This folder is on the package's path, so that `from smc_mujoco.law import law_function` finds law.py here.
+This folder is on the package's path, so `from smc_mujoco.law import law_function` finds law.py here.
 """
 
 import importlib
@@ -14,12 +14,17 @@ PLACES = {
     "backlash": "mechanisms.hardware.backlash",
     "basin": "analysis.region_of_attraction",
     "bounds": "analysis.tuning.search_space",
+    "c": "control.c",
+    "c.export": "control.c.export",
+    "c.load": "control.c.load",
     "claims": "studies.paper.claims.audit",
+    "claims.lyapunov": "studies.paper.claims.lyapunov",
     "component": "control.component",
     "conditions": "simulation.perturbations",
     "contact": "mechanisms.hardware.contact",
     "design": "control.design",
     "differences": "analysis.differences",
+    "draw.video": "draw.film.film",
     "errors": "common.errors",
     "estimators": "control.estimator",
     "friction": "mechanisms.hardware.friction",
@@ -32,6 +37,7 @@ PLACES = {
     "mechanism": "mechanisms.fidelity",
     "named_conditions": "simulation.conditions",
     "own_model": "mechanisms.custom.plant_from",
+    "paper": "studies.paper.scenarios",
     "plant": "mechanisms.plant",
     "policies": "control.policy",
     "pytest_plugin": "testing.plugin",
@@ -56,22 +62,25 @@ PLACES = {
 
 
 class Moved(types.ModuleType):
-    """A module under its old name. Called, it is the public function of that name, which it hides."""
+    """A module under its old name. If a public function has that name too, the module can be called in its place."""
 
     def __init__(self, name: str, module: types.ModuleType):
         super().__init__(name, module.__doc__)
+        vars(self).update({name: value for name, value in vars(module).items() if not name.startswith("__")})
+        found = vars(sys.modules[name])  # the file in this folder
+        vars(self).update({name: found[name] for name in ("__path__", "__spec__") if name in found})
         self._module = module
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._module, name)
 
     def __call__(self, *args: object, **kwargs: object) -> object:
-        """What the public function of the module's old name gives."""
+        """Call the public function of this name."""
         return importlib.import_module("smc_mujoco").__getattr__(self.__name__.rpartition(".")[2])(*args, **kwargs)
 
 
 def forward(old: str) -> None:
-    """Put the module at its new place where the old name is being imported, with a DeprecationWarning."""
+    """Let the old name of a module stand for the module in its new place, with a DeprecationWarning."""
     place = "smc_mujoco." + PLACES[old.removeprefix("smc_mujoco.")]
     warnings.warn(f"{old} is now {place}: import it from there", DeprecationWarning, stacklevel=3)
     sys.modules[old] = Moved(old, importlib.import_module(place))

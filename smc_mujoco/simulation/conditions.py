@@ -37,6 +37,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
@@ -54,21 +55,11 @@ SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
-# Plant -> parameter -> factor, at half time, with the sine disturbance: a mild and a hard one.
-JUMP_MILD: dict[str, dict[str, float]] = {
-    "inverted_pendulum": {"mass": 2.0},
-    "pendulum_network": {"mass": 2.0},
-    "inverted_pendulum_network": {"mass": 2.0},
-    "van_der_pol": {"mu": 3.0},
-    "duffing": {"alpha": 3.0},
-}
-JUMP_HARD: dict[str, dict[str, float]] = {
-    "inverted_pendulum": {"mass": 25.912},
-    "van_der_pol": {"mu": 9.0},
-    "duffing": {"alpha": 27.684},
-    "pendulum_network": {"mass": 11.062},
-    "inverted_pendulum_network": {"mass": 22.681},
-}
+# Plant -> parameter -> factor, at half time, with the sine disturbance: a mild and a hard one. Plants say them.
+JUMP_MILD, JUMP_HARD = (
+    {name: dict(plant.jumps[size]) for name, plant in plants().items() if size in plant.jumps}
+    for size in ("mild", "hard")
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -290,19 +281,15 @@ def _several(value: Any) -> tuple:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _jump(factors: dict[str, dict[str, float]], name: str) -> Callable[[Plant, float], Fields]:
+def _jump(size: str) -> Callable[[Plant, float], Fields]:
     def fields(plant: Plant, duration: float) -> Fields:
-        return {"disturbance": SINE, "jump": Jump(time=duration / 2, factors=_of(name, plant, factors))}
+        if size not in plant.jumps:
+            known = [name for name, one in plants().items() if size in one.jumps]
+            cure = f"choose another condition, or one of {', '.join(known)}"
+            raise ScenarioError(f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}")
+        return {"disturbance": SINE, "jump": Jump(time=duration / 2, factors=plant.jumps[size])}
 
     return fields
-
-
-def _of(name: str, plant: Plant, known: Mapping[str, Any]) -> Any:
-    """What a table says of a plant."""
-    if plant.name not in known:
-        cure = f"choose another condition, or one of {', '.join(known)}"
-        raise ScenarioError(f"condition {name!r} has no numbers for plant {plant.name!r}: {cure}")
-    return known[plant.name]
 
 
 def _contact(plant: Plant, duration: float) -> Fields:
@@ -324,8 +311,8 @@ IDEAL: dict[str, Fields | Callable[[Plant, float], Fields]] = {
     **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)},
     "light": {"mismatch": {"mass": 0.7}},
     "heavy": {"mismatch": {"mass": 1.3}},
-    "jump_mild": _jump(JUMP_MILD, "jump_mild"),
-    "jump_hard": _jump(JUMP_HARD, "jump_hard"),
+    "jump_mild": _jump("mild"),
+    "jump_hard": _jump("hard"),
     **{f"period_{ms}ms": {"control_period": ms * 1e-3} for ms in (10, 20, 50)},
     "differenced_5ms": {"velocity": DIFFERENCED},
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},

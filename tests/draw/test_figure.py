@@ -183,7 +183,7 @@ def test_refuses_what_shares_no_axes(pair, tmp_path):
 
 
 def test_laws_keep_their_colours_and_traces_never_share_one(pair):
-    assert style.colours(pair) == [style.COLOURS[law] for law in LAWS]
+    assert style.colours(pair) == [style.law_colour(law) for law in LAWS]
     assert len(set(style.colours(pair * 4))) == 8
     assert style.law_colour("my_own") == style.law_colour("my_own") in style.OTHERS
 

@@ -9,9 +9,11 @@ from matplotlib.colors import to_hex
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.search import tune
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.draw import figure, style
 from smc_mujoco.draw.pareto import MARKS, pareto
 
+COLOURS = [template.colour for template in catalogue().values() if template.colour]
 SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(6), 2009, severity 1
     "all cones": np.eye(3),
     "no red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
@@ -66,7 +68,7 @@ def test_the_distance_is_that_of_the_paper(one, other, distance):
 
 @pytest.mark.parametrize("eye", SEEN)
 def test_the_colours_of_other_laws_are_apart_from_all_that_is_drawn(eye):
-    drawn = [*style.COLOURS.values(), style.INK, style.REACTION, style.DISTURBANCE, style.FAILED, style.PAPER]
+    drawn = [*COLOURS, style.INK, style.REACTION, style.DISTURBANCE, style.FAILED, style.PAPER]
     pairs = [*itertools.product(style.OTHERS, drawn), *itertools.combinations(style.OTHERS, 2)]
     close = {pair: ciede2000(*(lab(colour, eye) for colour in pair)) for pair in pairs}
     assert min(close.values()) > APART[eye], min(close, key=close.__getitem__)
@@ -79,9 +81,12 @@ def test_laws_that_would_share_a_colour_differ_in_one_picture():
     given = style.law_colours([*SHARED, "observer_free"])
     assert given[0] == style.OTHERS[0]
     assert len(set(given)) == 3
-    assert given[2] == style.COLOURS["observer_free"]
-    everyone = len(style.COLOURS) + len(style.OTHERS)
-    assert len(set(style.law_colours([*smc.laws()][:everyone]))) == everyone
+    assert given[2] == "#0072B2"
+
+
+def test_law_colours_never_repeat_in_one_picture():
+    names = [f"law_{k}" for k in range(300)]
+    assert len({*style.law_colours([*smc.laws(), *names])}) == len(smc.laws()) + len(names)
 
 
 def test_laws_that_would_share_a_colour_differ_in_signals_and_fronts_too(monkeypatch):

@@ -35,12 +35,11 @@ def check_c(
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
     with loading():
-        from smc_mujoco.control.c.child import checked
-        from smc_mujoco.control.c.said import parsed
+        from smc_mujoco.control.c.load import check, parsed_gains
 
-    given = parsed(gains, "--gains") if gains else None
+    given = parsed_gains(gains, "--gains") if gains else None
     try:
-        for line in checked(file, given, memory, symbol, flag or (), timeout):
+        for line in check(file, given, memory, symbol, flag or (), timeout):
             print(line)
     except ScenarioError as error:
         raise ScenarioError(OPTIONS.sub(r"--\1", str(error))) from None

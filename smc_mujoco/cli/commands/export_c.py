@@ -25,7 +25,7 @@ def export_c(
     """
     with loading():
         from smc_mujoco.control.c.export import law_to_c
-        from smc_mujoco.control.c.said import parsed
+        from smc_mujoco.control.c.load import parsed_gains
         from smc_mujoco.control.law import law as find
 
-    print(law_to_c(find(law, **parsed(gains, "--gains")), numbers), end="")
+    print(law_to_c(find(law, **parsed_gains(gains, "--gains")), numbers), end="")

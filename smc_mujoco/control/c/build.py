@@ -1,4 +1,4 @@
-"""C compiled with the system's compiler into a library of this process; what the compiler says, in one sentence."""
+"""Compile C with the system's compiler into a shared library, and say its errors in one sentence."""
 
 import atexit
 import functools
@@ -14,76 +14,77 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.process import Late, timed
-from smc_mujoco.control.c.trial import BEYOND
+from smc_mujoco.control.law import Measurement
 
 HERE = Path(__file__).parent
 HEADER = HERE / "smc_law.h"
-INPUTS = 21  # numbers in a measurement, as in law.Measurement
+INPUTS = len(Measurement._fields)  # numbers in a measurement
 PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no products and sums fused into one rounding.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
-# Calls of its own functions, and its own data, whatever else in the process has the name: C's remove, y0, timezone.
-OWN = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
-# For a trial: what writes or reads beyond arrays, or does what C leaves undefined, ends the process with a report.
+# A library calls its own functions and uses its own data, also where C has the name: remove, y0, timezone.
+OWN_NAMES = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
+# For a trial: a step beyond an array, or what C leaves undefined, ends the process with a report.
 SANITIZERS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-WRONG = ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")  # are errors, not warnings
-ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<said>.*)$", re.MULTILINE)
-# Lines of `nm -f sysv`; what a compiler adds to names of variables in functions is left out.
+WARNINGS = ("-Wall", "-Wextra")
+# Warnings of compilers that are errors here.
+STRICT = tuple(
+    f"-Werror={name}" for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
+)
+ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE)
+WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
+# Lines of `nm -f sysv`. A number that the compiler adds to a variable's name is left out.
 FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
 DATA = re.compile(r"^(\S+?)(?:\.\d+)? *\|([0-9a-f]+)\| +[bBdDuV] +\| +OBJECT\|([0-9a-f]+)\|", re.MULTILINE)
-WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
-
-
-@functools.cache
-def folder() -> Path:
-    """A folder for what is compiled, until the process ends.
-
-    Not less: the loader takes a library for one that it has where a deleted file's number is used again.
-    """
-    made = tempfile.mkdtemp(prefix="smc_mujoco-")
-    atexit.register(_remove, made, os.getpid())
-    return Path(made)
-
-
-def _remove(made: str, owner: int) -> None:
-    if os.getpid() == owner:  # a forked child leaves its parent's files
-        shutil.rmtree(made, ignore_errors=True)
-
 
 _count = itertools.count()
 
 
+@functools.cache
+def folder() -> Path:
+    """Return a folder for what is compiled. It stays until the process ends.
+
+    A file that is deleted earlier gives its number to a new one, which the loader then takes for the old one.
+    """
+    path = tempfile.mkdtemp(prefix="smc_mujoco-")
+    atexit.register(_remove, path, os.getpid())
+    return Path(path)
+
+
+def _remove(path: str, owner: int) -> None:
+    if os.getpid() == owner:  # a forked child leaves its parent's files
+        shutil.rmtree(path, ignore_errors=True)
+
+
 def fresh(suffix: str) -> Path:
-    """A file name that nothing had before."""
+    """Return a file name that nothing had before."""
     return folder() / f"{os.getpid()}-{next(_count)}{suffix}"
 
 
 def compiler() -> list[str]:
-    """The command of the C compiler: $CC, or cc."""
-    said = os.environ.get("CC", "")
+    """Return the command of the C compiler: $CC, or cc."""
+    command = os.environ.get("CC", "")
     try:
-        return shlex.split(said) or ["cc"]
+        return shlex.split(command) or ["cc"]
     except ValueError:  # a quotation without an end: there is no such program
-        return [said]
+        return [command]
 
 
 def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
-    """A C file, and the glue that calls `symbol` in it, as a shared library; and the compiler's warnings.
+    """Compile a C file, with the glue that calls `symbol` in it, and return the library and the compiler's warnings.
 
     Raises:
       ScenarioError: there is no compiler, it needs too long, or it finds an error.
     """
-    if set('"\\\n') & set(str(source.resolve())):
+    path, target, command = str(source.resolve()), fresh(".so"), compiler()
+    if set('"\\\n') & set(path):
         raise ScenarioError(
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
         )
-    target, command = fresh(".so"), compiler()
-    strict = [f"-Werror={name}" for name in WRONG]
-    given = [f'-DSMC_SOURCE="{source.resolve()}"', f"-DSMC_SYMBOL={symbol}", f"-DSMC_INPUTS={INPUTS}"]
-    given += [f"-DSMC_BEYOND={BEYOND}", "-I", str(HERE)]
-    line = [*command, *FLAGS, *OWN, *strict, *given, str(HERE / "glue.c"), "-o", str(target), *flags, "-lm"]
+    macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", f"-DSMC_INPUTS={INPUTS}", "-I", str(HERE)]
+    files = [str(HERE / "glue.c"), "-o", str(target)]
     try:
-        done = timed(line, timeout)
+        done = timed([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
     except Late:
         raise ScenarioError(
             f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
@@ -99,7 +100,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
 
 @functools.cache
 def replayer(command: tuple[str, ...]) -> Path | None:
-    """The program of `replay.c` with a compiler's sanitizers, or None where it has none that work."""
+    """Return the program of `replay.c` with a compiler's sanitizers, or None where it has none that work."""
     target = fresh(".exe")
     line = [*command, *SANITIZERS, f"-DSMC_INPUTS={INPUTS}", str(HERE / "replay.c"), "-o", str(target), "-ldl"]
     try:
@@ -110,35 +111,40 @@ def replayer(command: tuple[str, ...]) -> Path | None:
     return target
 
 
-def data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, int]]]:
-    """Address of a law in its library; and name, address and size of what the library may change, as nm tells them."""
+def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, int]]]:
+    """Return a law's address in its library, and name, address and size of the library's static data.
+
+    nm tells them. The data is what the law may change, without constants.
+    """
     try:
         table = timed(["nm", "-f", "sysv", str(library)], 60.0).stdout
     except (Late, OSError):
         return 0, []
-    functions = {name: int(at, 16) for name, at in FUNCTION.findall(table)}
-    found = [(name, int(at, 16), int(size, 16)) for name, at, size in DATA.findall(table)]
-    return functions.get("smc_mujoco_entry", functions.get(symbol, 0)), found
+    functions = {name: int(address, 16) for name, address in FUNCTION.findall(table)}
+    data = [(name, int(address, 16), int(size, 16)) for name, address, size in DATA.findall(table)]
+    return functions.get("smc_mujoco_entry", functions.get(symbol, 0)), data
 
 
 def undefined(source: str, symbol: str) -> str:
-    """The sentence for a law without its function."""
-    return f"{source} has no function {symbol}: define {PROTOTYPE.replace('smc_law(', symbol + '(')}"
+    """Return the sentence for a file without the law's function."""
+    return f"{source} has no function {symbol}: define {_prototype(symbol)}"
+
+
+def _prototype(symbol: str) -> str:
+    return PROTOTYPE.replace("smc_law(", f"{symbol}(")
 
 
 def _sentence(source: Path, symbol: str, command: str, said: str) -> str:
-    """What the compiler did not like first, and the cure."""
-    error, prototype = ERROR.search(said), PROTOTYPE.replace("smc_law(", symbol + "(")
-    what = error["said"] if error else ""
+    """Return the first error of a compiler, with a cure."""
+    error, name = ERROR.search(said), source.name
+    what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
     if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", said):
-        return undefined(source.name, symbol)
+        return undefined(name, symbol)
     if error is None or error["line"] is None:  # of the linker, or of the command
-        words = [line for line in said.splitlines() if line.strip()] or ["it says nothing"]
-        telling = [line for line in words if re.search(r"ndefined|cannot find|error:", line)] or words
-        return f"{source.name} does not compile, {command} says: {telling[0].strip()}; mend it, or give other flags="
-    if f"'{symbol}'" in what or Path(error["file"]).name == "glue.c":
-        return f"{source.name} has another {symbol} than smc_mujoco calls: it must be {prototype}"
-    where = (
-        f"line {error['line']}" if Path(error["file"]).name == source.name else f"{error['file']}, line {error['line']}"
-    )
-    return f"{source.name} does not compile: {where}, {what}; mend it"
+        lines = [line for line in said.splitlines() if line.strip()] or ["it says nothing"]
+        telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
+        return f"{name} does not compile, {command} says: {telling[0].strip()}; mend it, or give other flags="
+    if f"'{symbol}'" in what or file == "glue.c":
+        return f"{name} has another {symbol} than smc_mujoco calls: it must be {_prototype(symbol)}"
+    where = f"line {error['line']}" if file == name else f"{error['file']}, line {error['line']}"
+    return f"{name} does not compile: {where}, {what}; mend it"

@@ -5,6 +5,8 @@
 #include SMC_SOURCE
 #include "smc_law.h"
 
+#define SMC_BEYOND (1LL << 40) /* sandbox.py: wrote beyond its memory; one more: beyond out; two: changed arithmetic */
+
 extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
 long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out);
 

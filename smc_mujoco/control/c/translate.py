@@ -1,149 +1,711 @@
-"""A law's Python as one file of C: its functions, the constants they use, and what both need."""
+"""Translate a law's Python into C99, operation by operation, in the same order and with the same rounding.
+
+numba computes some powers in its own way: with a constant exponent they become products or roots. The C does the same,
+so that in double precision it gives the bits of the compiled law.
+"""
 
 import ast
+import builtins
+import inspect
+import itertools
+import math
 import re
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.control.c.functions import Function, parsed
-from smc_mujoco.control.c.values import POINTERS, TYPES, Array, Value, plain, refuse
-from smc_mujoco.control.c.variables import TAKEN
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.law import Measurement
 
-BODIES = {"least": "b < a ? b : a", "most": "b > a ? b : a", "size": "a < 0 ? -a : a"}  # as Python's min, max and abs
+# Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
+KINDS = ("bool", "int", "single", "real")
+WHOLE_KINDS = ("bool", "int")
+TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
+# The arguments of a law, which are no numbers.
+ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
+
+# How tightly C's operators bind. An operand that binds less tightly is put in parentheses.
+ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
+OPERATORS: dict[type, tuple[str, int]] = {
+    ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT),
+}  # fmt: skip
+BITS: dict[type, str] = {ast.LShift: "<<", ast.RShift: ">>", ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^"}
+COMPARISONS: dict[type, str] = {
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+}  # fmt: skip
+
+# Functions of Python's math module that have the same name in C.
+MATH_NAMES = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p log10 log2 sqrt
+hypot fabs copysign fmod"""
+SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
+ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # whole numbers in Python, reals in C
+MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
+CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
+# Small functions that the file defines where it needs them. They are Python's min, max and abs.
+HELPERS = {"least": "b < a ? b : a", "most": "b > a ? b : a", "size": "a < 0 ? -a : a"}
+SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
+POWERS = {  # as numba multiplies them: by squares, from the lowest bit
+    "raised_2": "a * a",
+    "raised_3": f"a * {SQUARE}",
+    "raised_4": FOURTH,
+    "raised_5": f"a * {FOURTH}",
+    "raised_6": f"{SQUARE} * {FOURTH}",
+    "raised_7": f"a * {SQUARE} * {FOURTH}",
+    "raised_8": f"({FOURTH} * {FOURTH})",
+}
+
+KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
+register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
+# Functions, macros and keywords of C's headers, of newer C and of compilers' own dialects.
+OTHERS = """_Bool _Complex _Imaginary alignas alignof asm bool constexpr false linux nullptr static_assert thread_local
+true typeof unix main abort abs exit free index labs rindex NAN INFINITY HUGE_VAL cbrt drem erf erfc exp2 exp10 fdim
+finite fma fmax fmin fpclassify frexp gamma ilogb isfinite isgreater isgreaterequal isinf isless islessequal
+islessgreater isnan isnormal isunordered j0 j1 jn ldexp lgamma llrint llround logb lrint lround modf nan nearbyint
+nextafter nexttoward pow10 remainder remquo rint round scalb scalbln scalbn signbit signgam significand tgamma y0 y1
+yn"""
+RESERVED = {*KEYWORDS.split(), *OTHERS.split(), *MATH, "out"}
 
 
-class Translated(NamedTuple):
-    """What the C of a law consists of."""
-
-    constants: list[str]
-    functions: list[str]
-    slots: int  # numbers of memory that it uses
+class Untranslatable(ScenarioError):
+    """Python that has no translation into C."""
 
 
-def translate(law: Any, single: bool) -> Translated:
-    """The function (y, gains, memory) -> (u, s) of a law as smc_law; `single` where smc_real is float.
+class Value(NamedTuple):
+    """An expression in C: its text, its kind, and how tightly its outermost operator binds."""
+
+    text: str
+    kind: str
+    level: int = ATOM
+
+    def within(self, level: int) -> str:
+        """Return the text as an operand of an operator that binds as tightly as `level`."""
+        return self.text if self.level >= level else f"({self.text})"
+
+
+def translate(law: Component, single: bool) -> tuple[int, str]:
+    """Return how many numbers of memory a law uses, and the C of its function and of all that it calls.
+
+    Args:
+      single: whether smc_real is float.
 
     Raises:
-      Untranslatable: with what is not for C.
+      Untranslatable: names the Python that has no translation.
     """
-    program = Program(single)
-    main = Function(program, law, POINTERS, {}, law=True)
-    functions = [main.text("smc_law")]
-    for text in reversed(program.functions):  # but for those that a wider kind has taken the place of
-        if any(re.search(rf"\b{_named(text)}\(", other) for other in functions):
+    program = Program(law, single)
+    functions = [Function(program, law.function, list(ARGUMENTS), {}, law=True).text("smc_law")]
+    for name, text in reversed(program.functions.items()):
+        if any(re.search(rf"\b{name}\(", other) for other in functions):  # else only a narrower draft called it
             functions.insert(0, text)
-    arrays = [a for name, a in program.arrays.items() if any(f"{name}[" in other for other in functions)]
-    return Translated(arrays, functions, max(main.slots, program.slots))
-
-
-def _named(text: str) -> str:
-    """The name of the function that a text begins with."""
-    found = re.match(r"[^(]*?(\w+)\(", text)
-    return found[1] if found else ""
+    arrays = [text for name, text in program.arrays.items() if any(f"{name}[" in other for other in functions)]
+    return program.slots, "\n\n".join([*arrays, *functions])
 
 
 class Program:
-    """The file that a law becomes part of."""
+    """The file that a law becomes: constant arrays, functions, and the names that they take."""
 
-    def __init__(self, single: bool):
-        self.single = single
-        self.arrays: dict[str, str] = {}
-        self.functions: list[str] = []
-        self.made: dict[tuple, tuple[str, Function | None]] = {}
-        self.taken: set[str] = {"smc_law", "y", "gains", "memory", *TAKEN}
-        self.slots = 0
+    def __init__(self, law: Component, single: bool):
+        self.gains, self.single = law.gains, single
+        self.arrays: dict[str, str] = {}  # name -> text
+        self.functions: dict[str, str] = {}  # name -> text
+        self.made: dict[tuple, tuple[str, Function] | None] = {}  # None while a function is being translated
+        self.taken = {"smc_law", *ARGUMENTS, *RESERVED}
+        self.slots = 0  # numbers of memory that the law uses
+
+    def free(self, name: str) -> str:
+        """Return a name that nothing else in the file has, and take it."""
+        candidates = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
+        found = next(candidate for candidate in candidates if candidate not in self.taken)
+        self.taken.add(found)
+        return found
 
     def helper(self, name: str, kind: str) -> str:
-        """The name of a small function of numbers of a kind: `least`, `most`, `size`, or a power `raised_3`."""
-        key = (name, kind)
-        if key not in self.made:
-            self.made[key] = f"{name}_{kind}" if "raised" not in name or kind != "real" else name, None
-            body = BODIES.get(name) or _product(int(name.rpartition("_")[2]))
-            of, two = TYPES[kind], name in ("least", "most")
-            head = f"static {of} {self.made[key][0]}({of} a{f', {of} b' if two else ''})"
-            self.taken.add(self.made[key][0])
-            self.functions.append(f"{head}\n{{\n    return {body};\n}}")
-        return self.made[key][0]
+        """Return the name of a helper for numbers of a kind: least, most, size, or a power such as raised_3."""
+        function = name if name in POWERS and kind == "real" else f"{name}_{kind}"
+        body, of = (HELPERS | POWERS)[name], TYPES[kind]
+        second = f", {of} b" if "b" in body else ""
+        self.taken.add(function)
+        self.functions.setdefault(function, f"static {of} {function}({of} a{second})\n{{\n    return {body};\n}}")
+        return function
 
-    def array(self, name: str, values: Any) -> Array:
-        """A constant array: of the smallest whole numbers that hold it, or of smc_real."""
+    def array(self, name: str, values: Any) -> Value:
+        """Return a constant array: of smc_real, or of the smallest whole numbers that hold it."""
         data, name = np.asarray(values), plain(name)
         if data.ndim != 1 or data.dtype.kind not in "if":
             raise refuse(None, f"the constant {name}, which is no row of numbers,")
         kind, of = "real", "smc_real"
         items = [f"{float(v)!r}{'f' * self.single}" for v in data]
         if data.dtype.kind == "i":
-            kind, most = "int", int(np.abs(data).max(initial=0))
-            if most >= 2**31:
+            kind, largest = "int", int(np.abs(data).max(initial=0))
+            if largest >= 2**31:
                 raise refuse(None, f"the constant {name}, beyond 32 bits,")
-            of, items = "int16_t" if most < 2**15 else "int32_t", [str(int(v)) for v in data]
+            of, items = "int16_t" if largest < 2**15 else "int32_t", [str(int(v)) for v in data]
         content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
-        for taken, text in self.arrays.items():
-            if text.endswith(content) and f" {of} " in text:
-                return Array(taken, kind)
+        for known, text in self.arrays.items():
+            if text == f"static const {of} {known}{content}":
+                return Value(known, kind)
         name = self.free(name)
         self.arrays[name] = f"static const {of} {name}{content}"
-        return Array(name, kind)
+        return Value(name, kind)
 
-    def function(
-        self, function: Any, arguments: Sequence[Value], nodes: Sequence[ast.expr]
-    ) -> tuple[str, list[str], list[Value]]:
-        """A function that another calls, once for each kind of its arguments, and for each literal exponent."""
+    def function(self, function: Any, values: Sequence[Value], nodes: Sequence[ast.expr]) -> tuple[list[str], str]:
+        """Return the kinds of a function's results, and the beginning of a call of it, without the last parenthesis.
+
+        A function is translated once for each kind of its arguments. A literal exponent is no argument in C: there is
+        one function for each.
+        """
         written, tree = parsed(function)
+        names = [a.arg for a in tree.args.args]
+        exponents = {n.right.id for n in ast.walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Pow)
+            and isinstance(n.right, ast.Name)}  # fmt: skip
         constants = {
             name: node.value
-            for name, node in zip([a.arg for a in tree.args.args], nodes, strict=False)
-            if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and _exponent(tree, name)
+            for name, node in zip(names, nodes, strict=False)
+            if name in exponents and isinstance(node, ast.Constant) and isinstance(node.value, int | float)
         }
-        kinds = [v.kind for v in arguments]
+        kinds = [v.kind for v in values]
         key = (written, tuple(kinds), tuple(constants.items()))
         if key not in self.made:
-            self.made[key] = "", None  # while it is under way
+            self.made[key] = None
             made = Function(self, function, kinds, constants)
             name = self.free(plain(tree.name))
             self.made[key] = name, made
-            self.slots = max(self.slots, made.slots)
-            self.functions.append(made.text(name))
-        name, made = self.made[key]
-        if made is None:
+            self.functions[name] = made.text(name)
+        if (found := self.made[key]) is None:
             raise refuse(None, f"{tree.name}, which calls itself,")
-        names = [a.arg for a in tree.args.args]
-        return name, made.results, [v for n, v in zip(names, arguments, strict=True) if n not in constants]
+        passed = [v.text for n, v in zip(names, values, strict=True) if n not in constants]
+        return found[1].results, f"{found[0]}({', '.join(passed)}"
 
-    def free(self, name: str) -> str:
-        """A name that no other function of the file has."""
-        found, count = name, 1
-        while found in self.taken:
-            count += 1
-            found = f"{name}_{count}"
-        self.taken.add(found)
+
+class Function:
+    """One function in C.
+
+    A law's results go to out[0] and out[1]. Another function returns one result, and writes several to pointers.
+
+    Args:
+      kinds: of its arguments.
+      constants: arguments that are literal numbers instead.
+      law: whether it is smc_law itself.
+    """
+
+    def __init__(
+        self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], law: bool = False
+    ):
+        self.program, self.constants, self.law = program, constants, law
+        written, self.tree = parsed(function)
+        cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
+        self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
+        arguments = [a.arg for a in self.tree.args.args]
+        if len(arguments) != len(kinds) or self.tree.args.vararg or self.tree.args.kwonlyargs or self.tree.args.kwarg:
+            raise refuse(None, f"{self.tree.name} with its arguments")
+        if not returns(self.tree.body):
+            raise refuse(None, f"{self.tree.name}, whose last line is no return,")
+        self.parameters = {n: kind for n, kind in zip(arguments, kinds, strict=True) if n not in constants}
+        inside = [node for statement in self.tree.body for node in ast.walk(statement)]
+        self.read = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+        self.kinds, self.results = dict(self.parameters), list[str]()
+        before = None
+        while before != (self.kinds, self.results):  # translate again until no variable's kind widens
+            before = dict(self.kinds), list(self.results)
+            self.names = {name: Value(self.c_name(name), kind) for name, kind in self.kinds.items()}
+            self.declared, self.early, self.depth = set(self.parameters), set[str](), 0
+            self.lines = list(self.block(self.tree.body))
+
+    def text(self, name: str) -> str:
+        """Return the whole function under a name."""
+        early = sorted(self.early)
+        opening = [f"{TYPES[self.kinds[n]]} {self.c_name(n)} = 0;" for n in early]
+        opening += [f"(void){self.c_name(n)};" for n in (*self.parameters, *early) if n not in self.read]
+        lines, depth = [self.head(name), "{"], 1
+        for line in [*opening, *self.lines]:
+            depth -= line.startswith("}")
+            indent = "    " * depth
+            lines += textwrap.wrap(
+                indent + line, 110, subsequent_indent=indent + " " * 8, break_long_words=False, break_on_hyphens=False
+            )
+            depth += line.endswith("{")
+        return "\n".join([*lines, "}"])
+
+    def head(self, name: str) -> str:
+        """Return the declaration without a semicolon."""
+        types = {n: ARGUMENTS.get(kind, f"{TYPES.get(kind)} ") for n, kind in self.kinds.items()}
+        arguments = [f"{types[n]}{self.c_name(n)}" for n in self.parameters]
+        if self.law:
+            return f"int {name}({', '.join(arguments)}, smc_real *out)"
+        if len(self.results) == 1:
+            return f"static {TYPES[self.results[0]]} {name}({', '.join(arguments) or 'void'})"
+        arguments += [f"{TYPES[kind]} *out_{i}" for i, kind in enumerate(self.results)]
+        return f"static void {name}({', '.join(arguments)})"
+
+    def c_name(self, name: str) -> str:
+        """Return a variable's name in C. A law's arguments have the names of smc_law.h."""
+        if self.law and self.kinds.get(name) in ARGUMENTS:
+            return self.kinds[name]
+        return plain(name) + "_" * (name in RESERVED or (self.law and name in ARGUMENTS))
+
+    # statements
+
+    def block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
+        """Yield the lines of some statements, without indentation."""
+        for node in body:
+            match node:
+                case ast.Expr(value=ast.Constant(value=str())) | ast.Pass():
+                    pass
+                case ast.Assign(targets=[target]):
+                    yield from self.assign(target, node.value)
+                case ast.AnnAssign(target=target, value=ast.expr() as value):
+                    yield from self.assign(target, value)
+                case ast.AugAssign():
+                    yield self.augment(node)
+                case ast.If():
+                    yield from self.branch(node)
+                case ast.For(target=ast.Name(id=name), orelse=[]):
+                    yield from self.loop(node, name)
+                case ast.While(orelse=[]):
+                    yield f"while ({self.truth(node.test)}) {{"
+                    yield from self.nested(self.block(node.body))
+                    yield "}"
+                case ast.Break() | ast.Continue():
+                    yield f"{ast.unparse(node)};"
+                case ast.Return(value=ast.expr() as value):
+                    yield from self.give(value)
+                case _:
+                    raise refuse(node, f"{type(node).__name__.lower()}")
+
+    def nested(self, lines: Iterator[str]) -> Iterator[str]:
+        """Yield lines that are translated as the inside of a block."""
+        self.depth += 1
+        yield from lines
+        self.depth -= 1
+
+    def assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
+        """Assign to one target, or to a tuple of them."""
+        if not isinstance(target, ast.Tuple | ast.List):
+            found = self.numeric(value)
+            yield f"{self.home(target, found.kind)} = {found.text};"
+            yield from self.unread([target])
+            return
+        targets, values = target.elts, self.parts(value, len(target.elts))
+        if values is not None and clash(targets, values):
+            yield "{"
+            yield from self.nested(self.at_once(targets, values))
+            yield "}"
+        elif values is not None:
+            for one, part in zip(targets, values, strict=True):
+                yield from self.assign(one, part)
+        elif isinstance(value, ast.IfExp):
+            yield f"if ({self.truth(value.test)}) {{"
+            yield from self.nested(self.assign(target, value.body))
+            yield "} else {"
+            yield from self.nested(self.assign(target, value.orelse))
+            yield "}"
+        elif isinstance(value, ast.Call):
+            yield from self.unpack(targets, value)
+        else:
+            raise refuse(value, "a tuple that is no call")
+
+    def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
+        """Assign values of which one reads an earlier target: all are computed first."""
+        found = [self.numeric(value) for value in values]
+        yield from (f"const {TYPES[v.kind]} new_{i} = {v.text};" for i, v in enumerate(found))
+        for i, (target, value) in enumerate(zip(targets, found, strict=True)):
+            yield f"{self.home(target, value.kind)} = new_{i};"
+
+    def parts(self, value: ast.expr, count: int) -> Sequence[ast.expr] | None:
+        """Return the expressions of a tuple, or the elements of memory; None where neither is given."""
+        if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == count:
+            return value.elts
+        if isinstance(value, ast.Name) and self.kinds.get(value.id) == "memory":
+            return [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(count)]
+        return None
+
+    def unpack(self, targets: Sequence[ast.expr], call: ast.Call) -> Iterator[str]:
+        """Assign the results of a function that has several."""
+        values = [self.value(a) for a in call.args]
+        kinds, beginning = self.program.function(self.callee(call), values, call.args)
+        if len(kinds) != len(targets):
+            raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
+        homes = []
+        for target, kind in zip(targets, kinds, strict=True):
+            home = self.home(target, kind)
+            if " " in home:  # declared here
+                yield f"{home};"
+            homes.append(f"&{home.rpartition(' ')[2]}")
+        yield f"{beginning}{', ' * (not beginning.endswith('('))}{', '.join(homes)});"
+        yield from self.unread(targets)
+
+    def home(self, target: ast.expr, kind: str) -> str:
+        """Return a target that gets a value of a kind, after its type where this declares it.
+
+        A variable is declared where it first gets a value; inside a block, at the beginning of the function.
+        """
+        if isinstance(target, ast.Subscript) and (value := self.value(target)).kind == "real":
+            return value.text
+        name = target.id if isinstance(target, ast.Name) else ""
+        if not name or self.kinds.get(name) in ARGUMENTS or name in self.constants:
+            raise refuse(target, "an assignment to this")
+        self.kinds[name] = kind = wider(self.kinds.get(name, kind), kind)
+        self.names[name] = Value(self.c_name(name), kind)
+        if name not in self.declared:
+            self.declared.add(name)
+            if self.depth == 0:
+                return f"{TYPES[kind]} {self.c_name(name)}"
+            self.early.add(name)
+        return self.c_name(name)
+
+    def unread(self, targets: Sequence[ast.expr]) -> Iterator[str]:
+        """Name variables declared here that nothing reads: compilers warn of them."""
+        for target in targets if self.depth == 0 else ():
+            if isinstance(target, ast.Name) and target.id not in self.read:
+                yield f"(void){self.c_name(target.id)};"
+
+    def augment(self, node: ast.AugAssign) -> str:
+        """Translate target op= value."""
+        found = self.numeric(ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value))
+        target = self.home(node.target, found.kind)
+        if type(node.op) in OPERATORS and found.kind not in WHOLE_KINDS:
+            return f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
+        return f"{target} = {found.text};"
+
+    def branch(self, node: ast.If, word: str = "if") -> Iterator[str]:
+        """Translate if, elif and else."""
+        yield f"{word} ({self.truth(node.test)}) {{"
+        yield from self.nested(self.block(node.body))
+        if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
+            yield from self.branch(node.orelse[0], "} else if")
+            return
+        if node.orelse:
+            yield "} else {"
+            yield from self.nested(self.block(node.orelse))
+        yield "}"
+
+    def loop(self, node: ast.For, variable: str) -> Iterator[str]:
+        """Translate for i in range(...) with a step of 1 or -1."""
+        call = node.iter
+        if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range" and 1 <= len(call.args) <= 3):
+            raise refuse(call, "a loop over anything but a range")
+        if changed(node.body) & names_in([node.target, *call.args]):
+            raise refuse(call, "a loop that changes its own variable or range")
+        step = self.constant(call.args[2]) if len(call.args) == 3 else 1
+        bounds = [self.numeric(a) for a in call.args[:2]]
+        if any(b.kind != "int" for b in bounds) or step not in (1, -1):
+            raise refuse(call, "a range of other than whole numbers one apart")
+        if variable in self.declared:
+            raise refuse(node.target, "a loop over a variable that there is already")
+        name = self.c_name(variable)
+        self.names[variable] = Value(name, "int")
+        first, last = bounds if len(bounds) == 2 else (Value("0", "int"), bounds[0])
+        sign, change = ("<", "++") if step == 1 else (">", "--")
+        yield f"for (int32_t {name} = {first.text}; {name} {sign} {last.within(SUM)}; {name}{change}) {{"
+        yield from self.nested(self.block(node.body))
+        yield "}"
+        del self.names[variable]
+
+    def give(self, value: ast.expr) -> Iterator[str]:
+        """Translate return."""
+        found = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        self.results = self.results or [v.kind for v in found]
+        if len(found) != len(self.results) or (self.law and len(found) != 2):
+            raise refuse(value, "another number of results")
+        self.results = [wider(one, v.kind) for one, v in zip(self.results, found, strict=True)]
+        if len(found) == 1:
+            yield f"return {found[0].text};"
+            return
+        yield from (f"{f'out[{i}]' if self.law else f'*out_{i}'} = {v.text};" for i, v in enumerate(found))
+        yield "return 0;" if self.law else "return;"
+
+    # expressions
+
+    def value(self, node: ast.expr) -> Value:
+        """Translate an expression that is a number or one of the law's arguments."""
+        method: Callable[[Any], Value] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if method is None:
+            raise refuse(node, f"{type(node).__name__}")
+        return method(node)
+
+    def numeric(self, node: ast.expr) -> Value:
+        """Translate an expression that is a number."""
+        value = self.value(node)
+        if value.kind in ARGUMENTS:
+            raise refuse(node, f"{value.text} as a number")
+        return value
+
+    def truth(self, node: ast.expr) -> str:
+        """Translate an expression as a condition."""
+        value = self.numeric(node)
+        return value.text if value.kind in WHOLE_KINDS else f"{value.within(UNARY)} != 0"
+
+    def constant(self, node: ast.expr) -> float | None:
+        """Return the literal number that an expression is, or None."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            value = self.constant(node.operand)
+            return None if value is None else -value
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return node.value
+        return self.constants.get(node.id) if isinstance(node, ast.Name) else None
+
+    def thing(self, node: ast.expr) -> Any:
+        """Return what a global name stands for, dotted or not; None for a variable."""
+        if isinstance(node, ast.Name):
+            return None if node.id in self.names else self.globals.get(node.id, getattr(builtins, node.id, None))
+        if isinstance(node, ast.Attribute) and isinstance(home := self.thing(node.value), ModuleType):
+            return getattr(home, node.attr, None)
+        return None
+
+    def callee(self, node: ast.Call) -> Any:
+        """Return the function that is called."""
+        function = self.thing(node.func)
+        if function is None:
+            raise refuse(node, "a call")
+        return function
+
+    def _constant(self, node: ast.Constant) -> Value:
+        return literal(node.value, self.program.single, node)
+
+    def _name(self, node: ast.Name) -> Value:
+        if node.id in self.names:
+            return self.names[node.id]
+        if node.id not in self.globals:
+            raise refuse(node, "a name without a value")
+        return literal(self.globals[node.id], self.program.single, node)
+
+    def _attribute(self, node: ast.Attribute) -> Value:
+        if (constant := self.thing(node)) is not None:
+            return literal(constant, self.program.single, node)
+        home, name = self.value(node.value), node.attr
+        if home.kind == "y":
+            known(name, "measurement", Measurement._fields)
+            return Value(f"{home.text}->{name}", "real")
+        if home.kind == "gains":
+            known(name, "gain", self.program.gains)
+            return Value(f"{home.text}[GAIN_{plain(name)}]", "real")
+        raise refuse(node, "an attribute")
+
+    def _subscript(self, node: ast.Subscript) -> Value:
+        array, index = self.thing(node.value), self.numeric(node.slice)
+        if index.kind != "int":
+            raise refuse(node, "an index that is no whole number")
+        if isinstance(array, tuple | list | np.ndarray):
+            made = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
+            return Value(f"{made.text}[{index.text}]", made.kind)
+        home = self.value(node.value)
+        if home.kind != "memory":
+            raise refuse(node, "an element")
+        place = self.constant(node.slice)
+        if place is None or place < 0:
+            why = "at a place that is no constant" if place is None else "counted from its end"
+            raise refuse(node, f"memory {why}")
+        self.program.slots = max(self.program.slots, int(place) + 1)
+        return Value(f"{home.text}[{index.text}]", "real")
+
+    def _unaryop(self, node: ast.UnaryOp) -> Value:
+        if isinstance(node.op, ast.Not):
+            return Value(f"!({self.truth(node.operand)})", "bool", UNARY)
+        value = self.numeric(node.operand)
+        if isinstance(node.op, ast.UAdd):
+            return value
+        if not isinstance(node.op, ast.USub):
+            raise refuse(node, "the operator")
+        return Value(f"-{value.within(ATOM)}", "int" if value.kind == "bool" else value.kind, UNARY)
+
+    def _binop(self, node: ast.BinOp) -> Value:
+        if isinstance(node.op, ast.Pow):
+            return self._power(node)
+        left, right = self.numeric(node.left), self.numeric(node.right)
+        whole = left.kind in WHOLE_KINDS and right.kind in WHOLE_KINDS
+        if type(node.op) in BITS:
+            if not whole:
+                raise refuse(node, "an operation on bits of what is no whole number")
+            return Value(f"{left.within(ATOM)} {BITS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
+        if type(node.op) not in OPERATORS:
+            raise refuse(node, f"the operator {type(node.op).__name__}")
+        sign, level = OPERATORS[type(node.op)]
+        first, kind = left.within(level), wider(left.kind, right.kind)
+        if whole:
+            kind = "int"
+            if sign == "/":
+                first, kind = f"(smc_real){left.within(UNARY)}", "real"
+        return Value(f"{first} {sign} {right.within(level + 1)}", kind, level)
+
+    def _power(self, node: ast.BinOp) -> Value:
+        base, exponent = self.numeric(node.left), self.constant(node.right)
+        if base.kind in WHOLE_KINDS:
+            raise refuse(node, "a power of a whole number")
+        if exponent == 1:
+            return base
+        if exponent == 0.5:
+            return self.math("sqrt", [base])
+        if (power := f"raised_{exponent}") in POWERS or exponent == 2:
+            return Value(f"{self.program.helper(power.removesuffix('.0'), base.kind)}({base.text})", base.kind)
+        power = self.numeric(node.right)
+        if power.kind in WHOLE_KINDS:
+            raise refuse(node, "a power with such an exponent")
+        return self.math("pow", [base, power])
+
+    def _compare(self, node: ast.Compare) -> Value:
+        terms = [self.numeric(n).within(SUM) for n in (node.left, *node.comparators)]
+        if any(type(sign) not in COMPARISONS for sign in node.ops):
+            raise refuse(node, "the comparison")
+        pairs = zip(itertools.pairwise(terms), node.ops, strict=True)
+        parts = [f"{one} {COMPARISONS[type(sign)]} {other}" for (one, other), sign in pairs]
+        return Value(" && ".join(parts), "bool", LOOSE)
+
+    def _boolop(self, node: ast.BoolOp) -> Value:
+        values = [self.numeric(v) for v in node.values]
+        if any(v.kind != "bool" for v in values):
+            raise refuse(node, "`and` or `or` of what is no comparison")
+        # a plain comparison needs no parentheses, a chain of them or another operator does
+        parts = [f"({v.text})" if "&&" in v.text or "||" in v.text else v.text for v in values]
+        return Value((" && " if isinstance(node.op, ast.And) else " || ").join(parts), "bool", LOOSE)
+
+    def _ifexp(self, node: ast.IfExp) -> Value:
+        yes, no, test = self.numeric(node.body), self.numeric(node.orelse), self.truth(node.test)
+        test = f"({test})" if " " in test else test
+        return Value(f"{test} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
+
+    def _call(self, node: ast.Call) -> Value:
+        if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
+            raise refuse(node, "a call with names or stars")
+        function, values = self.callee(node), [self.value(a) for a in node.args]
+        if (built_in := self.built_in(function, values, node)) is not None:
+            return built_in
+        kinds, beginning = self.program.function(function, values, node.args)
+        if len(kinds) != 1:
+            raise refuse(node, "several results within an expression")
+        return Value(f"{beginning})", kinds[0])
+
+    def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
+        """Translate a call of a function that Python or numpy has built in; None for another function."""
+        if function in (min, max):
+            return self.extreme("least" if function is min else "most", values, node)
+        if function in CASTS and len(values) == 1:
+            kind = CASTS[function]
+            return Value(f"({TYPES[kind]}){values[0].within(UNARY)}", kind, UNARY)
+        if function in (abs, math.fabs):
+            if values[0].kind in WHOLE_KINDS:
+                return Value(f"{self.program.helper('size', 'int')}({values[0].text})", "int")
+            return self.math("fabs", values)
+        if function in ROUNDING:
+            return Value(f"(int32_t){self.math(ROUNDING[function], values).text}", "int", UNARY)
+        return self.math(function.__name__, values) if function in SAME_IN_C else None
+
+    def extreme(self, helper: str, values: list[Value], node: ast.Call) -> Value:
+        """Translate min or max, from left to right."""
+        if len(values) == 1:
+            raise refuse(node, "min or max of one thing")
+        found = values[0]
+        for value in values[1:]:
+            kind = wider(found.kind, value.kind)
+            found = Value(f"{self.program.helper(helper, kind)}({found.text}, {value.text})", kind)
         return found
 
-
-def _product(exponent: int) -> str:
-    """a to a whole power as numba multiplies it out: squares, from the lowest bit."""
-    result, square = "", "a"
-    while exponent:
-        if exponent & 1:
-            result = f"{result} * {square}" if result else square
-        exponent >>= 1
-        square = f"({square} * {square})" if square != "a" else "(a * a)"
-    return re.sub(r"^\((.*)\)$", r"\1", result) if result.count("(") == 1 and result.startswith("(") else result
+    def math(self, name: str, values: Sequence[Value]) -> Value:
+        """Translate a call of a function of math.h, in the precision of its arguments."""
+        single = all(v.kind == "single" for v in values)
+        suffix = "f" if single or self.program.single else ""
+        return Value(f"{name}{suffix}({', '.join(v.text for v in values)})", "single" if single else "real")
 
 
-def _exponent(tree: ast.FunctionDef, name: str) -> bool:
-    """Whether a function raises anything to its argument's power."""
-    powers = [n for n in ast.walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Pow)]
-    return any(isinstance(n.right, ast.Name) and n.right.id == name for n in powers)
+# Python as it was written
+
+
+def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
+    """Return a Python function, compiled or not, and its syntax tree."""
+    written = getattr(function, "py_func", function)
+    if not isinstance(written, FunctionType):
+        raise refuse(None, f"{getattr(function, '__name__', function)}, which is no function of Python's,")
+    try:
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(written))).body
+    except (OSError, SyntaxError, ValueError):
+        raise refuse(None, f"{written.__name__}, whose source is not at hand,") from None
+    if not isinstance(tree, ast.FunctionDef):
+        raise refuse(tree, "what is no def")
+    return written, tree
+
+
+def names_in(nodes: Iterable[ast.AST]) -> set[str]:
+    """Return the names in some code."""
+    return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
+
+
+def changed(nodes: Iterable[ast.AST]) -> set[str]:
+    """Return the names of variables that some code changes, and of arrays of which it changes an element."""
+    inside = [n for node in nodes for n in ast.walk(node) if isinstance(getattr(n, "ctx", None), ast.Store)]
+    return names_in(n.value if isinstance(n, ast.Subscript) else n for n in inside)
+
+
+def returns(body: Sequence[ast.stmt]) -> bool:
+    """Return whether some code always ends in a return."""
+    match body[-1]:
+        case ast.If(body=yes, orelse=no):
+            return bool(no) and returns(yes) and returns(no)
+        case last:
+            return isinstance(last, ast.Return)
+
+
+def clash(targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> bool:
+    """Return whether a value reads an earlier target, so that the assignments cannot be made one after the other."""
+    return any(names_in(targets[:i]) & names_in([value]) for i, value in enumerate(values))
+
+
+def known(name: str, kind: str, names: Iterable[str]) -> None:
+    """Refuse a name that is not among those that a law can read."""
+    if name not in names:
+        raise Untranslatable(f"it reads an {unknown(kind, name, names)}")
+
+
+def refuse(node: ast.AST | None, what: str) -> Untranslatable:
+    """Return the error for a piece of Python."""
+    code = f" ({shown(ast.unparse(node))[1:-1]})" if node is not None else ""
+    return Untranslatable(
+        f"{what}{code} has no translation into C: write it with arithmetic, if, for and math's functions"
+    )
+
+
+# C as it is written
+
+
+def wider(one: str, other: str) -> str:
+    """Return the kind of an operation on two kinds, as C and numba agree. A whole number and a single give a real."""
+    if "single" in (one, other) and (one in WHOLE_KINDS or other in WHOLE_KINDS):
+        return "real"
+    return max(one, other, key=KINDS.index)
+
+
+def literal(value: Any, single: bool, node: ast.AST) -> Value:
+    """Return a number of Python's in C.
+
+    Args:
+      single: whether smc_real is float.
+      node: where it stands, for an error.
+    """
+    kind = "single" if type(value) is np.float32 else "real"
+    if isinstance(value, bool):
+        return Value(str(int(value)), "bool")
+    if type(value).__name__.startswith("int"):
+        n = int(value)
+        if not -(2**31) < n < 2**31:
+            raise refuse(node, f"the whole number {n}, beyond 32 bits,")
+        return Value(str(n), "int", ATOM if n >= 0 else UNARY)
+    try:
+        x = float(value)
+    except (TypeError, ValueError):
+        raise refuse(node, f"the value {shown(value)}") from None
+    if math.isnan(x) or math.isinf(x):
+        return Value("NAN" if math.isnan(x) else "INFINITY" if x > 0.0 else "-INFINITY", kind, UNARY)
+    text = repr(x)
+    return Value(text + "f" * (single or kind == "single"), kind, UNARY if text.startswith("-") else ATOM)
+
+
+def plain(name: str) -> str:
+    """Return a name in letters that C99 takes everywhere: ASCII."""
+    return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
 
 
 def rows(items: Sequence[str]) -> str:
-    """Items in lines of at most 100 letters."""
-    lines, line = [], "   "
-    for item in items:
-        if len(line) + len(item) > 98:
-            lines, line = [*lines, line], "   "
-        line += f" {item},"
-    return "\n".join([*lines, line])
+    """Return items in lines of at most 100 characters."""
+    text = ", ".join(items) + ","
+    return textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="    ")

@@ -15,7 +15,9 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
         "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),
         "k0": Gain(0.0, FORCE, nonnegative=True, held=True),
-    }
+    },
+    short="AD",
+    colour="#D55E00",
 )
 def adaptive(y, gains, memory):
     s, eq = sliding(y, gains.c)

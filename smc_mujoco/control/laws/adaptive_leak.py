@@ -17,7 +17,9 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
         "leak": Gain(3.0, RATE, nonnegative=True),
         "deadzone": Gain(0.05, SPEED, nonnegative=True),
         "k0": Gain(0.0, FORCE, nonnegative=True, held=True),
-    }
+    },
+    label="Adaptive + leak",
+    colour="#56B4E9",
 )
 def adaptive_leak(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -5,8 +5,16 @@ s' = u + d. Sampled, the layer must be wider than one step: phi > g k dt / 2, or
 Source: J.-J. Slotine, "Sliding controller design for non-linear systems", Int. J. Control 40(2):421, 1984.
 """
 
+import numpy as np
+
+from smc_mujoco.control.component import Rest
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, SPEED, Gain
+
+REST = Rest(
+    linear=lambda g: (g.k / g.phi, g.c),
+    force=lambda g, x: g.k * np.clip(g.c * x / g.phi, -1.0, 1.0),
+)
 
 
 @law_function(
@@ -14,7 +22,9 @@ from smc_mujoco.control.units import FORCE, RATE, SPEED, Gain
         "k": Gain(6.0, FORCE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),
         "phi": Gain(0.5, SPEED, positive=True),
-    }
+    },
+    colour="#CC79A7",
+    rest=REST,
 )
 def boundary_layer(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -8,7 +8,11 @@ from smc_mujoco.control.law import command, law_function, sgn, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)})
+@law_function(
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+    short="CL",
+    colour="#E69F00",
+)
 def classical(y, gains, memory):
     s, eq = sliding(y, gains.c)
     return command(y, eq - gains.k * sgn(s)), s

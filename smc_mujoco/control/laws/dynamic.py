@@ -20,6 +20,7 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
         "c": Gain(2.5, RATE, nonnegative=True),
     },
     memory=3,
+    short="DY",
 )
 def dynamic(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -21,6 +21,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
         "q": Gain(1.5, RATE, nonnegative=True),
     },
     memory=3,
+    short="IN",
 )
 def integral(y, gains, memory):
     s0, eq = y.de + gains.c * y.e, -gains.c * y.de  # the loop that is imposed, not what the law knows of the plant

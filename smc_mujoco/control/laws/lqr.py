@@ -25,6 +25,8 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, Gain, Unit
         "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
     },
     relative_degree=2,
+    label="LQR",
+    short="LQR",
 )
 def lqr(y, gains, memory):
     a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)

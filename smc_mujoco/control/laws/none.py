@@ -6,6 +6,6 @@ The baseline that shows what the plant does by itself, with or without a model; 
 from smc_mujoco.control.law import law_function
 
 
-@law_function()
+@law_function(label="No control", colour="#6E7781")
 def none(y, gains, memory):
     return 0.0, 0.0

@@ -8,11 +8,22 @@ variable as s - u/g; the law uses neither g nor that variable, so the trace hold
 
 import math
 
+import numpy as np
+
+from smc_mujoco.control.component import Rest
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
+REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g.k1 * x))
 
-@law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
+
+@law_function(
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+    label="Observer-free",
+    short="OF",
+    colour="#0072B2",
+    rest=REST,
+)
 def observer_free(y, gains, memory):
     s, eq = sliding(y, gains.k1)
     return command(y, eq - gains.lam * math.tanh(s)), s

@@ -25,7 +25,10 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, RATE, Ga
         "k2": Gain(4.4, FORCE_RATE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),
         "w_max": Gain(math.inf, FORCE, nonnegative=True, held=True),
-    }
+    },
+    label="Super-twisting",
+    short="ST",
+    colour="#009E73",
 )
 def super_twisting(y, gains, memory):
     s, eq = sliding(y, gains.c)

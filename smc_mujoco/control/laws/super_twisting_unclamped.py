@@ -16,7 +16,8 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
         "k1": Gain(3.0, FORCE_PER_ROOT, nonnegative=True),
         "k2": Gain(4.4, FORCE_RATE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),
-    }
+    },
+    label="Super-twisting, unclamped",
 )
 def super_twisting_unclamped(y, gains, memory):
     s, eq = sliding(y, gains.c)

@@ -22,6 +22,7 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     memory=1,
     relative_degree=2,
     conditions={"1/2 < p < 1": lambda g: 0.5 < g.p < 1.0},
+    short="TE",
 )
 def terminal(y, gains, memory):
     s, eq = y.de + gains.b * power(y.e, gains.p), 0.0

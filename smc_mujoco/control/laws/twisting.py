@@ -16,6 +16,7 @@ from smc_mujoco.control.units import FORCE, Gain
     memory=1,
     relative_degree=2,
     conditions={"r1 > r2": lambda g: g.r1 > g.r2},
+    short="TW",
 )
 def twisting(y, gains, memory):
     return command(y, -gains.r1 * sgn(y.e) - gains.r2 * sgn(y.de)), y.e

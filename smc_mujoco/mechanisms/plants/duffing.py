@@ -95,6 +95,8 @@ def spring_fields(model, p):
 
 DUFFING = Plant(
     name="duffing",
+    label="Duffing oscillator",
+    short="Duffing",
     parameters={"M": 1.0, "delta": 0.2, "alpha": -1.0, "beta": 1.0},  # kg, N s/m, N/m, N/m^3
     mass="M",
     unit="m",
@@ -103,6 +105,7 @@ DUFFING = Plant(
     fields=fields,
     nominal=nominal,
     lane=(0.0, 1.0, 0.0),
+    jumps={"mild": {"alpha": 3.0}, "hard": {"alpha": 27.684}},
     contacts={
         "floor": on_floor,
         "stops": stops,

@@ -46,6 +46,7 @@ INVERTED_PENDULUM_NETWORK = Plant(
     fields=fields,
     nominal=nominal,
     lane=(1.15, 0.96, 0.0),  # across the view of `look`
+    jumps={"mild": {"mass": 2.0}, "hard": {"mass": 22.681}},
     contacts={"bobs": pendulum_row.bobs},
     mechanisms={"springs": Variant(pendulum_row.springs, spring_fields)},
 )

@@ -112,6 +112,8 @@ def spring_fields(model, p):
 
 VAN_DER_POL = Plant(
     name="van_der_pol",
+    label="Van der Pol oscillator",
+    short="Van der Pol",
     parameters={"M": 1.0, "mu": 1.0, "k": 1.0},  # kg, N s/m, N/m
     mass="M",
     unit="m",
@@ -120,6 +122,7 @@ VAN_DER_POL = Plant(
     fields=fields,
     nominal=nominal,
     lane=(0.0, 0.9, 0.0),
+    jumps={"mild": {"mu": 3.0}, "hard": {"mu": 9.0}},
     contacts={
         "floor": on_floor,
         "stops": stops,

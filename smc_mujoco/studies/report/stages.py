@@ -187,7 +187,7 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
                 its = result.shipped(plant, law)
             except ScenarioError:
                 continue
-            best = min(its.history, key=lambda e: e.objective)
+            best = min(its.finals, key=lambda e: e.objective)  # whose gains are taken; the front is of these too
             found.append(
                 Front(
                     plant=plant,

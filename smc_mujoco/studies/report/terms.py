@@ -97,8 +97,8 @@ STATISTICS = (
     Term(
         "tracking",
         "tracking",
-        "The first term of the objective of tuning: ITAE over the sum of |x0|, in s², summed over a nominal, a "
-        "noisy and a delayed run.",
+        "The first term of the objective of tuning: ITAE over the sum of |x0|, in s², summed over the runs of "
+        "tuning: one in each of its seven conditions.",
     ),
     Term(
         "variation",

@@ -9,9 +9,13 @@ import inspect
 import math
 import re
 
+from smc_mujoco.analysis.margin_kinds import SPECS
 from smc_mujoco.common.text import number as written
 from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
+from smc_mujoco.draw.style import law_initials as short
+from smc_mujoco.draw.style import law_name as law
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.studies.paper.claims.verdict import MARKS
@@ -19,19 +23,6 @@ from smc_mujoco.studies.paper.claims.verdict import MARKS
 # What the overview compares, and what each asks for; the tables' columns.
 HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
 COLUMNS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
-METRICS = {
-    "settling_time": "settling time",
-    "ise": "ISE",
-    "iae": "IAE",
-    "itae": "ITAE",
-    "tv": "TV",
-    "tv_rate": "TV rate",
-    "max_u": "max |u|",
-    "ultimate_bound": "ultimate bound",
-    "steady_error": "steady error",
-    "overshoot": "overshoot",
-    "settles": "settles",
-}
 RANKED = ("settles", *HEADLINE)  # columns of the ranking by plant
 ASKS = {
     "settling_time": "fast",
@@ -39,31 +30,13 @@ ASKS = {
     "ultimate_bound": "accurate in the end",
     "tv_rate": "calm",
 }
-KINDS = {
-    "delay": "input delay",
-    "disturbance": "constant disturbance",
-    "friction": "dry friction",
-    "mass": "mass",
-    "noise": "position noise",
-}
-ABBREVIATIONS = {"pid": "PID", "lqr": "LQR"}
-PROPER = {"van": "Van", "der": "der", "pol": "Pol", "duffing": "Duffing"}
 
-__all__ = ["MARKS", "style"]
+__all__ = ["MARKS", "law", "short", "style"]
 
 
 def number(value: float) -> str:
     """Three significant digits; "never" for inf, "none" for NaN."""
     return "none" if math.isnan(value) else written(value)
-
-
-def law(name: str) -> str:
-    """A law's name as people write it; one of your own is called as you call it."""
-    from smc_mujoco.control.law import laws
-
-    named = style.law_name(name)
-    plain = ABBREVIATIONS.get(name, name.replace("_", " "))
-    return named if named != name or name not in laws() else plain[0].upper() + plain[1:]
 
 
 def colour(name: str) -> str:
@@ -78,8 +51,8 @@ def _colours() -> dict[str, str]:
 
 def plant(name: str) -> str:
     """A plant's name as people write it."""
-    words = " ".join(PROPER.get(word, word) for word in name.split("_"))
-    return words[:1].upper() + words[1:]
+    known = plants().get(name)
+    return (known and known.short) or style.in_words(name)
 
 
 def condition(name: str) -> str:
@@ -89,12 +62,12 @@ def condition(name: str) -> str:
 
 def kind(name: str) -> str:
     """A kind of margin as people write it."""
-    return KINDS.get(name, name.replace("_", " "))
+    return SPECS[name].label if name in SPECS else name.replace("_", " ")
 
 
 def metric(name: str) -> str:
     """A metric's name as people write it."""
-    return METRICS.get(name, name.replace("_", " "))
+    return catalogue.CATALOGUE[name].label if name in catalogue.CATALOGUE else name.replace("_", " ")
 
 
 def unit(name: str, plant_name: str | None = None) -> str:
@@ -118,24 +91,6 @@ def definition(name: str) -> str:
     return inspect.getdoc(known[name].formula) or ""
 
 
-def short(law_name: str) -> str:
-    """A law in two or three letters, for where there is room for no more."""
-    given = {
-        "observer_free": "OF",
-        "classical": "CL",
-        "adaptive": "AD",
-        "super_twisting": "ST",
-        "conditioned_super_twisting": "CS",
-        "boundary_layer": "BL",
-        "adaptive_leak": "AL",
-        "twisting": "TW",
-        "terminal": "TE",
-        "integral": "IN",
-        "dynamic": "DY",
-    } | ABBREVIATIONS
-    return given.get(law_name, "".join(word[:1] for word in law_name.split("_")).upper()[:3] or "?")
-
-
 def interval(median: float, low: float, high: float) -> str:
     """The interval about a median, "" where it is unknown, or too narrow to be seen in three digits."""
     if math.isnan(low) or math.isnan(high) or number(low) == number(median) == number(high):
@@ -151,7 +106,7 @@ def pretty(text: str) -> str:
     """A sentence of the audit, which is written in letters of a keyboard, with signs and names as people write them."""
     signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
     text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
-    names = {name: plant(name) for name in plants()} | {name: name_.lower() for name, name_ in style.NAMES.items()}
+    names = {name: plant(name) for name in plants()} | {name: style.law_name(name).lower() for name in laws()}
     named = "|".join(sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True))
     return re.sub(rf"\b({named})\b(?!_)", lambda m: names[m[1]], text)
 

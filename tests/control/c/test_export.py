@@ -16,7 +16,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common.remade import remade
-from smc_mujoco.control.c import build, child, export, trial
+from smc_mujoco.control.c import build, export, sandbox
 from smc_mujoco.control.c.load import CLaw
 from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement, catalogue, sliding
@@ -86,7 +86,7 @@ def unmeasured():
     """Files without the size of their code, and loaded untried, which takes a process or two for each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(export, "_measured", lambda code: "not measured")
-        patch.setattr(child, "attempt", lambda law: trial.facts(trial.entry(str(law.file), law.symbol)[1]))
+        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
         yield
 
 

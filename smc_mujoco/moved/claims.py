@@ -1,5 +1,0 @@
-"""smc_mujoco.studies.paper.claims, under its old name."""
-
-from smc_mujoco.moved import forward
-
-forward(__name__)
