@@ -50,10 +50,10 @@ FAILED = Text("failed", style="red")
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
 BOARD_KEY = (
-    "median, #place, {level:.3g} % interval over seeds; * none is better; a winner is better than every other law: its "
-    "median is lower by more than 3 %, and the seeds bear it out; over several conditions: median of their medians, "
-    "place by mean rank, won and lost under how many, and a winner wins under each; x, u of driven joints, in rad or "
-    "m, N m or N"
+    "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition; a winner is "
+    "better than every other law: its median is lower by more than 3 %, and the seeds bear it out; over several "
+    "conditions: median of their medians, place by mean rank, won and lost under how many, and a winner wins under "
+    "each; x, u of driven joints, in rad or m, N m or N"
 )
 NARROW = 6  # runs, with fewer of which no interval of a median covers 95 %, see `analysis.bootstrap`
 # Verdicts have a colour beside their mark, from a palette for the colour-blind.
@@ -296,6 +296,8 @@ def _winner_cell(board: Board | None) -> Text:
     text = Text("no winner\n", "dim")
     counts = {entry.law: (len(board.wins(entry.law)), len(board.losses(entry.law))) for entry in board.entries}
     if not any(wins for wins, _ in counts.values()):
+        if len(board.best) == 1 and not board.why:
+            return text.append("undefeated:\n").append(_folded(board.best[0], 12), style.law_colour(board.best[0]))
         return text.append(board.why or f"{len(board.best)} of {len(board.entries)}*")
     for law, (wins, losses) in counts.items():
         if wins:

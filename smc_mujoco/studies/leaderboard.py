@@ -127,7 +127,7 @@ class Board:
 
     @property
     def verdict(self) -> str:
-        """In words: "winner: classical", "classical wins under noise, loses under sine", or "no winner: ..."."""
+        """In words: the winner, or who wins and loses where, or why there is no winner, or who is undefeated."""
         if self.winner:
             return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
         told = []
@@ -139,7 +139,7 @@ class Board:
                 )
         if told:
             return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(told)}"
-        return f"no winner: {self.why or _listed(self.best)}"
+        return f"no winner: {self.why}" if self.why else f"no winner, undefeated: {_listed(self.best)}"
 
     @property
     def why(self) -> str:

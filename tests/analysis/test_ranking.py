@@ -335,6 +335,9 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     assert text.count("1 won 2 lost") == 3
     level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
     assert level.verdict == "no winner in all 2 conditions: a wins under c1"
+    first = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4), "c": blocks(4, 2.01)}), ["itae"])[0]
+    assert first.verdict == "no winner, undefeated: a"
+    assert "undefeated: a" in " ".join(printed([first]).split())
 
 
 def test_friedman_s_test_is_scipy_s_and_the_critical_difference_demsar_s():
@@ -406,7 +409,7 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
     assert itae.unit == "{x} s^2"
     settles = picked(boards, "settles", plant="duffing")
     assert [entry.interval.median for entry in settles.entries] == [1.0, 1.0, 0.0]
-    assert settles.verdict == "no winner: a, b"
+    assert settles.verdict == "no winner, undefeated: a, b"
     assert by_law(picked(boards, "settling_time", plant="duffing").entries)["c"].interval[:3] == (INF, INF, INF)
     failing = by_law(picked(boards, "settles", plant="van_der_pol").entries)["c"]
     assert failing.interval.median == 39 / 40
@@ -649,7 +652,7 @@ def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count
     table = stand({"a": blocks(1e-3), "b": blocks(2e-3)}, metric="ultimate_bound")
     assert leaderboard(table, ["ultimate_bound"])[0].winner == "a"
     table.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * 40)
-    assert leaderboard(table, ["ultimate_bound"])[0].verdict == "no winner: a, b"
+    assert leaderboard(table, ["ultimate_bound"])[0].verdict == "no winner, undefeated: a, b"
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,8 @@ class Standing(NamedTuple):
 class Loss(NamedTuple):
     """A cell in which another law is better than the paper's: medians, and its own over that of the best law.
 
-    `times` is a lower bound where the best is less than what rounding leaves of zero, see `rounded`.
+    `times` is a lower bound where the best is less than what rounding leaves of zero, see `rounded`. `settles` says
+    whether the best law settles there: who hardly acts may be calm, and never arrives.
     """
 
     metric: str
@@ -42,6 +43,7 @@ class Loss(NamedTuple):
     rival: float
     law: str
     times: float
+    settles: bool
 
     @property
     def rounded(self) -> bool:
@@ -129,7 +131,9 @@ def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
             times = own.median / max(best.median, ROUNDING)
-            lost.append(Loss(metric, plant, condition, own.median, best.median, best.law, times))
+            times_to_settle = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
+            settles = times_to_settle.get(best.law) != math.inf
+            lost.append(Loss(metric, plant, condition, own.median, best.median, best.law, times, settles))
     return sorted(lost, key=lambda loss: -loss.times)
 
 
