@@ -11,7 +11,8 @@ import numpy as np
 from smc_mujoco.analysis.margin_kinds import BEARS, DELAYS
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue, command, law_function, sliding
-from smc_mujoco.metrics import conventions, settling_time
+from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.catalogue import settling_time
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, bound, deviation, scale
