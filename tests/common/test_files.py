@@ -22,7 +22,7 @@ from smc_mujoco.common.files import from_json, plain, reading, to_json
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.paper.claims.audit import document
 from smc_mujoco.studies.paper.claims.verdict import Claim
-from smc_mujoco.studies.report.kept import kept
+from smc_mujoco.studies.report.plan import cached
 from smc_mujoco.testing import golden
 
 NUMBERS = (math.nan, math.inf, -math.inf, 0.1, -0.0)
@@ -181,7 +181,7 @@ def test_what_a_report_kept_is_computed_again_where_it_is_damaged(damage, tmp_pa
         return [odd]
 
     def get() -> list[Margin]:
-        return kept(tmp_path / "margins.json", [], make, save_margins, load_margins)
+        return cached(tmp_path / "margins.json", [], make, save_margins, load_margins)
 
     assert get() == get() == [odd]
     assert len(made) == 1

@@ -42,8 +42,7 @@ def report(
     from smc_mujoco.common.errors import whole
     from smc_mujoco.common.files import replacing
     from smc_mujoco.studies.report import page, stages
-    from smc_mujoco.studies.report.bars import Bars
-    from smc_mujoco.studies.report.plan import FULL, QUICK
+    from smc_mujoco.studies.report.plan import FULL, QUICK, Bars
 
     if why := extras.missing("report", "a report", "jinja2", "plotly"):
         raise extras.MissingPackageError(why)

@@ -17,7 +17,7 @@ from typing import Any
 
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import metrics as catalogue_of_metrics
-from smc_mujoco.studies.report import answer, charts, maps, terms, words
+from smc_mujoco.studies.report import answer, charts, definitions, maps, words
 from smc_mujoco.studies.report.findings import Findings, Gains, Score
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -225,8 +225,8 @@ def uri(kind: str, data: bytes | None) -> str:
 def method(findings: Findings) -> dict[str, Any]:
     """What the last section shows."""
     return {
-        "terms": terms.terms(list(dict.fromkeys(margin.kind for margin in findings.margins))),
-        "metrics": terms.definitions(),
+        "terms": definitions.terms(list(dict.fromkeys(margin.kind for margin in findings.margins))),
+        "metrics": definitions.metric_terms(),
         "gain_sets": list(dict.fromkeys(row.set for row in findings.about.gains)),
         "gain_laws": list(dict.fromkeys(row.law for row in findings.about.gains)),
         "gain_rows": gain_rows(findings.about.gains),

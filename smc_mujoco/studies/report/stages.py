@@ -1,9 +1,9 @@
-"""The stages of a report: grid, claims, margins, maps, fronts, scenes; each kept in the report's folder when done.
+"""The stages of a report: grid, claims, margins, maps, fronts, scenes.
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
-Killed and called again, nothing that was finished is computed again: the grid goes on within itself, the others with
-the first plant, map, film or list of claims that is missing.
+Killed and called again, the grid goes on within itself, the other stages with the first plant, map, film or list of
+claims that is missing.
 """
 
 import dataclasses
@@ -17,13 +17,12 @@ from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.grid import grid as make_grid
-from smc_mujoco.studies.report import about, films, scores
-from smc_mujoco.studies.report.bars import Bars
-from smc_mujoco.studies.report.findings import Field, Findings, Front
-from smc_mujoco.studies.report.kept import kept
-from smc_mujoco.studies.report.plan import GAINS, Plan
-from smc_mujoco.studies.report.scenes import all_scenes
-from smc_mujoco.studies.report.work import Work, part
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.report import about, films, scores, words
+from smc_mujoco.studies.report.findings import Field, Findings, Front, Scene
+from smc_mujoco.studies.report.plan import GAINS, Bars, Plan, Report, Work, cached, counted
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
@@ -32,12 +31,13 @@ FIELD_POINTS = 121  # of a map of V', along each axis
 
 
 def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
-    """Everything that a report tells, computed or read from the folder."""
+    """Return everything that a report tells, computed or read from the folder."""
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
     table = grid(work)
     judged = claims(work, table)
     margins = all_margins(work)
     compared, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
+    no_film = films.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
             scores=scores.scores(table),
@@ -49,25 +49,20 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
             by_set=compared,
             basins=basins,
             scenes=scenes,
-            about=about.about(plan, table, bars.spent, _no_film(plan)),
+            about=about.about(plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")),
         )
 
 
-def _no_film(plan: Plan) -> str | None:
-    why = films.missing() if plan.filmed else None
-    return why and why.removeprefix("no film: ")
-
-
 def grid(work: Work) -> Table:
-    """The table of runs."""
+    """Return the table of the grid's runs."""
     plan = work.plan
-    scenarios = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
-    with work.bars.stage("grid", f"{len(scenarios)} runs", bar=False):
-        return study(scenarios, work.folder / "study", threads=work.threads, progress=work.bars.shown)
+    runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
+    with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
+        return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown)
 
 
 def claims(work: Work, table: Table) -> tuple[Any, ...]:
-    """The claims, judged; the table's runs are not made again."""
+    """Return the claims, judged; the table's runs are not made again."""
     from smc_mujoco.studies.paper.claims.audit import claims as judge
     from smc_mujoco.studies.paper.claims.audit import evaluations
     from smc_mujoco.studies.paper.claims.verdict import Claim
@@ -75,13 +70,8 @@ def claims(work: Work, table: Table) -> tuple[Any, ...]:
     plan = work.plan
     total = evaluations(plan.claims, None, plan.quick)
     with work.bars.stage("claims", f"{total} judgements") as report:
-        done = [0]
-
-        def told(n: int) -> None:
-            done[0] += n
-            report(done[0], total)
-
-        return kept(
+        told = counted(report, total)
+        return cached(
             work.folder / "claims.json",
             [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
             lambda: tuple(judge(table, plan.claims, None, plan.quick, None, work.threads, told)),
@@ -91,14 +81,14 @@ def claims(work: Work, table: Table) -> tuple[Any, ...]:
 
 
 def all_margins(work: Work) -> tuple[Any, ...]:
-    """Every law's margins, plant by plant."""
+    """Return every law's margins, plant by plant."""
     plan = work.plan
     plants = plan.plants if plan.kinds else ()
     return _margins(work, "margins", GAINS, [(plant, plan.laws) for plant in plants], plan.kinds)
 
 
 def margins_by_set(work: Work, found: Sequence[Any]) -> dict[str, tuple[Any, ...]]:
-    """Set of gains -> margins of the kinds that are compared, of the laws that it has gains for."""
+    """Return set of gains -> margins of the kinds that are compared, of the laws that the set has gains for."""
     plan = work.plan
     if not plan.compared:
         return {}
@@ -120,52 +110,85 @@ def _has(plant: str, law: str, gains: str) -> bool:
 def _margins(
     work: Work, stage: str, gains: str, laws: Sequence[tuple[str, Sequence[str]]], kinds: Sequence[str]
 ) -> tuple[Any, ...]:
-    """Margins of kinds under a set of gains, of each plant's laws."""
-    from smc_mujoco.analysis.margins import load, margins, save
+    """Return margins of kinds under a set of gains, of each plant's laws."""
+    from smc_mujoco.analysis.margins import Margin, load, margins, save
 
-    plan, found = work.plan, []
-    with work.bars.stage(stage, f"{len(laws)} plants") as report:
-        for k, (plant, names) in enumerate(laws):
-            told = part(report, k, len(laws))
-            found += kept(
-                work.folder / f"{stage}-{plant}.json",
-                [names, kinds, plan.quick, gains],
-                lambda plant=plant, names=names, told=told: margins(
-                    [plant], names, kinds, gains=gains, quick=plan.quick, threads=work.threads, report=told
-                ),
-                save,
-                load,
-            )
-            report(k + 1, len(laws))
-    return tuple(found)
+    def compute(item: tuple[str, Sequence[str]], report: Report) -> list[Margin]:
+        plant, names = item
+        return cached(
+            work.folder / f"{stage}-{plant}.json",
+            [names, kinds, work.plan.quick, gains],
+            lambda: margins(
+                [plant], names, kinds, gains=gains, quick=work.plan.quick, threads=work.threads, report=report
+            ),
+            save,
+            load,
+        )
+
+    return tuple(margin for found in work.each(stage, "plants", laws, compute) for margin in found)
 
 
 def all_basins(work: Work) -> tuple[Any, ...]:
-    """The maps, one a plant and law."""
+    """Return the maps of regions of attraction, one for each plant and law."""
     from smc_mujoco.analysis.region_of_attraction import Basin, basin, load
 
-    plan, found = work.plan, []
+    plan = work.plan
+
+    def compute(pair: tuple[str, str], report: Report) -> Basin:
+        plant, law = pair
+        return cached(
+            work.folder / f"region-{plant}-{law}.json",
+            [plan.points, plan.region, GAINS],
+            lambda: basin(
+                plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=report
+            ),
+            Basin.save,
+            load,
+        )
+
     pairs = [(plant, law) for plant in plan.basins for law in plan.basin_laws]
-    with work.bars.stage("regions", f"{len(pairs)} maps") as report:
-        for k, (plant, law) in enumerate(pairs):
-            told = part(report, k, len(pairs))
-            found.append(
-                kept(
-                    work.folder / f"region-{plant}-{law}.json",
-                    [plan.points, plan.region, GAINS],
-                    lambda plant=plant, law=law, told=told: basin(
-                        plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=told
-                    ),
-                    Basin.save,
-                    load,
-                )
-            )
-            report(k + 1, len(pairs))
-    return tuple(found)
+    return tuple(work.each("regions", "maps", pairs, compute))
+
+
+def all_scenes(work: Work) -> tuple[Scene, ...]:
+    """Return runs beside each other: their curves, and films where something renders."""
+    plan = work.plan
+
+    def compute(at: tuple[str, str], report: Report) -> Scene:
+        plant, condition = at
+        runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
+        traces = run(list(runs.values()), work.threads)
+        film = poster = None
+        if at in plan.scenes[: plan.filmed] and films.missing() is None:
+            film, poster = _film(work, traces, plant, condition, report)
+        first = traces[0].scenario
+        return Scene(
+            plant=plant,
+            condition=condition,
+            unit=first.plant.unit,
+            u_max=first.u_max,
+            curves=tuple(films.curve(trace) for trace in traces),
+            film=film,
+            poster=poster,
+            seconds=plan.scene,
+        )
+
+    return tuple(work.each("scenes", "scenes", plan.scenes, compute))
+
+
+def _film(work: Work, traces: Sequence[Trace], plant: str, condition: str, report: Report) -> tuple[bytes, bytes]:
+    told = counted(report, round(work.plan.scene * films.FPS))
+    return cached(
+        work.folder / f"film-{plant}-{condition}.webm",
+        [work.plan.scene_laws, work.plan.scene, GAINS, films.SIZE, films.FPS, films.VP9],
+        lambda: films.film(traces, f"{words.plant(plant)}, {words.condition(condition)}", told),
+        films.save,
+        films.load,
+    )
 
 
 def fields(plan: Plan) -> tuple[Field, ...]:
-    """V' of the paper's law on the state plane of every plant."""
+    """Return V' of the paper's law on the state plane of every plant."""
     from smc_mujoco.studies.paper.claims import lyapunov
 
     found = []
@@ -179,7 +202,7 @@ def fields(plan: Plan) -> tuple[Field, ...]:
 
 
 def fronts(plan: Plan) -> tuple[Front, ...]:
-    """Error against effort, of the tunings that come with the package; none where it has none."""
+    """Return error against effort, of the tunings that come with the package."""
     found = []
     for plant in plan.plants:
         for law in plan.laws:

@@ -5,7 +5,6 @@ Colours and names are those of `draw.style`; numbers those of the terminal's tab
 
 import functools
 import html
-import inspect
 import math
 import re
 
@@ -83,12 +82,6 @@ def unit(name: str, plant_name: str | None = None) -> str:
 def typeset(unit: str) -> str:
     """A unit with its dots and powers: "rad s^2" as "rad·s²"."""
     return re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²")).replace(" ", "·")
-
-
-def definition(name: str) -> str:
-    """What a metric is: its docstring, whole."""
-    known = {m.name: m for m in catalogue.metrics()}
-    return inspect.getdoc(known[name].formula) or ""
 
 
 def interval(median: float, low: float, high: float) -> str:

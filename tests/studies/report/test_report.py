@@ -23,13 +23,12 @@ import pytest
 from smc_mujoco.analysis.tuning.result import Evaluation
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.simulation import run
+from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.studies.report import answer, charts, films, kept, page, panels, report, stages, words
+from smc_mujoco.studies.report import answer, charts, films, page, panels, report, stages, words
 from smc_mujoco.studies.report import scores as scores_of
-from smc_mujoco.studies.report.bars import Bars
 from smc_mujoco.studies.report.findings import Place, Score
-from smc_mujoco.studies.report.plan import QUICK
+from smc_mujoco.studies.report.plan import QUICK, Bars, cached
 
 TINY = dataclasses.replace(
     QUICK,
@@ -475,7 +474,13 @@ def test_numbers_off_an_axis_stand_at_its_end():
 
 
 def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
-    for name in ("basin.basin", "claims.claims", "margins.margins", "report.films.film", "executor.outcome"):
+    for name in (
+        "analysis.region_of_attraction.basin",
+        "analysis.margins.margins",
+        "studies.paper.claims.audit.claims",
+        "studies.report.films.film",
+        "studies.executors.outcome",
+    ):
         module, _, function = f"smc_mujoco.{name}".rpartition(".")
         monkeypatch.setattr(importlib.import_module(module), function, None)  # not to be called
     before = made.read_text(encoding="utf-8")
@@ -490,7 +495,7 @@ def test_a_stage_that_was_killed_leaves_nothing_behind_and_one_with_other_argume
 
     def keep(depends, make):
         write = lambda found, path: path.write_text(json.dumps(found))  # noqa: E731
-        return kept.kept(tmp_path / "a.json", depends, make, write, lambda path: json.loads(path.read_text()))
+        return cached(tmp_path / "a.json", depends, make, write, lambda path: json.loads(path.read_text()))
 
     with pytest.raises(KeyboardInterrupt):
         keep([1], killed)
