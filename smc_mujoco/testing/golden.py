@@ -1,49 +1,48 @@
 """Golden metrics: recorded by `pytest --smc-update` in a JSON file beside the test, and compared from then on.
 
-test_laws.golden.json, for test_laws.py: test -> metric -> value, tolerance, unit. Value and tolerance have the same
-unit; a test that names no tolerance has those of the file.
+The file of test_laws.py is test_laws.golden.json: test -> metric -> value, tolerance, unit. The unit is that of value
+and tolerance. A test that names no tolerance uses those of the file.
 """
 
 import contextlib
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.files import plain, read_json, replacing
-from smc_mujoco.testing.limits import Limit, answer, table, told
+from smc_mujoco.testing.limits import Limit, judge, told
 from smc_mujoco.testing.response import StepResponse
 
-RELATIVE = 0.01  # of the recorded value, chosen: what another processor's rounding does to a smooth law is far below
+RELATIVE = 0.01  # default tolerance, as a share of the value: far more than another processor's rounding, chosen
 UPDATE = "run pytest --smc-update"
-LEAST = 1e-9  # in the metric's unit: what rounding leaves of a metric that is 0
+LEAST = 1e-9  # least tolerance, in the metric's unit: more than rounding makes of 0
 
 
 def place(test: Path) -> Path:
-    """The golden file of a test file."""
+    """Return the golden file of a test file."""
     return test.with_suffix(".golden.json")
 
 
 def record(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Write a response's metrics and their tolerances into the file, under `key`; what is compared says `compare`.
+    """Write a response's metrics and their tolerances into the file, under `key`. Arguments as of `compare`.
 
     Raises:
-      ScenarioError: the run failed, or a tolerance is none.
+      ScenarioError: the run failed, a tolerance that is none, or a file that cannot be written.
     """
-    _asked(response, tolerances)
+    _checked(response, tolerances)
     names = tolerances if tolerances and rel is None else [name for name in response.values if response.tells(name)]
     entry = {}
     for name in names:
-        value = float(response.values[name])
+        value, unit = response.value(name)
         within = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
-        entry[name] = {"value": value, "tolerance": within, "unit": response.unit(name)}
+        entry[name] = {"value": value, "tolerance": within, "unit": unit}
     try:
         with locked(file.parent):
-            known = (read(file) if file.exists() else {}) | {key: entry}
-            text = json.dumps(plain(dict(sorted(known.items()))), indent=2, ensure_ascii=False, allow_nan=False)
+            text = json.dumps(plain(dict(sorted((read(file) | {key: entry}).items()))), indent=2, ensure_ascii=False)
             with replacing(file) as part:
                 part.write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
@@ -62,62 +61,46 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
       ScenarioError: a file that cannot be read, or a tolerance that is none.
     """
     __tracebackhide__ = True
-    _asked(response, tolerances)
+    _checked(response, tolerances)
     if response.failure is not None:
         raise AssertionError(f"{response}: {response.failure}")
-    known = read(file).get(key, {}) if file.exists() else {}
+    known = read(file).get(key, {})
     if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
-    names = list(tolerances if tolerances and rel is None else known)
+    names = tolerances if tolerances and rel is None else known
     try:
-        response.named(dict.fromkeys(names))
+        response.named(names)
     except ScenarioError as error:  # recorded by another version, or of another plant
         raise ScenarioError(f"{file.name}, {key}: {error}; or {UPDATE}") from None
-    golden = {name: _number(file, key, name, known, "value") for name in names}
-    asked = []
-    for name, value in golden.items():
-        given = rel is not None or name in tolerances
-        within = (
-            _tolerance(name, value, tolerances, rel or 0.0) if given else _number(file, key, name, known, "tolerance")
-        )
-        asked.append(_limit(response, name, value, within))
-    response.limits.extend(asked)
-    _judge(response, asked)
+    limits = []
+    for name in names:
+        (value, unit), golden = response.value(name), _recorded(file, key, name, known, "value")
+        if rel is None and name not in tolerances:
+            within = _recorded(file, key, name, known, "tolerance")
+        else:
+            within = _tolerance(name, golden, tolerances, rel or 0.0)
+        kept = value == golden or abs(value - golden) <= within
+        limits.append(Limit(name, told(value, unit), f"{told(golden)} ± {told(within)}", kept))
+    judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
-def _asked(response: object, tolerances: Mapping[str, float]) -> None:
-    """Raise ScenarioError for what is no response, and for tolerances of what it has no metric for."""
+def _checked(response: object, tolerances: Mapping[str, float]) -> None:
+    """Raise ScenarioError for what is no response, and for tolerances of metrics that it does not have."""
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.named(tolerances)
 
 
-def _judge(response: StepResponse, asked: Sequence[Limit]) -> None:
-    """Raise AssertionError where a metric is off."""
-    __tracebackhide__ = True
-    met = {name: told(response.values[name], response.unit(name)) for name, _, _ in asked}
-    if off := [f"{name} is {met[name]}, golden {words}" for name, words, kept in asked if not kept]:
-        lines = table(
-            ("metric", "value", "golden", "ok"), [(n, met[n], words, answer(kept)) for n, words, kept in asked]
-        )
-        raise AssertionError(f"{'; '.join(off)} ({response}; if it is meant, {UPDATE})\n{lines}")
-
-
-def _limit(response: StepResponse, name: str, golden: float, tolerance: float) -> Limit:
-    value = float(response.values[name])
-    kept = value == golden or abs(value - golden) <= tolerance
-    return Limit(name, f"{told(golden)} ± {told(tolerance)}", kept)
-
-
 def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
-    """In the metric's unit: the one that is named, or a share of the value; of inf, compared as it is, nothing."""
+    """Return a metric's tolerance in its unit: the one that is named, else a share of its value, 0 of inf."""
     if name in tolerances:
         return number(f"tolerance of {name}", tolerances[name], least=0.0)
     share = max(number("rel", rel, least=0.0) * abs(value), LEAST)
     return float(f"{share:.2g}") if math.isfinite(value) else 0.0
 
 
-def _number(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:
+def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:
+    """Return the value or the tolerance of a metric in the file."""
     try:
         return float(known[name][what])
     except (TypeError, KeyError, ValueError):
@@ -125,7 +108,7 @@ def _number(file: Path, key: str, name: str, known: Mapping[str, Any], what: str
 
 
 def read(file: Path) -> dict[str, dict[str, Any]]:
-    """What a golden file holds.
+    """Return what a golden file holds; {} where there is none.
 
     Raises:
       ScenarioError: it is no golden file.
@@ -135,6 +118,8 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
         if isinstance(found, dict) and all(isinstance(entry, dict) for entry in found.values()):
             return found
         why = "it is not test -> metric -> value"
+    except FileNotFoundError:
+        return {}
     except (OSError, ValueError) as error:
         why = str(error)
     raise ScenarioError(f"{file} cannot be read ({why}): delete it and {UPDATE}")
@@ -142,7 +127,7 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """One writer at a time in a folder, among the workers of a parallel session; on Windows no lock."""
+    """Let one worker of a parallel session at a time write into a folder. On Windows there is no lock."""
     try:
         import fcntl
     except ImportError:

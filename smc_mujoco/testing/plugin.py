@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 class Ledger(NamedTuple):
-    """What fixtures tell hooks: the responses of the test that runs, and pytest's temporary folder."""
+    """Responses of the test that runs, and pytest's temporary folder: fixtures write them, hooks read them."""
 
     responses: list[StepResponse]
     temporary: Path
 
 
 LEDGER = pytest.StashKey[Ledger]()
-GOLDEN = "smc_golden"  # the property of a report that names the file which a test recorded
+GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -76,12 +76,12 @@ def step_response(
     Example: r = step_response("duffing", my_law(k1=4.0), step=0.2, condition="noise", duration=5.0)
     Every metric is an attribute of r: assert r.settling_time < 2; r.check(settling_time=2, overshoot=5) tests several.
     """
+    from smc_mujoco.testing.limits import without_frames
     from smc_mujoco.testing.response import respond
-    from smc_mujoco.testing.sentence import mendable
 
     ledger = request.config.stash.setdefault(LEDGER, Ledger([], tmp_path_factory.getbasetemp()))
 
-    @mendable
+    @without_frames
     def run(plant, law, step, condition="nominal", **fields) -> StepResponse:
         ledger.responses.append(respond(plant, law, step, condition, fields))
         return ledger.responses[-1]
@@ -97,12 +97,12 @@ def golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     too: within that share of their recorded value, by default within 1 %.
     """
     from smc_mujoco.testing import golden as files
-    from smc_mujoco.testing.sentence import mendable
+    from smc_mujoco.testing.limits import without_frames
 
     file, update = files.place(request.path), request.config.getoption("smc_update")
     test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
 
-    @mendable
+    @without_frames
     def compare(response: StepResponse, rel: float | None = None, **tolerances: float) -> None:
         __tracebackhide__ = True
         key = test if (n := next(number)) == 1 else f"{test} {n}"
@@ -126,13 +126,10 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Add what the step responses of a failing test were to its report."""
+    """Add the step responses of a failing test to its report."""
     report = yield
     ledger = item.config.stash.get(LEDGER, None)
-    if ledger is None or call.when == "teardown":
-        return report
-    responses = _used(item, ledger)
-    if report.failed and responses:
+    if ledger and report.failed and call.when != "teardown" and (responses := _used(item, ledger)):
         from smc_mujoco.testing.report import report as tell
 
         config, out = item.config, item.config.getoption("smc_out")
@@ -140,13 +137,11 @@ def pytest_runtest_makereport(
         report.sections.append(
             ("step responses", tell(item.nodeid, responses, folder, bool(config.getoption("smc_video"))))
         )
-    for response in responses if call.when == "call" else ():
-        response.limits.clear()  # another test may share it, with limits of its own
     return report
 
 
 def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
-    """The responses that a test made, and those that it has from fixtures of a wider scope."""
+    """Return the responses that a test made, and those that it has from fixtures of a wider scope."""
     from smc_mujoco.testing.response import StepResponse
 
     fixed = [value for value in getattr(item, "funcargs", {}).values() if isinstance(value, StepResponse)]

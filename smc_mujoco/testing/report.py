@@ -1,4 +1,4 @@
-"""What a failing test reports of its step responses: a table of metrics, a figure, and a film where one is wanted."""
+"""The report of a failing test: tables of its step responses, a figure, and a film if one is wanted."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -7,11 +7,11 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.testing.response import StepResponse
 
-LONGEST = 150  # bytes of a test's id in a file's name, which most file systems bound at 255
+LONGEST = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
 
 
 def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
-    """Tables of all responses, then the files that show them: one figure and one film for each plant.
+    """Return tables of all responses, then the files that show them: one figure and one film for each plant.
 
     Args:
       test: its node id, of which the files' names are made.
@@ -27,28 +27,22 @@ def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bo
         title = test.rpartition("::")[2]
         files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
         if video:
-            files.append(_no_film() or _shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
+            files.append(_shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
     return "\n\n".join([*parts, "\n".join(dict.fromkeys(files))])
 
 
 def _shown(what: str, make: Callable[[], Path]) -> str:
-    """A line with the file that `make` wrote, or with why there is none."""
+    """Return a line with the file that `make` writes, or with the reason why there is none."""
     try:
         return f"{what}: {make()}"
     except Exception as error:  # a picture must not hide why the test failed
-        return f"no {what}: {error}"
+        return f"no {what}: {str(error).removeprefix(f'no {what}: ')}"
 
 
 def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
     from smc_mujoco.draw.figure import figure
 
     return next(file for file in figure(traces, path, title=title) if file.suffix == ".png")
-
-
-def _no_film() -> str | None:
-    from smc_mujoco.draw.film.film import missing
-
-    return missing()
 
 
 def _film(traces: Sequence[Trace], path: Path) -> Path:

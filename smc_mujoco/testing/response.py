@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.control.component import Component, Template
@@ -17,36 +17,33 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Step
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.testing.limits import Limit, Value, answer, bound, table, told
-from smc_mujoco.testing.sentence import mendable
+from smc_mujoco.testing.limits import bound, judge, table, told, without_frames
 
-TOLD = ("settling_time", "overshoot", "tv_rate")  # of the metrics, in one line
+TOLD = ("settling_time", "overshoot", "tv_rate")  # metrics in the response's repr
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StepResponse:
-    """What a law made of a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
+    """The response of a law to a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
 
-    Where some joints have no actuator, `r.scores` has each group of channels by itself, as `smc.scores`: of the pole on
-    a cart, r.scores["free"]["ultimate_bound"]. In `check` its name is "free ultimate_bound".
+    Where some joints have no actuator, `r.scores` has the metrics of each group of channels, as `smc.scores` does: of
+    the pole on a cart, r.scores["free"]["ultimate_bound"]. In `check` that metric is "free ultimate_bound".
 
-    A run that failed has no metrics: to ask for one is a ScenarioError that says when and why it failed.
+    A run that failed has no metrics: asking for one raises a ScenarioError that says when and why it failed.
 
     Attributes:
       trace: the Trace of the run; `scenario` is its Scenario, `failure` what went wrong in it, or None.
       step: height of the step, rad or m.
-      condition: in which it was run: of the study, and what else the test gave, in words; "" for nothing.
-      limits: what the test has asked of the metrics so far.
+      condition: the condition and the fields that the test gave, in words; "" for none.
     """
 
     trace: Trace
     step: float
     condition: str = ""
-    limits: list[Limit] = dataclasses.field(default_factory=list)
 
     @property
     def scenario(self) -> Scenario:
-        """All that defines the run."""
+        """The scenario of the run."""
         return self.trace.scenario
 
     @property
@@ -61,27 +58,24 @@ class StepResponse:
         Raises:
           ScenarioError: the run failed.
         """
-        return {name: Value(value, name, self.limits) for name, value in score(self.trace).items()}
+        return score(self.trace)
 
     @functools.cached_property
     def scores(self) -> Mapping[str, Mapping[str, float]]:
         """Every metric of each group of channels, by the group's name; raises as `metrics`."""
-        return {
-            group: {name: Value(value, self._label(group, name), self.limits) for name, value in values.items()}
-            for group, values in scores(self.trace).items()
-        }
+        return scores(self.trace)
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
-        """`metrics`, and of several groups of channels those of each, by its name and theirs: "free peak"."""
+        """`metrics`, and where there are several groups of channels those of each, as "free peak"."""
         groups = self.scores.items()
         each = {self._label(group, name): value for group, values in groups for name, value in values.items()}
         return dict(self.metrics) | each
 
-    @mendable
+    @without_frames
     def __getattr__(self, name: str) -> float:
         __tracebackhide__ = True  # of the AttributeError
-        if name.startswith("_") or name == "trace":  # what copying and inspecting ask for
+        if name.startswith("_") or name == "trace":  # asked for by copy and inspect
             raise AttributeError(name)
         if name in CATALOGUE and name in self.metrics:
             return self.metrics[name]
@@ -98,17 +92,14 @@ class StepResponse:
     def __repr__(self) -> str:
         how = f"failed, {self.failure}"
         if self.failure is None:
-            how = ", ".join(f"{name} {self._told(name)}" for name in TOLD if name in self.metrics)
+            how = ", ".join(f"{name} {told(*self.value(name))}" for name in TOLD if name in self.metrics)
         return f"StepResponse({self}: {how})"
 
-    def unit(self, name: str) -> str:
-        """The unit of one of the `values`."""
+    def value(self, name: str) -> tuple[float, str]:
+        """Return one of the `values`, and its unit."""
         group, _, metric = name.rpartition(" ")
         units = {each.name: each.unit for each in groups(self.scenario.plant)}
-        return CATALOGUE[metric].unit_for(units.get(group, self.scenario.plant.unit))
-
-    def _told(self, name: str) -> str:
-        return told(self.values[name], self.unit(name))
+        return self.values[name], CATALOGUE[metric].unit_for(units.get(group, self.scenario.plant.unit))
 
     def _unknown(self, name: str) -> ScenarioError:
         if name in CATALOGUE:
@@ -116,16 +107,16 @@ class StepResponse:
         return unknown("metric", name, CATALOGUE)
 
     def _label(self, group: str, metric: str) -> str:
-        """What a metric of a group is called in tables: by its name alone, where it is the one value of `metrics`."""
+        """Return the name of a group's metric in tables: its own if it is the one in `metrics`, else with the group."""
         alone = len(groups(self.scenario.plant)) == 1
         return metric if alone or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
 
     def tells(self, name: str) -> bool:
-        """Whether one of the `values` says something of this run: some are of realistic mechanisms alone."""
+        """Return whether one of the `values` says something of this run: some are of realistic mechanisms alone."""
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
-    def named(self, names: Mapping[str, object]) -> None:
-        """Raise ScenarioError for names that are not among the `values` of this run."""
+    def named(self, names: Iterable[str]) -> None:
+        """Raise ScenarioError for names that are not among the `values` of this run, which may have failed."""
         plant = self.scenario.plant
         known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
         known += [self._label(each.name, m.name) for each in groups(plant) for m in CATALOGUE.values() if m.fits(each)]
@@ -133,7 +124,7 @@ class StepResponse:
             if name not in known:
                 raise self._unknown(name)
 
-    @mendable
+    @without_frames
     def check(self, **limits: float | tuple[float, float]) -> None:
         """Assert limits on metrics, all of them: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
 
@@ -150,25 +141,13 @@ class StepResponse:
         self.named(limits)
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
-        asked = [bound(name, float(self.values[name]), wanted) for name, wanted in limits.items()]
-        self.limits.extend(asked)
-        missed = [limit for limit in asked if not limit.kept]
-        if missed:
-            words = "; ".join(f"{name} is {self._told(name)}, not {words}" for name, words, _ in missed)
-            raise AssertionError(f"{words} ({self})\n{self.table(list(limits))}")
+        judge([bound(name, *self.value(name), limit) for name, limit in limits.items()], "limit", "not", self)
 
-    def table(self, names: list[str] | None = None) -> str:
-        """Metric, value, limit and whether it is kept; of all metrics that say something of this run, or of those."""
+    def table(self) -> str:
+        """Return a table of the metrics that say something of this run, as text."""
         if self.failure is not None:
             return f"failed: {self.failure}"
-        asked = {limit.metric for limit in self.limits}
-        listed = names or [name for name in self.values if name in asked or self.tells(name)]
-        rows = []
-        for name in listed:
-            of = list(dict.fromkeys(limit for limit in self.limits if limit.metric == name))
-            kept = answer(all(limit.kept for limit in of)) if of else ""
-            rows.append((name, self._told(name), ", ".join(limit.words for limit in of), kept))
-        return table(("metric", "value", "limit", "ok"), rows)
+        return table(("metric", "value"), [(name, told(*self.value(name))) for name in self.values if self.tells(name)])
 
 
 def respond(
