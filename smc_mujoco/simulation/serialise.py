@@ -16,14 +16,14 @@ from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.channels import recorded
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
+from smc_mujoco.mechanisms.hardware import backlash, drives, friction  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation import references  # noqa: F401  # so that a file finds their parts
+from smc_mujoco.simulation import references, time_series  # noqa: F401  # whose signals a file may name
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Recorded, Signal
-from smc_mujoco.simulation.time_series import TimeSeries  # noqa: F401  # so that it is among the signals
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 PARTS = ("friction", "contact", "actuator", "sensor")

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
@@ -296,7 +297,7 @@ def test_tune_has_the_bound_of_a_grid(arm):
 def test_an_objective_of_ones_own_is_saved_and_read_back(arm, tmp_path):
     goal = Objective(conditions=("nominal", WORN), duration=0.5, starts=smc.starts(x0=0.4, by=0.1))
     found = smc.tune("duffing", "observer_free", 4, objective=goal)
-    assert smc.tuning.load(found.save(tmp_path / "it.json")) == found
+    assert result.load(found.save(tmp_path / "it.json")) == found
 
 
 # the command line

@@ -17,6 +17,7 @@ from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.coerce import REALISTIC_STEP, FilledName, FilledNumber
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.trace import ARRAYS
 
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
@@ -219,7 +220,7 @@ CONTACT_NUMBERS = [(name, contact) for name in smc.paper.GAINS for contact in sm
 
 def one_batch(scenarios):
     """Fail unless the scenarios share a layout, and run in one batch as they run alone, on any number of threads."""
-    assert len({runner.layout(s) for s in scenarios}) == 1
+    assert len({prepare(s).key for s in scenarios}) == 1
     alone = [smc.run(s, threads=1) for s in scenarios]
     for threads in (1, 3):
         for a, b in zip(alone, smc.run(scenarios, threads=threads), strict=True):
@@ -268,7 +269,7 @@ def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
 def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
     common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
     ideal, realistic = scenario(**common), scenario(**common, **fields)
-    assert runner.layout(ideal) != runner.layout(realistic)
+    assert prepare(ideal).key != prepare(realistic).key
     for s, trace in zip((realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True):
         same(trace, smc.run(s))
 

@@ -972,7 +972,7 @@ def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch):
 
 @pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])
 def test_another_error_is_not_taken_for_memory_that_ran_out(error):
-    with pytest.raises(type(error), match="sour"), RUN.memory_for([scenario()]):
+    with pytest.raises(type(error), match="sour"), RUN.memory_for([prepare(scenario())]):
         raise error
 
 

@@ -18,9 +18,14 @@ from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.coerce import U_MAX
-from smc_mujoco.simulation.conditions import (
+from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
+    DIFFERENCED,
+    JUMP_HARD,
+    JUMP_MILD,
     NAMED,
     REAL,
+    SENSOR_NOISE,
+    SINE,
     Condition,
     find_condition,
 )
