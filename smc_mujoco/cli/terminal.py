@@ -1,4 +1,4 @@
-"""What every command shares: errors as sentences, loading that Ctrl-C cannot break, and a clock."""
+"""What commands share: errors as sentences, loading that Ctrl-C cannot break, and a clock."""
 
 import contextlib
 import os
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def mendable() -> Iterator[None]:
-    """Errors that the user can mend, and Ctrl-C, as one sentence."""
+    """End the command with one sentence on an error that the user can mend, and on Ctrl-C."""
     try:
         yield
     except ScenarioError as error:

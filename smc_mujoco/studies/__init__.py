@@ -1,1 +1,1 @@
-"""Many questions, whose answers are kept."""
+"""Studies: grids of runs with stored results, and what is made of them."""

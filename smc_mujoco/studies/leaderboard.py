@@ -160,7 +160,7 @@ class Board:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names in a row; those of blocks, if these are cells, have a comma in them already."""
+    """Return names in a row, joined by semicolons where a name has a comma in it."""
     return ("; " if any("," in name for name in names) else ", ").join(names)
 
 
@@ -172,7 +172,7 @@ def leaderboard(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> list[Board]:
-    """The laws of a table, compared in each metric within each group.
+    """Compare the laws of a table in each metric within each group.
 
     Only cells - plant, condition, seed - that every law of the group has are compared; a run that failed is inf in all
     metrics. Seeds in which every law does the same are one sample. A metric that does not apply to a group has no board
@@ -214,7 +214,7 @@ def leaderboard(
 
 
 def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
-    """Block k of a group, which is number `at` of those compared."""
+    """Return block k of a group, which is number `at` of those compared."""
     plant, condition = group.blocks[k]
     return Block(
         plant=plant,
@@ -227,7 +227,7 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
 
 
 def _units(metrics: Sequence[str]) -> dict[str, str]:
-    """Name -> unit, of the metrics asked for."""
+    """Return name -> unit of the metrics asked for."""
     from smc_mujoco.metrics.catalogue import metrics as catalogue
 
     known = {SETTLES: ""} | {m.name: m.unit for m in catalogue()}
@@ -240,7 +240,7 @@ def _units(metrics: Sequence[str]) -> dict[str, str]:
 
 
 def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
-    """The laws' lines; `mixed` if there is no median, of values in several units."""
+    """Return the laws' lines; `mixed`: values have several units, so that there is no median."""
     lines, scores = [], dict(zip(found.laws, found.cells, strict=True))
     for rank in ranks(found, resamples, seed):
         by_cell = scores[rank.law]

@@ -1,4 +1,4 @@
-"""What a run is: the hash that tells it from others, the name of its condition, what a table's row says of it."""
+"""The identity of a run: its key, the name of its condition, and the columns of a table that describe it."""
 
 import functools
 import hashlib
@@ -23,14 +23,14 @@ LONGEST = 60  # characters of a condition's name
 
 
 def described(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data, the same for equal scenarios."""
+    """Return the scenario as plain data, the same for equal scenarios."""
     data = serialise.describe(scenario)
     del data["left_out"]
     return data
 
 
 def key(scenario: Scenario) -> str:
-    """A hash of all that decides what a run does: its scenario, the code of its parts and of the package, versions.
+    """Return a hash of everything that decides a run: its scenario, the code of its parts and of the package, versions.
 
     32 hex digits.
     """
@@ -38,7 +38,7 @@ def key(scenario: Scenario) -> str:
 
 
 def row(scenario: Scenario) -> dict[str, Any]:
-    """The columns of a table that say what ran."""
+    """Return the columns of a table that say what ran."""
     data = described(scenario)
     return {
         "hash": _key(scenario, data),
@@ -54,7 +54,7 @@ def row(scenario: Scenario) -> dict[str, Any]:
 
 
 def condition(scenario: Scenario) -> str:
-    """The name of the run's condition: given, the suite's own, or what sets it apart from the nominal one.
+    """Return the name of the run's condition: as given, the suite's own, or its differences from the nominal one.
 
     Plant, law, start, seed and duration are no conditions.
     """
@@ -69,7 +69,7 @@ def _key(scenario: Scenario, data: dict[str, Any]) -> str:
 
 
 def _codes(s: Scenario) -> list[str]:
-    """Hashes of the code that a run calls: of laws, estimators, surfaces and signals; of plants and parts of yours."""
+    """Return hashes of the code that a run calls: law, estimator, surface, signals, plants and parts of yours."""
     functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
     signals = [type(signal) for signal in (s.reference, *s.disturbance)]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
@@ -99,7 +99,7 @@ def _compared(data: dict[str, Any]) -> str:
 
 @functools.lru_cache(maxsize=256)
 def _conditions(plant: Plant, duration: float) -> dict[str, str]:
-    """What runs of a plant look like in the paper's conditions -> their names, the nominal one first."""
+    """Return what runs of a plant look like in the suite's conditions -> names of these, the nominal one first."""
     found: dict[str, str] = {}
     for name in NAMED:
         try:

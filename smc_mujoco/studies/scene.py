@@ -79,7 +79,7 @@ class Scene:
             raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
 
     def seeded(self, seed: int) -> "Scene":
-        """The same scene with another seed in every run."""
+        """Return the same scene with another seed in every run."""
         conditions = {
             condition: {label: dataclasses.replace(scenario, seed=seed) for label, scenario in runs.items()}
             for condition, runs in self.conditions.items()
@@ -87,19 +87,19 @@ class Scene:
         return dataclasses.replace(self, conditions=conditions)
 
     def runs(self) -> Iterator[tuple[str, str, Scenario]]:
-        """(condition, label, scenario) of every run."""
+        """Yield (condition, label, scenario) of every run."""
         for condition, runs in self.conditions.items():
             for label, scenario in runs.items():
                 yield condition, label, scenario
 
 
 def scenes() -> dict[str, Path]:
-    """Name -> file of every scene that comes with the package."""
+    """Return name -> file of every scene that comes with the package."""
     return {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
 
 
 def find(name: str) -> Path:
-    """The scene file at a path, or the one of that name that comes with the package."""
+    """Return the scene file at a path, or the one of that name that comes with the package."""
     if Path(name).is_file():
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
@@ -108,7 +108,7 @@ def find(name: str) -> Path:
 
 
 def read(path: Path) -> Scene:
-    """The scene that a file declares.
+    """Return the scene that a file declares.
 
     Raises:
       ScenarioError: the file fails, or declares none.
@@ -124,12 +124,12 @@ def read(path: Path) -> Scene:
 
 
 def question(path: Path) -> str:
-    """The first line of a scene file's docstring."""
+    """Return the first line of a scene file's docstring."""
     return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0]
 
 
 def _execute(path: Path) -> dict:
-    """What a scene file defines; modules beside it can be imported, as in a script."""
+    """Return what a scene file defines. It can import modules beside it, as a script can."""
     sys.path.insert(0, str(path.resolve().parent))
     try:
         return runpy.run_path(str(path))
@@ -141,7 +141,7 @@ def _execute(path: Path) -> dict:
 
 
 def slug(name: str, longest: int = LONGEST) -> str:
-    """A name as part of a file name: letters and numbers, and what ties them together.
+    """Return a name as part of a file name: letters, digits, and _ . + - between them.
 
     It holds no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
     """

@@ -113,7 +113,7 @@ class Store:
                 self.where.setdefault(name, (path, i))
 
     def _read(self, path: Path) -> "pa.Table | None":
-        """A part, or None where it is none, or not whole."""
+        """Return a part, or None for a file that is no part or not whole."""
         try:
             with reading(path, "part", "start the study once more") as file:
                 part = table.read(file, sealed=True)

@@ -1,4 +1,4 @@
-"""The table of a study: a row a run, as parquet, with the run itself a call away.
+"""The table of a study: a row per run, as parquet, from which every run can be made again.
 
     table = smc.Table.read("study/results.parquet")
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
@@ -39,12 +39,12 @@ FEW: Mapping[str, Scenario] = frozen({})
 
 
 def columns() -> dict[str, str]:
-    """Column -> its type, in order."""
+    """Return column -> its type, in order."""
     return BEFORE | {m.name: "float64" for m in metrics()} | AFTER
 
 
 def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
-    """The schema of a study's files."""
+    """Return the schema of a study's files."""
     import pyarrow as pa
 
     kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
@@ -52,7 +52,7 @@ def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
 
 
 def content(rows: "pa.Table") -> bytes:
-    """All that rows say, as bytes: names and values, with null apart from NaN."""
+    """Return names and values of rows as bytes; null differs from NaN."""
     from pyarrow import types
 
     parts = [to_json([rows.column_names, len(rows)]).encode()]
@@ -65,7 +65,7 @@ def content(rows: "pa.Table") -> bytes:
 
 
 def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
-    """A parquet file, a row group a table, with a digest of all rows in its metadata.
+    """Write a parquet file with a row group for each table, and a digest of all rows in its metadata.
 
     Checksums of parquet cover pages, but neither their headers nor the footer.
 
@@ -87,7 +87,7 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
 
 
 def read(path: Path, sealed: bool = False) -> "pa.Table":
-    """The rows that `write` wrote.
+    """Return the rows that `write` wrote.
 
     Args:
       sealed: whether to refuse a file without a digest, as version 0.1 wrote them.
@@ -125,7 +125,7 @@ class Table:
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> "Table":
-        """The table in a parquet file that a study wrote, or in the study's folder.
+        """Return the table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:
           ScenarioError: no such file, no table of a study, or one that does not hold what was written.
@@ -146,11 +146,11 @@ class Table:
         return f"Table({len(self)} runs: {', '.join(counts)})"
 
     def rows(self) -> list[dict[str, Any]]:
-        """Every row as column -> value."""
+        """Return every row as column -> value."""
         return self.data.to_pylist()
 
     def column(self, name: str) -> np.ndarray:
-        """A column, (rows,): numbers with NaN for null, or texts with None."""
+        """Return a column, (rows,): numbers with NaN for null, or texts with None."""
         find("column of the table", name, dict.fromkeys(self.data.column_names))
         return self.data[name].to_numpy()
 
@@ -160,7 +160,7 @@ class Table:
         law: str | Sequence[str] | None = None,
         condition: str | Sequence[str] | None = None,
     ) -> "Table":
-        """The rows with this plant, law and condition, each a name, several, or None for all."""
+        """Return the rows with this plant, law and condition, each a name, several, or None for all."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -176,7 +176,7 @@ class Table:
         return dataclasses.replace(self, data=data)
 
     def scenario(self, i: int) -> Scenario:
-        """The scenario of row i."""
+        """Return the scenario of row i."""
         if not isinstance(i, int | np.integer) or not -len(self) <= i < len(self):
             raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
         row = self.data.slice(int(i) % len(self), 1)
@@ -184,5 +184,5 @@ class Table:
         return known or serialise.restore(from_json(row["scenario"][0].as_py()))
 
     def trace(self, i: int) -> Trace:
-        """The trace of row i: the run once more, which with the same versions is the same to the last bit."""
+        """Run row i again and return its trace; with the same versions it is the same to the last bit."""
         return run(self.scenario(i))

@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share, and what their texts stand for."""
+"""Options and arguments that several commands share, and functions that read their texts."""
 
 import ast
 import os

@@ -43,7 +43,7 @@ REALISTIC = REAL
 
 
 def fields(condition: str | Condition, plant: str | Plant, duration: float = DURATION) -> dict[str, Any]:
-    """The Scenario fields that a condition sets, in runs of that duration; what happens once does so at half time.
+    """Return the Scenario fields that a condition sets; what happens once does so at half of the duration.
 
     Raises:
       ScenarioError: an unknown condition or plant, or a condition that has no numbers for the plant.
@@ -60,7 +60,7 @@ def scenario(
     changes: Mapping[str, Any] = NOTHING,
     gains: str = "study",
 ) -> Scenario:
-    """The scenario of one plant under one law in one condition.
+    """Return the scenario of one plant under one law in one condition.
 
     Args:
       changes: Scenario field -> value, over what the study and the condition have, such as {"friction": Coulomb(0.1)}.
@@ -90,5 +90,5 @@ def comparison(
     changes: Mapping[str, Any] = NOTHING,
     gains: str = "study",
 ) -> dict[str, Scenario]:
-    """Law name -> scenario: one plant in one condition under several laws; arguments as of `scenario`."""
+    """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
     return {name: scenario(plant, name, condition, seed, duration, changes, gains) for name in laws}

@@ -1,4 +1,4 @@
-"""What the scores amount to: who leads where, where nobody can be told to, where the paper's law loses, in words.
+"""The report's answer in sentences: which law leads where, where no winner is known, where the paper's law loses.
 
 Everything here is counted from `Findings.scores`; no sentence is there that the numbers do not make.
 """
@@ -17,7 +17,7 @@ VERDICTS = ("supported", "partly supported", "refuted", "not testable")
 
 
 class Standing(NamedTuple):
-    """In how many of `of` cells a law is best or level with the best, and in how many it is so alone, which is to win.
+    """How often a law leads among `of` cells: `best` counts ties with the best, `alone` counts wins.
 
     `lost`: in how many another law is better.
     """
@@ -52,7 +52,7 @@ class Loss(NamedTuple):
 
 
 class Open(NamedTuple):
-    """How many of the comparisons name no winner."""
+    """How many of `of` comparisons name no winner."""
 
     open: int
     of: int
@@ -62,7 +62,7 @@ Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) ->
 
 
 def cells(scores: Sequence[Score]) -> Cells:
-    """The scores of each comparison."""
+    """Return the scores of each comparison."""
     found: Cells = {}
     for score in scores:
         found.setdefault((score.plant, score.condition, score.metric), []).append(score)
@@ -70,7 +70,7 @@ def cells(scores: Sequence[Score]) -> Cells:
 
 
 def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
-    """The laws that are best, or level with the best; none where none gets there at all."""
+    """Return the laws that are best, or level with the best; none where no law has a finite median."""
     best = [s for s in found.get((plant, condition, metric), ()) if s.best]
     return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
 
@@ -82,7 +82,7 @@ def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
 
 
 def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
-    """How often each law leads, and how often it is behind, most wins first."""
+    """Return how often each law leads, and how often it is behind, most wins first."""
     best = {key: leaders(found, *key) for key in found if key[2] == metric}
     behind = {key: [s.law for s in found[key] if not s.best] for key in best}
     rows = [
@@ -99,7 +99,7 @@ def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
 
 
 def everywhere(found: Cells, metric: str) -> dict[str, list[str]]:
-    """Law -> the conditions under which it wins on every plant, of at least two."""
+    """Return law -> the conditions under which it wins on every plant, where there are at least two."""
     winners: dict[str, list[str | None]] = {}
     for key in (key for key in found if key[2] == metric):
         winners.setdefault(key[1], []).append(winner(found, *key))
@@ -111,18 +111,18 @@ def everywhere(found: Cells, metric: str) -> dict[str, list[str]]:
 
 
 def undecided(found: Cells, metrics: Sequence[str]) -> Open:
-    """How many comparisons end without one winner."""
+    """Return how many comparisons end without one winner."""
     winners = [winner(found, *key) for key in found if key[2] in metrics]
     return Open(winners.count(None), len(winners))
 
 
 def repeated(found: Cells) -> int:
-    """In how many plants and conditions seeds change nothing, or not each of them."""
+    """Return in how many cells some seeds repeat the run of another seed."""
     return len({(plant, condition) for (plant, condition, _), s in found.items() if s[0].runs < s[0].seeds})
 
 
 def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]:
-    """Where another law is better than this one, worst first."""
+    """Return the cells in which another law is better than this one, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in found.items():
         own = next((s for s in scores if s.law == law), None)
@@ -138,24 +138,24 @@ def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]
 
 
 def counts(findings: Findings) -> dict[str, int]:
-    """Verdict -> how many claims have it."""
+    """Return verdict -> how many claims have it."""
     return {name: sum(claim.verdict == name for claim in findings.claims) for name in VERDICTS}
 
 
 def overall(findings: Findings, metric: str) -> list[Place]:
-    """The laws' places over all runs, best first."""
+    """Return the laws' places over all runs, best first."""
     return sorted((p for p in findings.places if p.metric == metric and not p.plant), key=lambda p: p.mean)
 
 
 class Sentence(NamedTuple):
-    """Of the answer: what it is about, "" for all, and what it says."""
+    """A sentence of the answer, and what it is about: "" for all."""
 
     about: str
     text: str
 
 
 def paragraph(findings: Findings, metrics: Sequence[str] = words.HEADLINE) -> list[Sentence]:
-    """The answer, sentence by sentence."""
+    """Return the answer, sentence by sentence."""
     found = cells(findings.scores)
     standing = {metric: standings(findings, found, metric) for metric in metrics}
     leads = [Sentence(words.ASKS[m].capitalize(), _leads(m, standing[m], everywhere(found, m))) for m in metrics]
@@ -180,7 +180,7 @@ def _first(standing: dict[str, list[Standing]]) -> str:
 
 
 def _leads(metric: str, standing: Sequence[Standing], conditions: dict[str, list[str]]) -> str:
-    """On one metric what holds in every cell, else in every plant, else who wins in how many and loses in how many."""
+    """Return who leads on a metric: in every cell, else on every plant, else in how many cells."""
     what, top = words.metric(metric), standing[0]
     if top.alone == top.of:
         return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
@@ -212,7 +212,7 @@ def _sure(found: Open, seeds: int, repeats: int) -> str:
 
 
 def _settled(findings: Findings) -> list[str]:
-    """What share of runs settles, for who does not may be calm all the same, and how many runs failed."""
+    """Return what share of runs settles, and how many failed; a run that does not settle may still be calm."""
     share = {place.law: place.median for place in overall(findings, "settles")}
     if not share:
         return []

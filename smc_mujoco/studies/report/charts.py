@@ -23,7 +23,7 @@ POWERS: dict[str, Any] = {"exponentformat": "power", "tickfont": AXIS["tickfont"
 
 
 def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> Figure:
-    """Medians with intervals: a row a metric, a column a plant, a line a law. All scores are of one condition."""
+    """Draw medians with intervals in one condition: a row per metric, a column per plant, a line per law."""
     grid = panels(len(metrics), len(plants), (0.028, 0.12))
     known = {(s.metric, s.plant, s.law): s for s in scores}
     data: list[dict] = []
@@ -54,12 +54,12 @@ def _range(ends: tuple[bool, float, float]) -> list[float]:
 
 
 def _decades(ends: tuple[bool, float, float]) -> int:
-    """Decades between ticks, so that there are at most four."""
+    """Return the decades between ticks that leave at most four ticks."""
     return max(1, math.ceil(math.log10(ends[2] / ends[1]) / 4))
 
 
 def _whisker(score: Score, end: str, ends: tuple[bool, float, float]) -> dict[str, Any]:
-    """A law's point with its interval, on the panel with this ending."""
+    """Return a law's point with its interval, on the panel whose axes have this ending."""
     logarithmic, low, high = ends
     off = (high / low) ** 0.035 if logarithmic else 1.0  # off the ends, clear of the labels
     inner = (low * off, high / off) if logarithmic else (low, high * 0.97)
@@ -98,7 +98,7 @@ def _whisker(score: Score, end: str, ends: tuple[bool, float, float]) -> dict[st
 
 
 def fronts(found: Sequence[Front], plants: Sequence[str]) -> Figure:
-    """Tracking against variation: a panel a plant, a staircase a law; a dot where the study's gains are."""
+    """Draw tracking against variation: a panel per plant, a staircase per law; a dot at the study's gains."""
     grid = panels(1, len(plants), (0.035, 0))
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": titles(grid, [words.plant(plant) for plant in plants])}
@@ -132,7 +132,7 @@ def _span(values: Sequence[float], least: float | None) -> list[float]:
 
 
 def _key(law: str) -> dict[str, Any]:
-    """A law's entry in the legend, which switches all of its curves."""
+    """Return a law's entry in the legend, which switches all of its curves."""
     return {
         "type": "scatter",
         "mode": "lines+markers",
@@ -160,9 +160,9 @@ def _front(front: Front, end: str) -> list[dict[str, Any]]:
 
 
 def margins(found: "Sequence[Margin]", kind: str, plants: Sequence[str], laws: Sequence[str]) -> Figure:
-    """The largest level of one kind that each law bears: a panel a plant; a bar is what linear theory says.
+    """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
 
-    A triangle that points on: the search ended there without a failure.
+    A triangle means that the search ended there without a failure.
     """
     grid = panels(1, len(plants), (0.025, 0))
     names = [words.escape(words.law(law)) for law in reversed(laws)]
@@ -204,7 +204,7 @@ def _margin(margin: "Margin", end: str, most: float) -> list[dict[str, Any]]:
 
 
 def curves(scene: Scene) -> Figure:
-    """x and u of every law over time; bands are the range of u where it chatters, its line there a running mean."""
+    """Draw x and u of every law over time. Where u chatters, a band is its range and the line its running mean."""
     grid = panels(1, 2, (0.075, 0))
     data: list[dict] = []
     for curve in scene.curves:

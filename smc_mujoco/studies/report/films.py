@@ -1,4 +1,4 @@
-"""Scenes of a report: runs side by side, as curves in few points and as a short film.
+"""Curves and films of a report's scenes: runs side by side, in few points and few bytes.
 
 Films are WebM (VP9), which every browser plays and no patent fences in; small, for they travel in the page.
 """
@@ -27,7 +27,7 @@ Report = Callable[[int], None]
 
 
 def curve(trace: Trace) -> Curve:
-    """One channel of a trace, the one that starts farthest out, with every extreme kept."""
+    """Return one channel of a trace, that which starts farthest out, in few points with every extreme kept."""
     whole = decimate.finite(trace)
     i = int(np.argmax(np.abs(trace.scenario.x0)))
     t, x, u = whole.t, whole.x[:, i], whole.u[:, i]
@@ -42,14 +42,14 @@ def curve(trace: Trace) -> Curve:
 
 
 def _extremes(y: np.ndarray) -> np.ndarray:
-    """Indices of the least and the largest of y (K + 1,) in each of some stretches, of its first and of its last."""
+    """Return the indices of the extremes of y (K + 1,) in each of some stretches, with its first and last."""
     parts = np.array_split(np.arange(len(y)), min(decimate.POINTS, len(y)))
     ends = [(part[np.argmin(y[part])], part[np.argmax(y[part])]) for part in parts]
     return np.unique([0, *np.ravel(ends), len(y) - 1])
 
 
 def film(traces: Sequence[Trace], title: str, report: Report = lambda frames: None) -> tuple[bytes, bytes]:
-    """A film of the traces as WebM, and a picture of it as JPEG.
+    """Return a film of the traces as WebM, and a picture of it as JPEG.
 
     Raises:
       ScenarioError: nothing renders here, or ffmpeg cannot write.
@@ -81,12 +81,12 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda frames: No
 
 
 def missing() -> str | None:
-    """None when a film can be made, else one sentence that says why not and what to do."""
+    """Return None when a film can be made, else one sentence that says why not and what to do."""
     return gl.missing() or extras.missing("report", "no film: it", "imageio_ffmpeg")
 
 
 def jpeg(picture: np.ndarray) -> bytes:
-    """A picture (height, width, 3), for paper."""
+    """Return a picture (height, width, 3) as JPEG."""
     from PIL import Image
 
     data = io.BytesIO()
@@ -102,5 +102,5 @@ def save(made: tuple[bytes, bytes], path: Path) -> None:
 
 
 def load(path: Path) -> tuple[bytes, bytes]:
-    """The film and the picture that `save` wrote."""
+    """Return the film and the picture that `save` wrote."""
     return path.read_bytes(), path.with_suffix(".jpg").read_bytes()

@@ -1,4 +1,4 @@
-"""What a report tells, as plain data: stages.py finds it, page.py and charts.py show it; neither knows the other.
+"""Everything that a report shows, as plain data: stages.py computes it, page.py and charts.py show it.
 
 Units are SI; every `metric` is the name of one in `metrics`.
 """
@@ -12,7 +12,9 @@ import numpy as np
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.region_of_attraction import Basin
+    from smc_mujoco.analysis.tuning.objective import Objective
     from smc_mujoco.studies.paper.claims.verdict import Claim
+    from smc_mujoco.studies.report.plan import Plan
 
 
 OFF = 1e-6  # in s: less is s = 0, as the claim on V' has it
@@ -85,18 +87,18 @@ class Field:
 
     @property
     def rises(self) -> np.ndarray:
-        """Where V' is positive off s = 0, bool."""
+        """Return where V' is positive off s = 0, bool."""
         return (self.vdot > 0) & (np.abs(self.s) > OFF)
 
     @property
     def share(self) -> float:
-        """Of the plane, where V rises."""
+        """Return the share of the plane in which V rises."""
         return float(self.rises.mean())
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Curve:
-    """One channel's trace in few points: x(t), and of u its line and the band (low, high) between its extremes.
+    """One channel of a trace in few points: x(t), the line of u, and the band between the extremes of u.
 
     t, x: (k,); tu, u: the line, a mean where u chatters; tb, low, high: the band's windows.
     """
@@ -137,15 +139,18 @@ class Gains(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class About:
-    """How it was computed.
+    """How the report was computed.
 
     Attributes:
+      plan: how much of everything.
       runs, failed: of the grid.
       seeds: of every cell of the grid.
-      duration: of a run, s.
       gains_set: with which grid, margins and maps were made.
-      settings: what -> value, in words.
-      limits: what was not done, a sentence each.
+      objective: of the tuning of these gains.
+      left_out: conditions of the full report that this one lacks.
+      laws: how many the package has.
+      u_max: the bound on u, N or N m.
+      control_period: s.
       conditions: condition -> the Scenario fields that it sets, in words.
       versions: package -> version.
       gains: of every set.
@@ -153,14 +158,16 @@ class About:
       no_film: why there are no films, or None.
     """
 
-    quick: bool
+    plan: "Plan"
     runs: int
     failed: int
     seeds: int
-    duration: float
     gains_set: str
-    settings: Mapping[str, str]
-    limits: tuple[str, ...]
+    objective: "Objective"
+    left_out: tuple[str, ...]
+    laws: int
+    u_max: float
+    control_period: float
     conditions: Mapping[str, str]
     versions: Mapping[str, str]
     gains: tuple[Gains, ...]
@@ -170,7 +177,7 @@ class About:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Everything a report tells; `by_set`: set of gains -> the margins that are found under every set."""
+    """Everything that a report shows; `by_set`: set of gains -> the margins that are found under every set."""
 
     scores: tuple[Score, ...]
     places: tuple[Place, ...]

@@ -1,4 +1,4 @@
-"""Maps of the state plane: from where runs converge, and where V of the paper's Lyapunov argument rises."""
+"""Maps of the state plane: the states from which runs converge, and where the paper's Lyapunov function rises."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,18 +21,18 @@ ZERO = {"coloring": "none", "start": 0, "end": 0, "size": 1, "showlabels": False
 
 
 def horizons(found: "Sequence[Basin]") -> list[float]:
-    """The lengths of runs, s, that decided that a state converges, in any of the maps."""
+    """Return the run lengths, s, after which states were found to converge, over all maps."""
     return sorted({float(at) for basin in found for at in np.unique(basin.decided_at[basin.outcome == 1])})
 
 
 def classed(basin: "Basin", after: Sequence[float]) -> np.ndarray:
-    """The colour's number for each state, (nv, nx): the blues by when it was decided, then undecided, then not."""
+    """Return the index into COLOURS for each state, (nv, nx): converging by time, then undecided, then not."""
     shade = np.minimum(np.searchsorted(after, basin.decided_at), len(region.BLUES) - 1)
     return np.where(basin.outcome == 1, shade, np.where(basin.outcome == -1, len(COLOURS) - 1, len(COLOURS) - 2))
 
 
 def meanings(found: "Sequence[Basin]") -> dict[str, str]:
-    """Colour -> what it says, of those that occur in any of the maps."""
+    """Return colour -> its meaning, for the colours that occur in any of the maps."""
     after, last = horizons(found), len(region.BLUES) - 1
     told = {min(k, last): f"at rest, known after {at:g} s" for k, at in enumerate(after)}
     told |= {last + 1: "undecided", last + 2: "does not come to rest here"}
@@ -41,7 +41,7 @@ def meanings(found: "Sequence[Basin]") -> dict[str, str]:
 
 
 def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
-    """The maps of one plant: a panel a law, x across, x' up; `after` as `horizons` of all maps gives them."""
+    """Draw the maps of one plant: a panel per law, x across, x' up; `after` comes from `horizons` of all maps."""
     grid = panels(1, len(found), (0.02, 0))
     unit = found[0].unit
     steps = len(COLOURS)
@@ -80,7 +80,7 @@ def _right(panel: tuple[str, list[float], list[float]], text: str) -> dict[str, 
 
 
 def fields(found: Sequence[Field]) -> Figure:
-    """Where V rises, dark, and the line s = 0: a panel a plant, x across, x' up."""
+    """Draw where V rises, dark, and the line s = 0: a panel per plant, x across, x' up."""
     grid = panels(1, len(found), (0.045, 0))
     colours = [[0, FALLS], [0.5, FALLS], [0.5, RISES], [1, RISES]]
     data: list[dict] = []

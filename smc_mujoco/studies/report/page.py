@@ -1,4 +1,4 @@
-"""Findings to one HTML file that needs nothing else: no network, no other file.
+"""The HTML page of a report, which needs no network and no other file.
 
     page(findings)                 # the HTML, a str
 
@@ -33,7 +33,7 @@ SECTIONS = {
 
 
 def page(findings: Findings) -> str:
-    """The report as HTML."""
+    """Return the report as HTML."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from jinja2.utils import htmlsafe_json_dumps
     from markupsafe import Markup
@@ -43,7 +43,7 @@ def page(findings: Findings) -> str:
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["json"] = htmlsafe_json_dumps
+    environment.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind}
     environment.globals |= {"words": words, "f": findings, "about": findings.about, "infinity": math.inf}
     fixed = {
         "css": Markup((TEMPLATES / "style.css").read_text()),
@@ -56,7 +56,7 @@ def page(findings: Findings) -> str:
 
 
 def overview(findings: Findings) -> dict[str, Any]:
-    """What the first section shows."""
+    """Return what the first section shows."""
     found = answer.cells(findings.scores)
     headline = [m for m in words.HEADLINE if any(s.metric == m for s in findings.scores)]
     first = "nominal" if "nominal" in findings.conditions else findings.conditions[0]
@@ -77,7 +77,7 @@ def overview(findings: Findings) -> dict[str, Any]:
 
 
 def by_plant(findings: Findings) -> list[SimpleNamespace]:
-    """The rows of the ranking by plant, each with a Place in every metric, or None."""
+    """Return the rows of the ranking by plant, each with a Place in every metric, or None."""
     known = {(p.plant, p.law, p.metric): p for p in findings.places}
     return [
         SimpleNamespace(plant=plant, law=law, places={m: known.get((plant, law, m)) for m in words.RANKED})
@@ -88,7 +88,7 @@ def by_plant(findings: Findings) -> list[SimpleNamespace]:
 
 
 def board(scores: Sequence[Score]) -> list[SimpleNamespace]:
-    """The leaderboard's rows: a plant, condition and law, with its score in every column, or None."""
+    """Return the leaderboard's rows: a plant, condition and law, with a score in every column, or None."""
     rows: dict[tuple[str, str, str], dict[str, Score]] = {}
     for score in scores:
         rows.setdefault((score.plant, score.condition, score.law), {})[score.metric] = score
@@ -99,7 +99,7 @@ def board(scores: Sequence[Score]) -> list[SimpleNamespace]:
 
 
 def claims(findings: Findings) -> dict[str, Any]:
-    """What the section on claims shows."""
+    """Return what the section on claims shows."""
     sets = list(dict.fromkeys(name for claim in findings.claims for name in claim.verdicts))
     rises = ", ".join(f"{words.plant(f.plant)} {100 * f.share:.0f} percent" for f in findings.fields)
     return {
@@ -114,7 +114,7 @@ def claims(findings: Findings) -> dict[str, Any]:
 
 
 def checks(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
-    """A claim's checks: a row each, a column a set of gains; those that fail first."""
+    """Return a row for each check of a claim, with a column for each set of gains; checks that fail come first."""
     names = dict.fromkeys(what for name in sets for what in claim.numbers.get(name, {}))
     rows = []
     for what in names:
@@ -127,7 +127,7 @@ def checks(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
 
 
 def decided(gains: str, claim: Any) -> SimpleNamespace | None:
-    """The check that decides a claim under these gains, or under the first that it was judged with."""
+    """Return the check that decides a claim under these gains, or under the first that it was judged with."""
     name = gains if gains in claim.numbers else next(iter(claim.numbers), "")
     one = claim.decisive(name) if name else None
     if one is None:
@@ -137,14 +137,14 @@ def decided(gains: str, claim: Any) -> SimpleNamespace | None:
 
 
 def beside(sets: Sequence[str], claim: Any) -> list[SimpleNamespace]:
-    """What was found beside a claim's checks: a row each, a value a set of gains or None."""
+    """Return a row for each number beside a claim's checks, with a value for each set of gains, or None."""
     found = [claim.beside.get(name, {}) for name in sets]
     names = dict.fromkeys(what for its in found for what in its)
     return [SimpleNamespace(what=n, values=[its.get(n) for its in found], link=link(n)) for n in names]
 
 
 def link(what: str) -> str:
-    """The definition of the metric that a check names, else of what a verdict is."""
+    """Return the anchor of the metric that a check names, else that of "verdict"."""
     names = {called: m.name for m in catalogue_of_metrics() for called in (m.name, words.metric(m.name))}
     known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     found = re.search(rf"(?<!\w)({known})(?!\w)", what)
@@ -152,13 +152,13 @@ def link(what: str) -> str:
 
 
 def tradeoffs(findings: Findings) -> dict[str, Any]:
-    """What the section on error against effort shows."""
+    """Return what the section on error against effort shows."""
     there = [plant for plant in findings.plants if any(f.plant == plant for f in findings.fronts)]
     return {"fronts": charts.fronts(findings.fronts, there) if there else None, "fronts_of": "5 s"}
 
 
 def margins(findings: Findings) -> dict[str, Any]:
-    """What the section on margins shows."""
+    """Return what the section on margins shows."""
     kinds = dict.fromkeys(margin.kind for margin in findings.margins)
     plants = [p for p in findings.plants if any(m.plant == p for m in findings.margins)]
     laws = [law for law in findings.laws if any(m.law == law for m in findings.margins)]
@@ -175,7 +175,7 @@ def margins(findings: Findings) -> dict[str, Any]:
 
 
 def set_margins(findings: Findings) -> list[SimpleNamespace]:
-    """The margins under every set of gains: a row a kind, plant and law, with a Margin in each set, or None."""
+    """Return a row for each kind of margin, plant and law, with a Margin under each set of gains, or None."""
     known = {(m.kind, m.plant, m.law, name): m for name, own in findings.by_set.items() for m in own}
     rows = dict.fromkeys(key[:3] for key in known)
     return [
@@ -187,7 +187,7 @@ def set_margins(findings: Findings) -> list[SimpleNamespace]:
 
 
 def regions(findings: Findings) -> dict[str, Any]:
-    """What the section on regions of attraction shows."""
+    """Return what the section on regions of attraction shows."""
     shown, after = [], maps.horizons(findings.basins)
     for plant in dict.fromkeys(basin.plant for basin in findings.basins):
         own = [basin for basin in findings.basins if basin.plant == plant]
@@ -200,7 +200,7 @@ def regions(findings: Findings) -> dict[str, Any]:
 
 
 def films(findings: Findings) -> dict[str, Any]:
-    """What the section on films and traces shows."""
+    """Return what the section on films and traces shows."""
     shown = []
     for scene in findings.scenes:
         network = scene.plant in catalogue() and catalogue()[scene.plant].network
@@ -218,12 +218,12 @@ def films(findings: Findings) -> dict[str, Any]:
 
 
 def uri(kind: str, data: bytes | None) -> str:
-    """Bytes as a data URI, "" for none."""
+    """Return bytes as a data URI, "" for none."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}" if data else ""
 
 
 def method(findings: Findings) -> dict[str, Any]:
-    """What the last section shows."""
+    """Return what the last section shows."""
     return {
         "terms": definitions.terms(list(dict.fromkeys(margin.kind for margin in findings.margins))),
         "metrics": definitions.metric_terms(),
@@ -234,7 +234,7 @@ def method(findings: Findings) -> dict[str, Any]:
 
 
 def gain_rows(found: Sequence[Gains]) -> list[SimpleNamespace]:
-    """Every law's gains on every plant: a row each, with the Gains of each set, which may be none or several."""
+    """Return a row for each law on each plant, with the Gains of each set, none or several."""
     sets = list(dict.fromkeys(row.set for row in found))
     rows: dict[tuple[str, str], dict[str, list[Gains]]] = {}
     for row in found:

@@ -1,4 +1,4 @@
-"""Panels of the report's charts: plotly figures as plain dicts, so that nothing is imported to make them.
+"""Panels of the report's charts: plotly figures as plain dicts, made without importing plotly.
 
 Small multiples throughout: the same axes, one panel a plant (and a law), one colour a law. Numbers have five digits.
 """
@@ -27,7 +27,7 @@ AXIS: dict[str, Any] = {
 
 
 def figure(data: list[dict], layout: dict[str, Any], height: int, legend: bool = False) -> Figure:
-    """A figure in the report's style; its height in px."""
+    """Return a figure in the report's style; height in px."""
     common = {
         "font": {"family": FONT, "size": 12, "color": style.INK},
         "paper_bgcolor": "rgba(0,0,0,0)",
@@ -44,7 +44,7 @@ def figure(data: list[dict], layout: dict[str, Any], height: int, legend: bool =
 
 
 def panels(rows: int, columns: int, gaps: tuple[float, float]) -> list[tuple[str, list[float], list[float]]]:
-    """Row by row from the top: an axis's ending ("", "2", ...), its x and its y domain; gaps as shares of the whole."""
+    """Return the axis ending ("", "2", ...), x domain and y domain of each panel; gaps are shares of the whole."""
     wide, high = (1 - gaps[0] * (columns - 1)) / columns, (1 - gaps[1] * (rows - 1)) / rows
     found = []
     for k in range(rows * columns):
@@ -54,7 +54,7 @@ def panels(rows: int, columns: int, gaps: tuple[float, float]) -> list[tuple[str
 
 
 def axes(panel: tuple[str, list[float], list[float]], x: dict[str, Any], y: dict[str, Any]) -> dict[str, Any]:
-    """The two axes of a panel."""
+    """Return the two axes of a panel."""
     end, across, up = panel
     return {
         f"xaxis{end}": AXIS | {"domain": across, "anchor": f"y{end}"} | x,
@@ -63,7 +63,7 @@ def axes(panel: tuple[str, list[float], list[float]], x: dict[str, Any], y: dict
 
 
 def heading(panel: tuple[str, list[float], list[float]], text: str, size: int = 12) -> dict[str, Any]:
-    """A title above a panel, at its left."""
+    """Return a title above a panel, at its left."""
     _, across, up = panel
     return {
         "text": f"<b>{words.escape(text)}</b>",
@@ -81,7 +81,7 @@ def heading(panel: tuple[str, list[float], list[float]], text: str, size: int = 
 
 
 def titles(grid: Sequence[tuple[str, list[float], list[float]]], names: Sequence[str], size: int = 12) -> list[Figure]:
-    """A heading a panel, on two lines where there are too many for one."""
+    """Return a heading for each panel, on two lines where there are more than three panels."""
     many = len(names) > 3
     made = [heading(panel, name, size) for panel, name in zip(grid, names, strict=True)]
     for each in made if many else ():
@@ -90,20 +90,20 @@ def titles(grid: Sequence[tuple[str, list[float], list[float]]], names: Sequence
 
 
 def rounded(values: Sequence[float] | np.ndarray, digits: int = 5) -> list[float | None]:
-    """Numbers in few digits; None where there is none."""
+    """Return numbers with few digits; None for what is not finite."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
 
 
 def packed(values: np.ndarray) -> dict[str, str]:
-    """An int8 array as plotly reads it."""
+    """Return an array of int8 as plotly reads it."""
     shape = ", ".join(str(n) for n in values.shape)
     return {"dtype": "i1", "bdata": base64.b64encode(values.astype(np.int8).tobytes()).decode(), "shape": shape}
 
 
 def scale(values: Sequence[float], logarithmic: bool | None = None) -> tuple[bool, float, float]:
-    """Whether an axis for these is logarithmic, and its ends, with room at the upper one for what is beyond.
+    """Return whether an axis for these values is logarithmic, and its ends; values beyond get room at the upper end.
 
-    None: it is, where they span more than WIDE; it then shows DECADES at most.
+    With None it is logarithmic where values span more than WIDE, and shows DECADES at most.
     """
     finite = [v for v in values if math.isfinite(v)]
     top = max([0.0, *finite]) or 1.0

@@ -1,4 +1,4 @@
-"""A study's table as a report shows it: a score a law in every cell, and the laws' places over many cells."""
+"""A study's table as a report shows it: each law's score in every cell, and the laws' places over many cells."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scores(table: "Table") -> tuple[Score, ...]:
-    """Every law in every cell in every column of the leaderboard, in the table's order."""
+    """Return a score for every law, cell and column of the leaderboard, in the table's order."""
     lost, found = failures(table), []
     order = list(dict.fromkeys(table.column("law").tolist()))
     boards = leaderboard(table, words.COLUMNS, by=("plant",))
@@ -48,7 +48,7 @@ def scores(table: "Table") -> tuple[Score, ...]:
 
 
 def places(table: "Table") -> tuple[Place, ...]:
-    """Every law's place in what the overview ranks, plant by plant, and over all of them."""
+    """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
     boards = leaderboard(table, words.RANKED, by=("plant",))
     by_plant = [place for board in boards for place in _places(board)]
     names = dict.fromkeys((place.metric, place.law) for place in by_plant)
@@ -79,7 +79,7 @@ def _places(board: Board) -> list[Place]:
 
 
 def _overall(by_plant: Sequence[Place]) -> Place:
-    """A law over the cells of all plants, from its places on each: every cell weighs the same."""
+    """Return a law's place over all plants, from its places on each; every cell weighs the same."""
     of = [place.of for place in by_plant]
     first, whys = by_plant[0], {place.why for place in by_plant}
     return Place(
@@ -101,7 +101,7 @@ def _overall(by_plant: Sequence[Place]) -> Place:
 
 
 def failures(table: "Table") -> dict[tuple[str, str, str], int]:
-    """(plant, condition, law) -> runs that failed, where some did."""
+    """Return (plant, condition, law) -> how many runs failed, where some did."""
     found: dict[tuple[str, str, str], int] = {}
     columns = [table.column(name).tolist() for name in ("plant", "condition", "law", "failure")]
     for plant, condition, law, failure in zip(*columns, strict=True):
@@ -111,10 +111,10 @@ def failures(table: "Table") -> dict[tuple[str, str, str], int]:
 
 
 def seeds(table: "Table") -> int:
-    """Of every cell; the most where they differ."""
+    """Return the number of seeds of a cell, the largest where cells differ."""
     return len(np.unique(table.column("seed")))
 
 
 def failed(table: "Table") -> int:
-    """Runs that failed."""
+    """Return how many runs failed."""
     return sum(failures(table).values()) if len(table) else 0

@@ -1,4 +1,4 @@
-"""How a report calls things and writes numbers: laws, plants, conditions, metrics, kinds of margin.
+"""Names and numbers as a report writes them: laws, plants, conditions, metrics, kinds of margin.
 
 Colours and names are those of `draw.style`; numbers those of the terminal's tables, three significant digits.
 """
@@ -96,7 +96,7 @@ SIGNS |= {"Vdot": "V′", "xdot": "x′"}
 
 
 def pretty(text: str) -> str:
-    """A sentence of the audit, which is written in letters of a keyboard, with signs and names as people write them."""
+    """Return a sentence of the audit, written in ASCII, with mathematical signs and proper names."""
     signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
     text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
     names = {name: plant(name) for name in plants()} | {name: style.law_name(name).lower() for name in laws()}
@@ -105,10 +105,10 @@ def pretty(text: str) -> str:
 
 
 def bound(value: float) -> str:
-    """A number of theory, which may be without bound."""
+    """Return a number of theory, which may be infinite."""
     return "no bound" if math.isinf(value) else number(value)
 
 
 def escape(text: str) -> str:
-    """Text for a chart, which reads some tags."""
+    """Return text for a chart, where HTML tags would have an effect."""
     return html.escape(text, quote=False)

@@ -8,7 +8,7 @@ from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import NETWORKS, OURS, Runs, scale
+from smc_mujoco.studies.paper.claims.runs import NETWORKS, OURS, Runs, comes_to_rest
 from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import CONDITIONS, PLANTS, REALISTIC
 
@@ -99,12 +99,8 @@ def bounded(runs: Runs) -> list[Check | Beside]:
 def robust(runs: Runs) -> list[Check]:
     """Largest |x| in the last 20 % of the run over |x0|, plant by plant and condition by condition."""
     names = ("noise", *DISTURBED[:1], *VARIED[-1:]) if runs.quick else ("noise", *DISTURBED, *VARIED)
-    cells = [(plant, name) for plant in PLANTS for name in names]
-    grid = [runs.scenario(plant, OURS, name) for plant, name in cells]
-    return [
-        check(f"{plant}, {name}: ultimate bound / |x0|", scores["ultimate_bound"] / scale(scenario), "<=", 0.05)
-        for (plant, name), scenario, scores in zip(cells, grid, runs.scores(grid), strict=True)
-    ]
+    grid = {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant in PLANTS for name in names}
+    return comes_to_rest(runs, grid)
 
 
 @claim(

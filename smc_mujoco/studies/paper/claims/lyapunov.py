@@ -31,18 +31,18 @@ REACH = 2.0  # times the largest |x0|, chosen: the states from which the study s
 
 
 def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The paper's s = alpha - u / g in the states (x, v), arrays of one shape; m/s or rad/s, though u / g is not."""
+    """Return the paper's s = alpha - u / g in the states (x, v), arrays of one shape; in m/s or rad/s, as alpha."""
     alpha = v + k1 * x
     return alpha + lam / _model(plant, x, v)[1] * np.tanh(alpha)
 
 
 def value(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """V = s^2 / 2 in the states (x, v)."""
+    """Return V = s^2 / 2 in the states (x, v)."""
     return surface(plant, lam, k1, x, v) ** 2 / 2.0
 
 
 def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """V' by (2) in the states (x, v), in the unit of s, squared, per s.
+    """Return V' by (2) in the states (x, v), in the unit of s, squared, per s.
 
     Args:
       plant: with its nominal f and g; a network is taken synchronised.
@@ -58,7 +58,7 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
 
 
 def plane(plant: Plant, k1: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """A grid of states: x up to REACH times the largest |x0|, v up to k1 times that, so alpha = 0 is its diagonal."""
+    """Return a grid of states: x up to REACH times the largest |x0|, v up to k1 times that; alpha = 0 is a diagonal."""
     reach = REACH * max(map(abs, plant.x0))
     x = np.linspace(-reach, reach, points)
     grid = np.meshgrid(x, k1 * x)
@@ -66,12 +66,12 @@ def plane(plant: Plant, k1: float, points: int = POINTS) -> tuple[np.ndarray, np
 
 
 def input_gain(plant: Plant) -> float:
-    """g at rest, which on the study's plants is g everywhere; x'' = f + g u."""
+    """Return g at rest, which on the study's plants is g everywhere; x'' = f + g u."""
     return float(_model(plant, np.zeros(1), np.zeros(1))[1][0])
 
 
 def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """f and g of the first channel, with every channel in the same state."""
+    """Return f and g of the first channel, with every channel in the same state."""
     p = SimpleNamespace(**plant.parameters)
     pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)
     both = np.array([plant.nominal(np.full(plant.n, a), np.full(plant.n, b), 0, p) for a, b in pairs])

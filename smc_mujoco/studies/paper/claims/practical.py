@@ -75,7 +75,7 @@ def cheap_tanh(runs: Runs) -> list[Check | Beside]:
 
 
 def _cheap(runs: Runs, name: str, exact: Component) -> Component:
-    """The law `name` with lam and k1 of the exact law, and the mutant of it where the audit has one."""
+    """Return the law `name` with lam and k1 of the exact law, or its mutant where the audit has one."""
     template = observer_free_series if name == SERIES else catalogue()[name]
     gains = {gain: exact.gains[gain] for gain in ("lam", "k1")} | CHEAP[name]
     if name == FIXED:  # a word must hold lambda: its range is the next power of 2
@@ -127,7 +127,7 @@ def exponential(runs: Runs) -> list[Check]:
 
 
 def decay_rate(trace: Trace) -> float:
-    """The rate c, 1/s, of the least-squares fit exp(a - c t) to the envelope of the worst channel.
+    """Return the rate c, 1/s, of the least-squares fit exp(a - c t) to the envelope of the worst channel.
 
     The envelope at t is the largest |x| from t on; fitted from the start until it is 2 % of |x0|; NaN if it never is.
     """
@@ -165,7 +165,7 @@ def jumps(runs: Runs) -> list[Check | Beside]:
 
 
 def _peak_after_jump(trace: Trace) -> float:
-    """Largest |x| from the jump on; inf where the run failed."""
+    """Return the largest |x| from the jump on; inf where the run failed."""
     jump = trace.scenario.jump
     assert jump is not None  # the condition has one
     peak = float(np.abs(trace.x[trace.t >= jump.time]).max())

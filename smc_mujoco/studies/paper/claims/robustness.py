@@ -99,7 +99,7 @@ def continuous(runs: Runs) -> list[Check]:
 
 
 def fluctuation(trace: Trace) -> tuple[float, float, float]:
-    """Of u in the last part, worst channel: standard deviation, largest step, share of the variance above 50 Hz.
+    """Return standard deviation, largest step and share of variance above 50 Hz of u in the last part, worst channel.
 
     The share is from the discrete Fourier transform, no window; a failed run gives inf, a constant u 0.
     """

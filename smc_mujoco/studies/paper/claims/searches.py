@@ -1,4 +1,4 @@
-"""Searches that claims share: the largest delay that a law tolerates, the smallest lambda that stabilises a plant.
+"""Searches that claims share: the largest delay that a law tolerates, the smallest stabilising lambda.
 
     largest_delays(runs, PLANTS, LAWS)["duffing", "classical"]    # s
 

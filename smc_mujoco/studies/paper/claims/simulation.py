@@ -82,7 +82,7 @@ def larger_undershoot(runs: Runs) -> list[Check]:
     holds_if="2 to 15 %",
 )
 def moderate_undershoot(runs: Runs) -> list[Check | Beside]:
-    """By how much the paper's law's overshoot misses the range: one check, as every number meets one of its ends."""
+    """Distance of the overshoot from the range, as one check: every number would meet one of the range's ends."""
     over = overshoot(scores(runs, [VAN_DER_POL], [OURS])[VAN_DER_POL, OURS])
     outside = max(MODERATE[0] - over, over - MODERATE[1], 0.0)
     return [
@@ -196,12 +196,12 @@ def classical_deviates(runs: Runs) -> list[Check]:
 
 
 def _overshoot(plant: str, law: str, got: ScoresOfPairs, relation: str, limit: float) -> Check:
-    """A law's overshoot against a limit; to stay below one it must settle."""
+    """Check a law's overshoot against a limit; to stay below a limit it must settle."""
     value = overshoot(got[plant, law]) if relation in ("<", "<=") else got[plant, law]["overshoot"]
     return check(f"{plant}: overshoot of {law}, %", value, relation, limit)
 
 
 def _above(plant: str, law: str, other: str, got: ScoresOfPairs) -> Check:
-    """Whether a law's overshoot is larger, by a relevant difference, than another's, which must settle."""
+    """Check that a law's overshoot is larger, by a relevant difference, than another's, which must settle."""
     limit = larger_than(overshoot(got[plant, other]), of=100.0)
     return check(f"{plant}: overshoot of {law} against {other}'s, %", got[plant, law]["overshoot"], ">", limit)

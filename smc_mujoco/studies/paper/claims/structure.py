@@ -8,7 +8,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.lyapunov import input_gain
-from smc_mujoco.studies.paper.claims.runs import OURS, Runs, scale
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs, comes_to_rest, scale
 from smc_mujoco.studies.paper.claims.searches import LEAST, smallest_stable
 from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS, U_MAX
@@ -82,14 +82,10 @@ def no_tuning(runs: Runs) -> list[Check | Beside]:
 def with_estimators(runs: Runs) -> list[Check]:
     """Largest |x| in the last 20 % of the run over |x0|."""
     sigmas = SIGMAS[-1:] if runs.quick else SIGMAS
-    cells = [(plant, name, sigma) for plant in PLANTS for name in ESTIMATORS for sigma in sigmas]
-    grid = [runs.scenario(plant, OURS, velocity=name, noise=Noise(position=sigma)) for plant, name, sigma in cells]
-    return [
-        check(
-            f"{plant}, {name}, sigma {sigma:g}: ultimate bound / |x0|",
-            scores["ultimate_bound"] / scale(run),
-            "<=",
-            0.05,
-        )
-        for (plant, name, sigma), run, scores in zip(cells, grid, runs.scores(grid), strict=True)
-    ]
+    grid = {
+        f"{plant}, {name}, sigma {sigma:g}": runs.scenario(plant, OURS, velocity=name, noise=Noise(position=sigma))
+        for plant in PLANTS
+        for name in ESTIMATORS
+        for sigma in sigmas
+    }
+    return comes_to_rest(runs, grid)

@@ -89,14 +89,14 @@ def table_one(runs: Runs) -> list[Check | Beside]:
 
 
 def chattering(nominal: ScoresOfPairs) -> dict[str, float]:
-    """Law -> TV rate over classical's, worst plant."""
+    """Return law -> TV rate over classical's, worst plant."""
     return {
         law: max(_over(nominal, p, law, "tv_rate", nominal[p, "classical"]["tv_rate"]) for p in PLANTS) for law in LAWS
     }
 
 
 def roughness(nominal: ScoresOfPairs) -> dict[str, float]:
-    """Law -> largest step of u over max |u|, worst plant."""
+    """Return law -> largest step of u over max |u|, worst plant."""
     return {law: max(_over(nominal, p, law, "max_step", nominal[p, law]["max_u"]) for p in PLANTS) for law in LAWS}
 
 
@@ -106,18 +106,18 @@ def _over(got: ScoresOfPairs, plant: str, law: str, metric: str, reference: floa
 
 
 def tolerance(runs: Runs) -> dict[str, float]:
-    """Law -> largest delay less classical's, s, worst plant."""
+    """Return law -> largest delay less classical's, s, worst plant."""
     borne = largest_delays(runs, PLANTS, LAWS)
     return {law: min(borne[p, law] - borne[p, "classical"] for p in PLANTS) for law in LAWS}
 
 
 def growth(runs: Runs, law: str) -> float:
-    """By how much max |u| grows with distance or time, the larger, as a share; worst plant."""
+    """Return the growth of max |u| with distance or with time, whichever is larger, as a share; worst plant."""
     return max(_growth(runs.law(plant, law), scale(runs.scenario(plant, law))) for plant in PLANTS)
 
 
 def _growth(law: Component, start: float) -> float:
-    """Largest |u| that a law asks for far off or for long, over that nearer and sooner, less 1; start is |x0|."""
+    """Return the growth of a law's largest |u|, far off against nearer and late against early; start is |x0|."""
     samples = round(HELD / CONTROL_PERIOD)
     near, far = (np.abs(_asked(law, np.full(2 * samples, times * start))) for times in (10.0, 100.0))
     sooner = near[:samples].max()
@@ -125,7 +125,7 @@ def _growth(law: Component, start: float) -> float:
 
 
 def estimated(runs: Runs, law: str) -> float:
-    """How many signals, beside position and velocity, change what a law does."""
+    """Return how many signals, beside position and velocity, change what a law does."""
     bound = runs.law(PLANTS[0], law)
     x, v, other = np.random.default_rng(0).normal(size=(3, PROBES))
     plain = _asked(bound, x, v)
@@ -133,7 +133,7 @@ def estimated(runs: Runs, law: str) -> float:
 
 
 def _asked(law: Component, x: np.ndarray, v: np.ndarray | None = None, **signals: np.ndarray) -> np.ndarray:
-    """What a law commands, sample by sample, when it is shown x, v and other signals, whatever it does."""
+    """Return what a law commands, sample by sample, when it is shown these signals whatever it commands."""
     function, gains, memory = (
         remade(law.function, lambda same: same),
         SimpleNamespace(**law.gains),

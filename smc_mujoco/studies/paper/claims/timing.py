@@ -1,4 +1,4 @@
-"""What a law costs per control sample: its compiled C function alone, on states that vary from sample to sample.
+"""Time of a law per control sample: its compiled C function alone, on states that vary between samples.
 
 Rounds of the laws are interleaved and the least of each law's counts, as what else runs only adds to it; only ratios
 within one call mean anything. benchmarks/laws.py measures the whole sample, in which reading and logging cost more.
@@ -23,7 +23,7 @@ SEEN = {"dt": 1e-3, "g": 8.0, "limit": 6.0}  # what a pendulum's sample holds be
 
 
 def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str, float]:
-    """Least time per call of each law, ns."""
+    """Return the least time per call of each law, ns."""
     t = np.arange(CALLS) * 1e-3
     states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
     functions = {name: native.component(law) for name, law in laws.items()}  # kept alive while their addresses are used
@@ -43,7 +43,7 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
 
 @functools.cache
 def _loop() -> Callable:
-    """A compiled loop that calls a law once per state."""
+    """Return a compiled loop that calls a law once per state."""
     from numba import njit
 
     e, de = AT["e"], AT["de"]

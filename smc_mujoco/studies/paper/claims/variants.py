@@ -1,4 +1,4 @@
-"""Laws made of laws: with other gains, with the command reversed, or through an input gain that varies with x.
+"""Variants of laws: other gains, a reversed command, or an input gain that varies with x.
 
 A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
 multiplied by g at each sample is therefore the law on that plant, exactly so but for g's change within a control
@@ -15,27 +15,27 @@ from smc_mujoco.control.component import Component
 
 
 def with_gains(law: Component, **gains: float) -> Component:
-    """The law with some of its gains changed."""
+    """Return the law with some of its gains changed."""
     return dataclasses.replace(law, gains=dict(law.gains) | gains)
 
 
 def reversed_gain(law: Component) -> Component:
-    """The law on a plant of the opposite input gain: u becomes -u."""
+    """Return the law as on a plant of the opposite input gain: u becomes -u."""
     return through(law, minus, "reversed")
 
 
 def zero_gain(law: Component) -> Component:
-    """The law with no effect: u becomes 0."""
+    """Return the law with no effect: u becomes 0."""
     return through(law, nothing, "zero")
 
 
 def squeezed(law: Component) -> Component:
-    """The law on a plant whose input gain is its own times 1 / (1 + x^2), x in rad or m."""
+    """Return the law as on a plant whose input gain is its own times 1 / (1 + x^2), x in rad or m."""
     return through(law, bell, "squeezed")
 
 
 def through(law: Component, gain: Callable[[float], float], name: str) -> Component:
-    """The law with its command, bounded as the actuator bounds it, times gain(x), x as measured; named after it."""
+    """Return the law whose command, bounded as by the actuator, is multiplied by gain(x), x as measured."""
     return dataclasses.replace(law, name=f"{law.name}_{name}", function=_multiplied(law.function, gain))
 
 
@@ -56,7 +56,7 @@ def bell(x: float) -> float:
 
 @functools.cache
 def _multiplied(function: Callable, gain: Callable[[float], float]) -> Callable:
-    """Compiled once for each law and gain."""
+    """Return the function times the gain; compiled once for each pair."""
     body, factor = njit(function), njit(gain)
 
     def multiplied(y, gains, memory):
