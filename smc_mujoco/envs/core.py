@@ -1,13 +1,11 @@
-"""A setting: a plant with a task, ready to be simulated; the same for dm_env, gymnasium and batches.
+"""A plant with a task, ready to be simulated: the same for dm_env, gymnasium and batches.
 
-The physics are those of `smc.run`: an action is the command u of a control sample, held for one control period, as a
-part of its channel's limit, which is u_max or what the channel's own motor gives: in [-1, 1], beyond which it
-saturates. Only the law is left out, and what a Scenario puts between plant and law: noise, delay, encoder; and
+The physics are those of `smc.run`. An action is the command u of a control sample, held for one control period, in
+parts of its channel's limit: in [-1, 1], beyond which it saturates. The limit is u_max or what the channel's own motor
+gives. An environment has no law, and nothing that a Scenario puts between plant and law (noise, delay, encoder); and no
 disturbances, contacts and jumps.
 """
 
-import dataclasses
-import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -16,7 +14,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.envs.tasks import TASKS, Pair, Task, reward, starts, tasks
+from smc_mujoco.envs.tasks import TASKS, Pair, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import within
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.plant import Plant, ready
@@ -34,63 +32,68 @@ FIELDS = (  # of a Scenario that an environment takes
 )  # fmt: skip
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Setting:
-    """What environments of every kind share.
+    """A plant with a task, compiled. Environments of every kind have one.
 
     Attributes:
       task: what is asked.
       scenario: the run that an episode is, with the law `none`.
       model: its compiled model.
-      qpos, qvel: where its n channels lie, (n,) each; `ctrl` where the driven ones are commanded.
-      rotors: channels with a rotor of their own, and where it lies in qpos and qvel, (3, m).
+      qpos, qvel: addresses of the n channels, (n,) each.
+      ctrl: addresses of the driven channels' actuators.
+      rotors: channels with a rotor of their own, and its addresses in qpos and qvel, (3, m).
+      rest: qpos (nq,) and qvel (nv,) of a run's start, into which an episode's x and v are put.
+      most: the largest inputs of the model's actuators, (driven,).
       which: the channels that the task singles out, (n,) of bool.
       low, high: bounds of the starts, (n,) each.
-      references: r, r', r'' at every sample, (K + 1, 3); one row of zeros for a task that follows none.
+      references: r, r', r'' at every sample, (K + 1, 3); one row if the task follows none.
+      size: of an observation: positions, velocities, and for a moving task r, r', r''.
+      shape: of an action.
     """
 
-    task: Task
-    scenario: Scenario
-    model: mujoco.MjModel
-    qpos: np.ndarray
-    qvel: np.ndarray
-    ctrl: np.ndarray
-    rotors: np.ndarray
-    which: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    references: np.ndarray
+    def __init__(
+        self,
+        plant: Plant | str,
+        task: str = "regulate",
+        changes: Mapping[str, Any] | None = None,
+        edit: Callable[[mujoco.MjSpec], None] = lambda spec: None,
+    ):
+        """Compile a plant for a task.
 
-    @functools.cached_property
-    def scale(self) -> float:
-        """What the model's actuators take per unit of u."""
-        return math.prod(part.scale for part in self.scenario.actuator)
-
-    @functools.cached_property
-    def most(self) -> np.ndarray:
-        """What the model's actuators take at most, (driven,)."""
-        return self.scale * np.array(self.scenario.limits)
-
-    @functools.cached_property
-    def size(self) -> int:
-        """Numbers in an observation: positions, velocities, and for a moving task r, r', r''."""
-        return 2 * self.scenario.plant.n + 3 * self.task.moving
-
-    @functools.cached_property
-    def shape(self) -> tuple[int]:
-        """Of an action."""
-        return (self.scenario.plant.driven,)
-
-    @functools.cached_property
-    def rest(self) -> Pair:
-        """qpos (nq,) and qvel (nv,) of a run's start, in which an episode's x and v are put."""
-        return assembly.start(self.model, self.scenario)
-
-    def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """What ctrl becomes under an action: each channel's limit times it, saturated, in the actuators' unit.
+        Args:
+          plant: a Plant or the name of one.
+          task: one of `tasks(plant)`.
+          changes: Scenario field -> value, of FIELDS, such as {"control_period": 0.01, "u_max": 3.0}.
+          edit: changes the mechanism before it is compiled, but not how it moves.
 
         Raises:
-          ScenarioError: an action of another shape, or with what is no finite number.
+          ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
+        """
+        plant = find_plant(plant) if isinstance(plant, str) else plant
+        self.task, offered = find("task", task, TASKS), tasks(plant)
+        if task not in offered:
+            raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(offered)}")
+        changes = _checked({} if changes is None else changes, task)
+        self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
+        if math.inf in self.scenario.limits:
+            raise ScenarioError("u_max is inf: give a finite one, so that an agent knows what it may ask")
+        fixed = np.array(self.scenario.x0)
+        self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
+        self.model = _compiled(self.scenario, edit)
+        table = channels(self.model)
+        self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
+        self.rotors = _rotors(self.model)
+        self.rest = assembly.start(self.model, self.scenario)
+        self.most = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
+        self.which = self.task.which(plant)
+        self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
+        self.size, self.shape = 2 * plant.n + 3 * self.task.moving, (plant.driven,)
+
+    def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
+        """Return the actuators' inputs for an action: each channel's limit times the action, saturated.
+
+        Raises:
+          ScenarioError: an action of another shape, or not of finite numbers.
         """
         try:
             a = np.asarray(action, float)
@@ -102,12 +105,12 @@ class Setting:
         return self.most * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def stretches(self, ctrl: np.ndarray, command: np.ndarray, first: np.ndarray) -> Iterator[int]:
-        """Put a command through a control period: write ctrl, and yield for how many physics steps it holds.
+        """Write a command into ctrl over a control period, and yield for how many physics steps each input holds.
 
         Args:
           ctrl: of one simulation, (nu,), or of several, (..., nu).
           command: what `command` returned, (..., driven).
-          first: the output of the first of two drives at the period's begin, which becomes that at its end; as command.
+          first: the output of the first of two drives, as command; it is updated.
         """
         tandem, steps = self.scenario.tandem, self.scenario.steps
         if tandem is None:
@@ -119,7 +122,7 @@ class Setting:
             yield 1
 
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
-        """A start: x and v, (n,) each, from a numpy generator of either kind, or as options x0 and v0 say.
+        """Return a start, x and v, (n,) each: drawn from a numpy generator of either kind, or from options x0 and v0.
 
         Raises:
           ScenarioError: another option, not n finite numbers, or an x0 outside a joint's range.
@@ -144,68 +147,76 @@ class Setting:
         qpos[at_q], qvel[at_v] = x[channel], v[channel]
 
     def reference(self, k: Any) -> np.ndarray:
-        """r, r', r'' at sample k, (..., 3)."""
-        return np.take(self.references, k, axis=0, mode="clip")  # a copy: who observes may write into it
+        """Return r, r', r'' at sample k, (..., 3), as a copy."""
+        return np.take(self.references, k, axis=0, mode="clip")
 
     def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
-        """The observation at sample k: x, v, and for a moving task the reference, (..., size)."""
+        """Return the observation at sample k: x, v, and for a moving task the reference, (..., size)."""
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
     def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
-        """The reward of being at x, v (..., n) at sample k."""
+        """Return the reward for x, v (..., n) at sample k."""
         return reward(*self.task.errors(x, v, self.reference(k), self.which))
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
-        """Whether x, v (..., n) are outside the finite world, where an episode ends without reward."""
+        """Return whether x, v (..., n) are outside the finite world."""
         return ~(np.vecdot(x, x) + np.vecdot(v, v) < MAX_STATE**2)
 
 
+class Episode:
+    """An episode of one simulation: the base of a gymnasium environment and of a task for dm_control.
+
+    Attributes:
+      setting: the plant with its task.
+      sample: control samples since the episode began.
+      first: the output of the first of two drives, (driven,).
+      x, v: positions and velocities, (n,) each.
+      over: whether the plant has left the finite world, where an episode ends without reward.
+    """
+
+    def __init__(self, setting: Setting):
+        self.setting, self.sample, self.first, self.over = setting, 0, np.zeros(setting.shape), False
+        self.x = self.v = np.zeros(setting.scenario.plant.n)
+
+    def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
+        """Draw a start, or take it from options x0 and v0."""
+        x, v = self.setting.draw(random, options)
+        mujoco.mj_resetData(self.setting.model, data)
+        self.setting.place(data.qpos, data.qvel, x, v)
+        self.sample, self.first[:] = 0, 0.0
+        self.look(data)
+
+    def stretches(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
+        """Give an action to the actuators, and yield for how many physics steps each of their inputs holds."""
+        return self.setting.stretches(data.ctrl, self.setting.command(action), self.first)
+
+    def look(self, data: mujoco.MjData) -> None:
+        """Read the state."""
+        self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
+        self.over = bool(self.setting.lost(self.x, self.v))
+
+    def reward(self) -> float:
+        """Return the reward of the state, in [0, 1]."""
+        return 0.0 if self.over else float(self.setting.reward(self.x, self.v, self.sample))
+
+
 def bounded(observation: np.ndarray) -> np.ndarray:
-    """An observation from outside the finite world, the last of its episode, as numbers that end there."""
+    """Return an observation with its values limited to the finite world: the last one of an episode that left it."""
     return np.clip(
         np.nan_to_num(observation, nan=MAX_STATE, posinf=MAX_STATE, neginf=-MAX_STATE), -MAX_STATE, MAX_STATE
     )
 
 
 def _culprit(action: Any, a: np.ndarray, shape: tuple[int, ...]) -> str:
-    """A refused action in words: of many copies the first one that is not finite."""
+    """Return a refused action in words; of many copies the first one that is not finite."""
     if a.shape != shape or a.ndim < 2:
         return shown(action)
     i = int(np.argmin(np.abs(a).max(axis=-1) < MAX_CONTROL))
     return f"{shown(a[i].tolist())} for copy {i}"
 
 
-def setting(
-    plant: Plant | str,
-    task: str = "regulate",
-    changes: Mapping[str, Any] | None = None,
-    edit: Callable[[mujoco.MjSpec], None] = lambda spec: None,
-) -> Setting:
-    """A plant with a task.
-
-    Args:
-      plant: a Plant or the name of one.
-      task: one of `tasks(plant)`.
-      changes: Scenario field -> value, of FIELDS, such as {"control_period": 0.01, "u_max": 3.0}.
-      edit: what is done to the mechanism before it is compiled, and does not change how it moves.
-
-    Raises:
-      ScenarioError: a plant, task or field that there is not, a task that is not for the plant, a value out of range.
-    """
-    plant = find_plant(plant) if isinstance(plant, str) else plant
-    found, offered = find("task", task, TASKS), tasks(plant)
-    if task not in offered:
-        raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(offered)}")
-    changes = _checked({} if changes is None else changes, task)
-    scenario = Scenario(**({"plant": plant, "law": "none"} | found.fields(plant) | changes))
-    if math.inf in scenario.limits:
-        raise ScenarioError("u_max is inf: give a finite one, so that an agent knows what it may ask")
-    fixed = np.array(scenario.x0)
-    return _built(scenario, found, starts(found, plant) if changes.get("x0") is None else (fixed, fixed), edit)
-
-
 def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
-    """Changes as a dict, or ScenarioError."""
+    """Return changes as a dict, or raise ScenarioError."""
     if not isinstance(changes, Mapping):
         raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
     for name in changes:
@@ -216,16 +227,19 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
     return dict(changes)
 
 
-def _built(scenario: Scenario, task: Task, spread: Pair, edit: Callable[[mujoco.MjSpec], None]) -> Setting:
-    """The Setting of a scenario and its task, compiled."""
-    model = _compiled(scenario, edit)
-    table = channels(model)
+def _rotors(model: mujoco.MjModel) -> np.ndarray:
+    """Return the channels with a rotor of their own, and its addresses in qpos and qvel, (3, m)."""
     rotors = []
     for i, joint in enumerate(joint_ids(model)):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
         if rotor >= 0:
             rotors.append((i, model.jnt_qposadr[rotor], model.jnt_dofadr[rotor]))
-    times = np.arange(scenario.samples + 1 if task.moving else 1) * scenario.control_period
+    return np.array(rotors, int).reshape(-1, 3).T
+
+
+def _references(scenario: Scenario, samples: int) -> np.ndarray:
+    """Return r, r', r'' at the first samples, (samples, 3)."""
+    times = np.arange(samples) * scenario.control_period
     try:
         references = np.array([signalled(scenario.reference, float(t)) for t in times])
     except Failure as failure:
@@ -233,23 +247,11 @@ def _built(scenario: Scenario, task: Task, spread: Pair, edit: Callable[[mujoco.
     if not (finite := np.isfinite(references).all(axis=1)).all():
         at = f"t = {times[np.argmin(finite)]:.6g} s"
         raise ScenarioError(f"reference {shown(scenario.reference)} is no finite number at {at}: give another")
-    return Setting(
-        task=task,
-        scenario=scenario,
-        model=model,
-        qpos=table["qpos"],
-        qvel=table["qvel"],
-        ctrl=table["ctrl"][: scenario.plant.driven],
-        rotors=np.array(rotors, int).reshape(-1, 3).T,
-        which=task.which(scenario.plant),
-        low=spread[0],
-        high=spread[1],
-        references=references,
-    )
+    return references
 
 
 def _compiled(scenario: Scenario, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
-    """What `assembly.model` makes of a scenario, edited, with its numbers."""
+    """Return the model of a scenario, with its mechanism edited."""
     spec = assembly.spec([scenario])
     edit(spec)
     made = ready(spec, 0)

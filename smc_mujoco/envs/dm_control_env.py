@@ -23,7 +23,7 @@ from dm_env import specs
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
-from smc_mujoco.envs.core import Setting, bounded, setting
+from smc_mujoco.envs.core import Episode, Setting, bounded
 from smc_mujoco.envs.tasks import tasks
 from smc_mujoco.mechanisms.plant import Plant, plants
 
@@ -37,72 +37,59 @@ ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep"
 
 
 class PlantPhysics(Physics):
-    """dm_control's physics, in which a plant that leaves the finite world ends its episode and raises nothing.
+    """dm_control's physics, where a plant that leaves the finite world raises nothing.
 
     Attributes:
-      stretches: how the coming physics steps follow each other, as of `Setting.stretches`.
+      stretches: numbers of the coming physics steps, of `Setting.stretches`.
     """
 
     stretches: Iterable[int] = ()
 
     def step(self, nstep: int = 1) -> None:
-        """Take physics steps, by stretches where a command goes through two drives."""
+        """Take physics steps, in stretches where a command goes through two drives."""
         stretches, self.stretches = self.stretches, ()
         for steps in stretches:
             super().step(steps)
             nstep -= steps
-        if nstep > 0:  # whoever steps without a command
+        if nstep > 0:  # a user may step without a command
             super().step(nstep)
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
-        """Leave it to `PlantTask.over`."""
+        """Check nothing: `PlantTask.over` does it."""
         yield
 
 
-class PlantTask(control.Task):
-    """A task of `tasks` for dm_control.
+class PlantTask(Episode, control.Task):
+    """A task of `tasks` for dm_control. Attributes are those of an Episode, and:
 
     Attributes:
-      setting: the plant with its task.
       random: the numpy generator of the starts.
-      sample: control samples since the episode began.
-      first: the output of the first of two drives, (driven,).
     """
 
     def __init__(self, setting: Setting, random: Any):
-        self.setting, self.random, self.sample = setting, random, 0
-        self.x = self.v = np.zeros(setting.scenario.plant.n)
-        self.first = np.zeros(setting.shape)
-        self.over = False
+        super().__init__(setting)
+        self.random = random
 
     def initialize_episode(self, physics: Physics) -> None:
         """Draw a start."""
-        data = physics.data.ptr
-        self.setting.place(data.qpos, data.qvel, *self.setting.draw(self.random))
-        self.sample, self.first[:] = 0, 0.0
-        self._look(physics)
+        self.begin(physics.data.ptr, self.random)
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Give the command to the actuators."""
-        physics.stretches = self.setting.stretches(physics.data.ptr.ctrl, self.setting.command(action), self.first)
+        physics.stretches = self.stretches(physics.data.ptr, action)
 
     def after_step(self, physics: Physics) -> None:
-        """Count the sample."""
+        """Count the sample and read the state."""
         self.sample += 1
-        self._look(physics)
-
-    def _look(self, physics: Physics) -> None:
-        data = physics.data.ptr
-        self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
-        self.over = bool(self.setting.lost(self.x, self.v))
+        self.look(physics.data.ptr)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Commands of the driven channels, in parts of their limits."""
+        """Return the spec of commands of the driven channels, in parts of their limits."""
         return specs.BoundedArray(self.setting.shape, float, minimum=-1.0, maximum=1.0, name="u")
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Positions and velocities, and what is to be followed."""
+        """Return positions and velocities, and for a moving task the reference."""
         x, v = (bounded(self.x), bounded(self.v)) if self.over else (self.x, self.v)
         found = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
@@ -110,11 +97,11 @@ class PlantTask(control.Task):
         return found
 
     def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """In [0, 1]; 0 outside the finite world."""
-        return 0.0 if self.over else float(self.setting.reward(self.x, self.v, self.sample))
+        """Return the reward of the state."""
+        return self.reward()
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """0 where the plant has left the finite world: nothing is to be had any more."""
+        """Return the discount 0 where the plant has left the finite world, which ends the episode."""
         return 0.0 if self.over else None
 
 
@@ -128,7 +115,7 @@ def load(
     changes: Mapping[str, Any] | None = None,
     flat_observation: bool = False,
 ) -> control.Environment:
-    """A plant with a task as a dm_env environment.
+    """Return a plant with a task as a dm_env environment.
 
     Args:
       domain: a Plant or the name of one.
@@ -150,7 +137,7 @@ def load(
     flat_observation = named.pop("flat_observation", flat_observation)
     if named and isinstance(changes, Mapping | None):
         changes = {**(changes or {}), **named}
-    found = setting(domain, task, changes)
+    found = Setting(domain, task, changes)
     if not isinstance(random, np.random.RandomState | np.random.Generator):
         random = _generator(random)
     scenario = found.scenario
@@ -170,14 +157,14 @@ def _all_tasks() -> tuple[tuple[str, str], ...]:
 
 
 def __getattr__(name: str) -> object:
-    """ALL_TASKS: every plant with each of its tasks; found out when asked for, as it loads the plants' models."""
+    """Return ALL_TASKS, every plant with each of its tasks. It loads the plants' models, so it is made on demand."""
     if name == "ALL_TASKS":
         return _all_tasks()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def _named(what: str, given: object, known: Mapping[str, str]) -> dict[str, Any]:
-    """Arguments in the words of dm_control's suite as ours."""
+    """Return arguments named as in dm_control's suite under our names."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):

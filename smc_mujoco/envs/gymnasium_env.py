@@ -2,10 +2,10 @@
 
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
-An observation is positions and velocities, and for `track` r, r', r'', one after another; an action is the command of
-the driven channels, in parts of their limits, in float32, which learners give. An episode is truncated at the
-scenario's duration, which is also the max_episode_steps of its spec, and terminated where the plant leaves the finite
-world. Tasks and rewards stand in `tasks`, many copies in one batch in `vector`.
+An observation is positions and velocities, and for `track` r, r', r'', one after another. An action is the command of
+the driven channels, in parts of their limits, in float32. An episode is truncated at the scenario's duration, which is
+also the max_episode_steps of its spec, and terminated where the plant leaves the finite world. Tasks and rewards are in
+`tasks`, many copies in one batch in `vector_env`.
 """
 
 import copy
@@ -19,7 +19,7 @@ from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.envs import registration
-from smc_mujoco.envs.core import Setting, bounded, setting
+from smc_mujoco.envs.core import Episode, Setting, bounded
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 
@@ -32,12 +32,12 @@ registration.register()  # for who imports this module alone
 
 
 def action_space(found: Setting) -> spaces.Box:
-    """Commands of the driven channels, in parts of their limits."""
+    """Return the space of commands of the driven channels, in parts of their limits."""
     return spaces.Box(-1.0, 1.0, found.shape, np.float32)
 
 
 def observation_space(found: Setting) -> spaces.Box:
-    """The finite world; for r, r', r'' as much more as they take."""
+    """Return the space of observations: the finite world, for r, r', r'' as much more as they take."""
     high = np.full(found.size, MAX_STATE)
     if found.task.moving:
         high[-3:] = np.maximum(MAX_STATE, np.abs(found.references).max(axis=0))
@@ -56,25 +56,22 @@ class Timed:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """What gymnasium made the environment from."""
+        """The spec that gymnasium made the environment from."""
         return self._spec
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        """Take it over, with the episode's own length."""
+        """Take a spec over, with the episode's own length."""
         self._spec = copy.copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.last
 
 
-class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """One plant with a task.
+class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
+    """One plant with a task. Attributes are those of an Episode, and:
 
     Attributes:
-      setting: the plant with its task.
       data: the simulation's state.
-      first: the output of the first of two drives, (driven,).
-      sample: control samples since the episode began.
       last: the sample at which an episode is truncated.
     """
 
@@ -87,45 +84,40 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Arguments as of `setting.setting`; `reset` takes options x0 and v0.
+        """Arguments as of `core.Setting`; `reset` takes options x0 and v0.
 
         Raises:
-          ScenarioError: what `setting` raises, or another render_mode.
+          ScenarioError: what `core.Setting` raises, or another render_mode.
         """
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
-        self.setting, self.render_mode, self.sample = setting(plant, task, changes), render_mode, 0
-        self.last = self.setting.scenario.samples
+        Episode.__init__(self, Setting(plant, task, changes))
+        self.render_mode, self.last = render_mode, self.setting.scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / self.setting.scenario.control_period))}
-        self.data, self.first = mujoco.MjData(self.setting.model), np.zeros(self.setting.shape)
+        self.data = mujoco.MjData(self.setting.model)
         self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
         self.renderer: mujoco.Renderer | None = None
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Draw a start, or take it from options x0 and v0; the observation, and no more to tell."""
+        """Draw a start, or take it from options x0 and v0. Return the observation and an empty info."""
         super().reset(seed=seed)
-        x, v = self.setting.draw(self.np_random, options)
-        mujoco.mj_resetData(self.setting.model, self.data)
-        self.setting.place(self.data.qpos, self.data.qvel, x, v)
-        self.sample, self.first[:] = 0, 0.0
-        return self.setting.observe(x, v, 0), {}
+        self.begin(self.data, self.np_random, options)
+        return self.setting.observe(self.x, self.v, 0), {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One control period under an action: observation, reward, terminated, truncated, and no more to tell."""
-        found, data = self.setting, self.data
-        for steps in found.stretches(data.ctrl, found.command(action), self.first):
-            mujoco.mj_step(found.model, data, steps)
+        """Take one control period. Return observation, reward, terminated, truncated and an empty info."""
+        for steps in self.stretches(self.data, action):
+            mujoco.mj_step(self.setting.model, self.data, steps)
         self.sample += 1
-        x, v = data.qpos[found.qpos], data.qvel[found.qvel]
-        observation, truncated = found.observe(x, v, self.sample), self.sample >= self.last
-        if found.lost(x, v):
-            return bounded(observation), 0.0, True, truncated, {}
-        return observation, float(found.reward(x, v, self.sample)), False, truncated, {}
+        self.look(self.data)
+        observation = self.setting.observe(self.x, self.v, self.sample)
+        seen = bounded(observation) if self.over else observation
+        return seen, self.reward(), self.over, self.sample >= self.last, {}
 
     def render(self) -> np.ndarray | None:
-        """What the plant's own camera sees, (height, width, 3), with render_mode "rgb_array".
+        """Return what the plant's own camera sees, (height, width, 3), with render_mode "rgb_array", else None.
 
         Raises:
           ScenarioError: there is nothing to render with.
@@ -139,11 +131,11 @@ class PlantEnv(Timed, gymnasium.Env):  # pyright: ignore[reportIncompatibleVaria
         return self.renderer.render()
 
     def close(self) -> None:
-        """Give the renderer back."""
+        """Close the renderer."""
         if self.renderer is not None:
             self.renderer.close()
             self.renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """For copies and other processes: all but the renderer."""
+        """Return all but the renderer, for copies and other processes."""
         return self.__dict__ | {"renderer": None}

@@ -1,9 +1,10 @@
-"""Tasks for agents: what is asked of a plant, where episodes start, and what is rewarded.
+"""Tasks for agents: what a plant is asked to do, where episodes start, and what is rewarded.
 
     reward = T(rms(e)) (4 + T(rms(w) / 5)) / 5,    T(a) = 10^(-a^2)
 
 in [0, 1], rms over the channels. T is dm_control's tolerance about 0 with margin 1 (Tassa et al., DeepMind Control
-Suite, 2018), and the form is its cart-pole's; the margins, 1 (rad or m) for e and 5 (per second) for w, are chosen.
+Suite, 2018), and the form is that of its cart-pole. The margins, 1 (rad or m) for e and 5 (per second) for w, are
+chosen.
 
     task          e                                          w                  an episode starts with |x| up to
     regulate      x                                          x'                 the plant's x0
@@ -11,14 +12,11 @@ Suite, 2018), and the form is its cart-pole's; the margins, 1 (rad or m) for e a
     swing_up      1 - cos x of toppling hinges, x of others  x'                 hanging within 0.1 rad, 0 in others
     synchronise   x - the channels' mean                     x' - its mean      the largest of the plant's x0
 
-and within the ranges that the joints of a model of yours have.
+and within the ranges of the joints, which a model of yours may have.
 """
 
-import dataclasses
 import functools
 import math
-import operator
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -31,51 +29,124 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.signals import Sine
 
 LN10 = math.log(10.0)
-CALM = 5.0  # rad/s or m/s, the margin of w: chosen
-ASIDE = 0.1  # rad, how far from hanging a swing-up begins: chosen
-WEAK = 0.5  # u_max of a swing-up, in torques that hold the pendulum level: chosen, so that one push is not enough
-WAY = Sine(amplitude=0.5, omega=1.0)  # rad or m, what `track` follows unless told: chosen
+RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
+SWING_UP_SPREAD = 0.1  # rad, how far from hanging a swing-up starts: chosen
+SWING_UP_TORQUE = 0.5  # u_max of a swing-up, in torques that hold the pendulum level: chosen, one push is not enough
+TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, what `track` follows unless told otherwise: chosen
 
 Pair = tuple[np.ndarray, np.ndarray]
 
 
-def _all(plant: Plant) -> np.ndarray:
-    return np.ones(plant.n, bool)
-
-
-def _none(plant: Plant) -> dict[str, Any]:
-    return {}
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Task:
-    """What an agent is to do; of functions with names, so that pickle knows them.
+    """What an agent is to do. This one, `regulate`, brings every channel to 0; the others differ from it.
 
     Attributes:
-      fits: whether a plant has this task.
-      spread: plant -> the lowest and the highest start of its channels, (n,) each, whatever their ranges.
-      errors: (x, v, r, which) -> e and w; x and v are (..., n), r the reference and its derivatives, (..., 3).
-      which: plant -> the channels that the task singles out, (n,) of bool.
-      fields: plant -> Scenario fields that it sets unless told.
-      moving: whether it follows a reference, which is then part of the observation.
+      moving: whether the task follows a reference, which is then part of the observation.
     """
 
-    fits: Callable[[Plant], bool]
-    spread: Callable[[Plant], Pair]
-    errors: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Pair]
-    which: Callable[[Plant], np.ndarray] = _all
-    fields: Callable[[Plant], dict[str, Any]] = _none
-    moving: bool = False
+    moving = False
+
+    def fits(self, plant: Plant) -> bool:
+        """Return whether a plant has this task."""
+        return True
+
+    def fields(self, plant: Plant) -> dict[str, Any]:
+        """Return the Scenario fields that the task sets unless told otherwise."""
+        return {}
+
+    def which(self, plant: Plant) -> np.ndarray:
+        """Return which channels the task singles out, (n,) of bool."""
+        return np.ones(plant.n, bool)
+
+    def spread(self, plant: Plant) -> Pair:
+        """Return the lowest and the highest start of the channels, (n,) each, whatever their ranges."""
+        most = np.abs(plant.x0)
+        return -most, most
+
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+        """Return e and w for x and v, (..., n) each; r is the reference with its derivatives, (..., 3)."""
+        return x, v
+
+
+class Track(Task):
+    """Follow a reference with the driven channels."""
+
+    moving = True
+
+    def fields(self, plant: Plant) -> dict[str, Any]:
+        """Return the reference."""
+        return {"reference": TRACK_REFERENCE}
+
+    def which(self, plant: Plant) -> np.ndarray:
+        """Return which channels have an actuator."""
+        return np.arange(plant.n) < plant.driven
+
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+        """Return how far the driven channels are from the reference."""
+        return x - r[..., :1] * which, v - r[..., 1:2] * which
+
+
+class SwingUp(Task):
+    """Bring hanging pendulums and poles upright."""
+
+    def fits(self, plant: Plant) -> bool:
+        """Return whether something can hang and be swung up with a weak drive. One u_max has one unit."""
+        down, (least, most) = toppling(plant), _ranges(plant)
+        hangs = (least[down] <= math.pi) & (most[down] >= math.pi)
+        one = plant.free or {"rad"}.issuperset(plant.units)
+        return bool(down.any() and hangs.all() and one)
+
+    def fields(self, plant: Plant) -> dict[str, Any]:
+        """Return a torque too weak to push the heaviest pendulum up at once. A cart keeps its force."""
+        if plant.free:
+            return {}
+        down, p = toppling(plant), Values(**plant.parameters)
+        level = math.pi / 2 * down
+        pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
+        return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}
+
+    def which(self, plant: Plant) -> np.ndarray:
+        """Return which channels topple."""
+        return toppling(plant)
+
+    def spread(self, plant: Plant) -> Pair:
+        """Return starts about hanging."""
+        down = toppling(plant)
+        return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
+
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+        """Return how far the toppling channels are from upright."""
+        return np.where(which, 1.0 - np.cos(x), x), v
+
+
+class Synchronise(Task):
+    """Bring the channels of a network together."""
+
+    def fits(self, plant: Plant) -> bool:
+        """Return whether the plant is a network."""
+        return plant.network
+
+    def spread(self, plant: Plant) -> Pair:
+        """Return the same range for every channel."""
+        most = np.full(plant.n, max(np.abs(plant.x0)))
+        return -most, most
+
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+        """Return how far the channels are from their mean."""
+        return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
+
+
+TASKS = {"regulate": Task(), "track": Track(), "swing_up": SwingUp(), "synchronise": Synchronise()}
 
 
 def reward(e: np.ndarray, w: np.ndarray) -> Any:
-    """The reward for errors e and w, (..., n) each."""
+    """Return the reward for errors e and w, (..., n) each."""
     rate = -LN10 / e.shape[-1]
-    return np.exp(rate * np.vecdot(e, e)) * (0.8 + 0.2 * np.exp(rate / CALM**2 * np.vecdot(w, w)))
+    return np.exp(rate * np.vecdot(e, e)) * (0.8 + 0.2 * np.exp(rate / RATE_MARGIN**2 * np.vecdot(w, w)))
 
 
 def tasks(plant: Plant | str) -> list[str]:
-    """Names of the tasks that a plant has."""
+    """Return the names of the tasks that a plant has."""
     kind = find_plant(plant) if isinstance(plant, str) else plant
     if not isinstance(kind, Plant):
         raise ScenarioError(f"plant is {shown(plant)}: give smc.plant(...) or one of the names smc.plants() lists")
@@ -83,93 +154,23 @@ def tasks(plant: Plant | str) -> list[str]:
 
 
 def starts(task: Task, plant: Plant) -> Pair:
-    """The lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
-    low, high = task.spread(plant)
+    """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
     least, most = _ranges(plant)
+    low, high = task.spread(plant)
     return np.clip(low, least, most), np.clip(high, least, most)
 
 
 def _ranges(plant: Plant) -> Pair:
-    """The least and the largest positions that the joints have, (n,) each."""
+    """Return the least and the largest positions of the joints, (n,) each."""
     found = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
     return found[:, 0], found[:, 1]
 
 
 @functools.lru_cache(maxsize=64)
 def toppling(plant: Plant) -> np.ndarray:
-    """Which channels fall further when they lean: hinges for which x = 0 is unstable, (n,) of bool."""
+    """Return which channels fall further when they lean, (n,) of bool: hinges for which x = 0 is unstable."""
     model = plant.load()
     hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
     lean = 0.1 * hinged
     f = [plant.nominal(lean, 0.0 * lean, i, Values(**plant.parameters))[0] for i in range(plant.n)]
     return hinged & (np.array(f) > 0.0)
-
-
-def driven(plant: Plant) -> np.ndarray:
-    """Which channels have an actuator, (n,) of bool."""
-    return np.arange(plant.n) < plant.driven
-
-
-def _any(plant: Plant) -> bool:
-    return True
-
-
-def _topples(plant: Plant) -> bool:
-    """Whether it has what can hang and be swung up, and be driven weakly: one u_max has one unit."""
-    down, (least, most) = toppling(plant), _ranges(plant)
-    hangs = (least[down] <= math.pi) & (most[down] >= math.pi)
-    one = plant.free or {"rad"}.issuperset(plant.units)
-    return bool(down.any() and hangs.all() and one)
-
-
-def _way(plant: Plant) -> dict[str, Any]:
-    return {"reference": WAY}
-
-
-def _within_start(plant: Plant) -> Pair:
-    most = np.abs(plant.x0)
-    return -most, most
-
-
-def _hanging(plant: Plant) -> Pair:
-    down = toppling(plant)
-    return (math.pi - ASIDE) * down, (math.pi + ASIDE) * down
-
-
-def _apart(plant: Plant) -> Pair:
-    most = np.full(plant.n, max(np.abs(plant.x0)))
-    return -most, most
-
-
-def _weak(plant: Plant) -> dict[str, Any]:
-    """Torques too weak to push the heaviest pendulum up at once; a cart keeps its force, its pole has no torque."""
-    if plant.free:
-        return {}
-    down, p = toppling(plant), Values(**plant.parameters)
-    level = math.pi / 2 * down
-    pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
-    return {"u_max": WEAK * max(abs(f / g) for f, g in pulls)}
-
-
-def _regulate(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-    return x, v
-
-
-def _track(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-    return x - r[..., :1] * which, v - r[..., 1:2] * which
-
-
-def _swing_up(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-    return np.where(which, 1.0 - np.cos(x), x), v
-
-
-def _synchronise(x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-    return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
-
-
-TASKS = {
-    "regulate": Task(fits=_any, spread=_within_start, errors=_regulate),
-    "track": Task(fits=_any, spread=_within_start, errors=_track, which=driven, fields=_way, moving=True),
-    "swing_up": Task(fits=_topples, spread=_hanging, errors=_swing_up, which=toppling, fields=_weak),
-    "synchronise": Task(fits=operator.attrgetter("network"), spread=_apart, errors=_synchronise),
-}

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, whole
-from smc_mujoco.envs.core import bounded, setting
+from smc_mujoco.envs.core import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
@@ -57,7 +57,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         max_episode_steps: int | None = None,
         render_mode: None = None,
     ):
-        """Arguments as of `setting.setting`.
+        """Arguments as of `core.Setting`.
 
         Args:
           threads: None for one per available core.
@@ -66,11 +66,11 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
           render_mode: None: copies are not drawn.
 
         Raises:
-          ScenarioError: what `setting` raises, or a value of these that there is not.
+          ScenarioError: what `core.Setting` raises, or a value of these that there is not.
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
-        self.num_envs, self.setting = whole("num_envs", num_envs, 1, MOST), setting(plant, task, changes, edit=strip)
+        self.num_envs, self.setting = whole("num_envs", num_envs, 1, MOST), Setting(plant, task, changes, edit=strip)
         relieve(self.setting.model)
         self.metadata = self.metadata | {"autoreset_mode": _mode(autoreset_mode)}
         most = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)

@@ -16,7 +16,7 @@ from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm
 import smc_mujoco as smc
 from smc_mujoco.common import extras, gl
 from smc_mujoco.envs import tasks
-from smc_mujoco.envs.core import setting
+from smc_mujoco.envs.core import Setting
 from smc_mujoco.simulation import callback
 
 suite = dm_control_suite()
@@ -119,7 +119,7 @@ def test_what_makes_an_environment_waits_for_other_threads_runs_in_the_plain_loo
 
 
 def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
-    found, random = setting("duffing"), np.random.default_rng(0)
+    found, random = Setting("duffing"), np.random.default_rng(0)
     for x, v in random.normal(scale=(1.0, 5.0), size=(20, 2)):
         calm = rewards.tolerance(v, margin=5.0)
         expected = rewards.tolerance(x, margin=1.0) * (4.0 + calm) / 5.0
@@ -137,7 +137,7 @@ def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
     ],
 )
 def test_the_reward_is_one_at_the_goal_and_small_far_from_it(plant, task, goal, miss):
-    found = setting(plant, task)
+    found = Setting(plant, task)
     still = np.zeros(len(goal))
     assert found.reward(np.array(goal), still, 0) == pytest.approx(1.0)
     assert found.reward(np.array(miss), still, 0) < 0.35
@@ -145,7 +145,7 @@ def test_the_reward_is_one_at_the_goal_and_small_far_from_it(plant, task, goal, 
 
 
 def test_tracking_is_rewarded_where_the_plant_follows():
-    found = setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
+    found = Setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
     r, dr, _ = found.reference(300)
     assert (r, dr) == pytest.approx((0.5 * np.sin(0.6), np.cos(0.6)))
     assert found.reward(np.array([r, 0.0]), np.array([dr, 0.0]), 300) == pytest.approx(1.0)

@@ -401,7 +401,7 @@ except ValueError as error:
         (lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]), "call reset first"),
         (lambda: BatchEnv("duffing", 2).reset(seed=[1]), "seed has 1 values for 2 copies"),
         (lambda: BatchEnv("duffing", 2).reset(seed="a"), "seed is 'a'"),
-        (lambda: smc.agent("classical", BatchEnv("duffing", 2)), "give one of smc_mujoco.envs.dm_control_env"),
+        (lambda: smc.agent("classical", BatchEnv("duffing", 2)), "give one of smc_mujoco.suite"),
         (lambda: smc.agent("clasical", PlantEnv("duffing")), "did you mean 'classical'"),
         (lambda: smc.agent("classical", PlantEnv("duffing"))(np.zeros(1)), "what the environment returned"),
     ],
