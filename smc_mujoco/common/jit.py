@@ -35,7 +35,7 @@ if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread 
 
 
 class NotCompilable(Exception):
-    """Why a function runs in the plain loop instead."""
+    """Why a function runs in the reference loop instead."""
 
 
 def _pointer_to(kind: types.Type) -> Callable:

@@ -4,7 +4,8 @@ A process has one set of callbacks, eight of them. A run installs the control ca
 that a trace depends on its scenario alone; afterwards all are put back.
 
 MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
-that Python does not know. The plain loop installs such a function. The harness is native code, which is no obstacle.
+that Python does not know. The reference loop installs such a function. The compiled callback is native code, with
+which MuJoCo can compile models.
 """
 
 import contextlib

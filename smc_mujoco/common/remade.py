@@ -1,7 +1,7 @@
 """Functions remade: copies in which every numba-compiled function that they reach is compiled anew, or not at all.
 
 numba checks array bounds only where it was asked to. A law's own helpers were compiled as their author liked, so a
-law is run with copies of them: compiled with checks, or, in the plain loop, as the Python functions they were written.
+law is run with copies of them: compiled with checks or, in the reference loop, as the Python functions they are.
 """
 
 from collections.abc import Callable

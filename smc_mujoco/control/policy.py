@@ -4,7 +4,7 @@
 
 A policy sees the positions and velocities that it has in an environment; in a network it is asked channel by channel,
 each with its own. It is to be a function of the observation alone: what it remembered would go from channel to channel
-and from run to run. It is Python, and so such runs take the plain loop.
+and from run to run. It is Python, and so such runs take the reference loop.
 """
 
 import copy

@@ -1,4 +1,4 @@
-"""A run in MuJoCo's viewer at real time: the plain loop's control, with a slider for each gain of its law.
+"""A run in MuJoCo's viewer at real time: the reference loop's control, with a slider for each gain of its law.
 
 What is shown is a model of its own, which has the sliders and takes positions from the run. So the run is that of
 `smc.run`, whatever the viewer's panels do to what is shown. Three things go the other way: the gains, what the mouse
@@ -168,7 +168,7 @@ class Live:
 
 
 class Pushed(Loop):
-    """The plain loop with a force and a torque on every body besides, (nbody, 6), as xfrc_applied has them."""
+    """The reference loop with a force and a torque on every body besides, (nbody, 6), as xfrc_applied has them."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)

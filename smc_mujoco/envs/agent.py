@@ -3,7 +3,7 @@
     act = smc.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-A law sees what it would see in `smc.run`, and its episode is the trace of that run: it is the plain loop's own code
+A law sees what it would see in `smc.run`, and its episode is the trace of that run: it is the reference loop's own code
 that asks it.
 """
 
@@ -59,7 +59,7 @@ class Agent:
 
     Attributes:
       source: the part of the environment that knows the time, its `sample`.
-      loop: the plain loop of the scenario with the law in it, of which only the controller is used.
+      loop: the reference loop of the scenario with the law in it, of which only the controller is used.
     """
 
     def __init__(self, source: Any, loop: reference.Loop):

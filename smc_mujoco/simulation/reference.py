@@ -1,4 +1,4 @@
-"""The plain loop: mj_step with the law called as the Python function it is.
+"""The reference loop: mj_step with the law called as the Python function it is.
 
 It runs what does not compile, and it is the oracle that the tests hold the compiled callback against: same Scenario,
 same Trace, but written for reading, with numpy's own Philox and nothing of the harness. A step takes tens of
@@ -44,7 +44,7 @@ INTERRUPTED = (
 
 
 def run(scenario: Scenario) -> Trace:
-    """One run in the plain loop."""
+    """One run in the reference loop."""
     with installed():
         loop = Loop(scenario)
     with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named

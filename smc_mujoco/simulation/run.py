@@ -1,9 +1,9 @@
 """Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
 
 A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
-and the number of steps; parameters, friction levels, laws, gains, signals, delays and seeds mix freely within it. What
-does not compile takes the plain loop. The results do not depend on the number of threads, on the grouping, or on what
-else runs.
+and the number of steps. Parameters, friction levels, laws, gains, signals, delays and seeds mix freely within it. What
+does not compile runs in the reference loop. The results depend neither on the number of threads nor on the grouping nor
+on what else runs.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ MANY = 64  # runs of a chunk that leave more memory than it takes time to give i
 
 
 class PlainLoopWarning(UserWarning):
-    """A law or signal does not compile and runs in the plain loop, several times slower and on one core."""
+    """A law or signal does not compile and runs in the reference loop, several times slower and on one core."""
 
 
 @overload
@@ -78,7 +78,7 @@ def stream(
     slow: list[tuple[int, Prepared]] = []
     for index, prepared in enumerate(_prepared(scenarios)):
         if prepared.why_not:
-            warnings.warn(f"{prepared.why_not}; the run takes the plain loop", PlainLoopWarning, users_frame())
+            warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_frame())
             slow.append((index, prepared))
         else:
             groups.setdefault(prepared.key, []).append((index, prepared))

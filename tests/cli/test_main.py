@@ -646,7 +646,7 @@ def test_a_law_in_the_plain_loop_is_one_line_on_stderr(script):
     _, done = script
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith("smc-mujoco: law 'plain' does not compile: ")
-    assert done.stderr.endswith("the run takes the plain loop\n")
+    assert done.stderr.endswith("the run takes the reference loop\n")
 
 
 def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace):

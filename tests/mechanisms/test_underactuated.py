@@ -205,7 +205,7 @@ PARTS = {
 @PLANTS
 @pytest.mark.parametrize("part", PARTS)
 def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name, part):
-    """And the compiled callback gives what the plain loop gives, to the last bit."""
+    """And the compiled callback gives what the reference loop gives, to the last bit."""
     fast, slow = scenario(name, **PARTS[part]), scenario(name, duration=0.25, **PARTS[part])
     trace, start = smc.run([fast, slow])
     assert bound(trace) <= 0.05

@@ -1,6 +1,6 @@
-"""The compiled callback and the plain Python loop give the same numbers, to the last bit, whatever else runs.
+"""The compiled callback and the reference loop give the same numbers, to the last bit, whatever else runs.
 
-The plain loop uses numpy's own generator and calls the laws as the Python functions they are: agreement holds the
+The reference loop uses numpy's own generator and calls the laws as the Python functions they are: agreement holds the
 callback's clock, noise, delay, estimators, signals, saturation and logging against a second telling of them.
 """
 
@@ -370,7 +370,7 @@ def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
 
 
 class Policy:
-    """A law that no compiler takes, for the plain loop; it may think with a simulation of its own."""
+    """A law that no compiler takes, for the reference loop; it may think with a simulation of its own."""
 
     def __init__(self, think=lambda: None):
         self.think = think

@@ -1,4 +1,4 @@
-"""Realistic mechanisms as a whole: parts in scenarios, alone and together, against the plain loop and the formulas.
+"""Realistic mechanisms as a whole: parts in scenarios, alone and together, against the reference loop and the formulas.
 
 What one part does on its own stands in test_friction, test_actuators, test_contact and test_sensors.
 """
@@ -56,7 +56,7 @@ def same(a, b):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
 
 
-# the compiled callback and the plain loop
+# the compiled callback and the reference loop
 
 
 PARTS = {

@@ -40,7 +40,7 @@ def same(a, b) -> bool:
 
 
 def plainly(*args, **kwargs):
-    """`smc.run` of something that takes the plain loop, without the warning about it."""
+    """`smc.run` of something that takes the reference loop, without the warning about it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", smc.PlainLoopWarning)
         return smc.run(*args, **kwargs)
@@ -421,7 +421,7 @@ def test_extreme_sensor_noise_is_no_exception(plant):
     assert trace.diverged_at is None or "law 'classical' returned" in trace.failure
 
 
-# the plain loop
+# the reference loop
 
 
 def native(y, gains, memory):
@@ -473,7 +473,7 @@ def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin(func
         "seed": 3,
     }
     twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
-    with pytest.warns(smc.PlainLoopWarning, match="plain loop"):
+    with pytest.warns(smc.PlainLoopWarning, match="reference loop"):
         trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
     for name in ARRAYS:
         np.testing.assert_allclose(getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12)
@@ -627,7 +627,7 @@ def test_a_callback_that_was_installed_is_put_back():
     assert same(plain, plainly(scenario(made(with_json, {"k": 2.0}))))
 
 
-@pytest.mark.parametrize("law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "plain loop"])
+@pytest.mark.parametrize("law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "reference loop"])
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     def interrupt(*_):

@@ -58,7 +58,7 @@ def same(a, b) -> bool:
 
 
 def plainly(*args, **kwargs):
-    """`smc.run` of something that takes the plain loop, without the warning about it."""
+    """`smc.run` of something that takes the reference loop, without the warning about it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", smc.PlainLoopWarning)
         return smc.run(*args, **kwargs)
@@ -870,7 +870,7 @@ class Infinite(smc.Signal):
 
 @dataclasses.dataclass(frozen=True)
 class InfiniteInPython(smc.Signal):
-    """The same, in the plain loop."""
+    """The same, in the reference loop."""
 
     start: float
 

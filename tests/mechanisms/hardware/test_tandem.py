@@ -1,4 +1,4 @@
-"""Two drives in series do what their equations say, and the same in the compiled callback and in the plain loop."""
+"""Two drives in series do what their equations say, and the same in the compiled callback and in the reference loop."""
 
 import dataclasses
 import math
