@@ -35,12 +35,12 @@ def margins(
     json: Annotated[Path | None, typer.Option(help="Also write the margins to a .json file.")] = None,
     threads: options.Threads = None,
 ) -> None:
-    """Find how much a law bears: the largest level with which the error still ends below 5 % of the first.
+    """Find how much a law tolerates: the largest level with which the error still ends below 5 % of the first.
 
     Constant disturbance and dry friction in N or N m, mass as a multiple of the nominal one, noise as the standard
     deviation of the position (the velocity's is 5/s of it), delay of the command in s. Theory is that of the loop
-    linearised at rest, for laws that have one: for a delay, where rest turns unstable; a law may bear more, in a small
-    steady oscillation. The search and its limits: smc_mujoco.analysis.margins.
+    linearised at rest, for laws that have one: for a delay, where rest turns unstable; a law may tolerate more, in a
+    small steady oscillation. The search and its limits: smc_mujoco.analysis.margins.
 
     Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
     """

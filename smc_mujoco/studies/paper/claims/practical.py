@@ -187,17 +187,17 @@ def _peak_after_jump(trace: Trace) -> float:
 )
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
     """Largest delay of the paper's law against each rival's; beside it linear theory's, sampled and held."""
-    borne, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (BEARS, 1.0))
+    longest, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (BEARS, 1.0))
     found: list[Check | Beside] = []
     for plant in PLANTS:
         for law in RIVALS:
             what = f"{plant}: largest delay against that of {law}, s"
-            found.append(check(what, borne[plant, OURS], ">", borne[plant, law]))
+            found.append(check(what, longest[plant, OURS], ">", longest[plant, law]))
         found += [
             Beside(f"{plant}: largest delay with which {law} ends below its start, s", below[plant, law])
             for law in LAWS
         ]
-        found.append(Beside(f"{plant}: largest delay of {UNCLAMPED}, s", borne[plant, UNCLAMPED]))
+        found.append(Beside(f"{plant}: largest delay of {UNCLAMPED}, s", longest[plant, UNCLAMPED]))
         found.append(
             Beside(f"{plant}: critical delay of the paper's law by linear theory, s", critical_delay(runs, plant))
         )

@@ -7,7 +7,7 @@ A property is a number of a law, the worst over the five plants of the study, an
 - bounded input: growth of the largest |u| that the law asks for, before the actuator's bound, when it is held at
   100 |x0| instead of 10 |x0|, or for 2 s instead of 1 s, the larger of both, at most 1 %. Where it does not grow
   there is a bound.
-- delay-tolerant: largest delay borne (as claim 61 measures it) less classical SMC's on that plant is above 0.
+- delay-tolerant: largest delay tolerated (as claim 61 measures it) less classical SMC's on that plant is above 0.
 - smoothness: largest step of u from sample to sample, nominal, over the run's max |u|, below 10 % (the limit under
   which claim 48 calls u smooth).
 
@@ -107,8 +107,8 @@ def _over(got: ScoresOfPairs, plant: str, law: str, metric: str, reference: floa
 
 def tolerance(runs: Runs) -> dict[str, float]:
     """Return law -> largest delay less classical's, s, worst plant."""
-    borne = largest_delays(runs, PLANTS, LAWS)
-    return {law: min(borne[p, law] - borne[p, "classical"] for p in PLANTS) for law in LAWS}
+    longest = largest_delays(runs, PLANTS, LAWS)
+    return {law: min(longest[p, law] - longest[p, "classical"] for p in PLANTS) for law in LAWS}
 
 
 def growth(runs: Runs, law: str) -> float:
