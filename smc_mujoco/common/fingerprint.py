@@ -179,7 +179,7 @@ def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list
     found: list[Any] = []
     for name in sorted(names & space.keys()):
         value = space[name]
-        found.append((name, value))
+        found += [name, value]
         own = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
         if own and id(value) not in known:
             known.add(id(value))
@@ -206,5 +206,5 @@ def _class_contents(kind: type) -> list[Any]:
         content = _as_written(value.fget if isinstance(value, property) else value)
         written = name == "__call__" or not name.startswith("__")
         if written and isinstance(content, (FunctionType, *VALUES)):
-            found.append((name, content))
+            found += [name, content]
     return found

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 # What two tunings must share to be compared, as the sentence that refuses calls it.
 ALIKE = {
@@ -197,19 +194,6 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
     return sorted(tuned, key=lambda one: one.objective)
-
-
-def table(tuned: Tuned) -> "Table":
-    """A line for each gain that was tuned: its value, between which bounds, and whether it is at one."""
-    from rich.table import Table
-
-    found = Table("gain", "tuned", "searched from", "to", "", box=None, padding=(0, 2, 0, 0))
-    found.title, found.title_justify = f"{tuned.law.name} on {tuned.plant.name}", "left"
-    for name, (low, high) in tuned.searched.items():
-        notes = [f"at its {tuned.at_bound[name]} bound"] if name in tuned.at_bound else []
-        notes += ["bound widened by a decade"] if name in tuned.widened else []
-        found.add_row(name, f"{tuned.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes))
-    return found
 
 
 def versions() -> dict[str, str]:
