@@ -121,7 +121,8 @@ def _unbound(
     by_place = [p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
     there = {*by_place[: len(args)], *named}
     required = [p.name for p in parameters if p.default is p.empty and p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-    if strange := [key for key in named if key not in by_name]:
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
+    if strange := [key for key in named if key not in by_name and not takes_any]:
         return unknown(f"{what} of {name}", strange[0], by_name)
     if len(args) > len(by_place):
         return ScenarioError(f"{name} takes {len(by_place)} {what}s without a name, not {len(args)}: name the others")

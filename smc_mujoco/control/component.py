@@ -113,7 +113,7 @@ class Component:
         home = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         found = _at(*home)
         if isinstance(found, Template) and found.function is self.function:
-            return _bind, (*home, dict(self.gains))
+            return _bind, (*home, dict(self.gains), self.name)
         return super().__reduce__()
 
     def __post_init__(self):
@@ -122,6 +122,18 @@ class Component:
         if self.template and (self.template.function is not self.function or self.template.name != self.name):
             object.__setattr__(self, "template", None)  # another function took its place
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
+
+    def named(self, name: str) -> "Component":
+        """Return the same function and gains under another name, which tables and figures show.
+
+        So two sets of gains of one law can be compared. A run of it is another run.
+
+        Raises:
+          ScenarioError: no name of 1 to 100 printable characters.
+        """
+        errors.name(f"name of the {self.kind}", name)
+        template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
+        return dataclasses.replace(self, name=name, template=template)
 
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
@@ -135,11 +147,12 @@ def _at(module: str, name: str) -> object:
     return found
 
 
-def _bind(module: str, name: str, gains: dict[str, float]) -> Component:
+def _bind(module: str, name: str, gains: dict[str, float], called: str = "") -> Component:
     importlib.import_module(module)
     template = _at(module, name)
     assert isinstance(template, Template)
-    return template.bind(gains)
+    bound = template.bind(gains)
+    return bound.named(called) if called and called != bound.name else bound
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -133,8 +133,19 @@ def catalogue() -> dict[str, Template]:
     return discover("smc_mujoco.control.laws")
 
 
+def checked_name(law: Law) -> Law:
+    """Return the law; ScenarioError if it is a user's and has the name of one of the library."""
+    known = catalogue().get(law.name) if law.kind == "law" else None
+    if known is None or law.function in (None, known.function):
+        return law
+    raise ScenarioError(
+        f"law {law.name!r} is yours and has the name of one of the library: call its function otherwise, or give "
+        f"law.named('my_{law.name}')"
+    )
+
+
 def law(name: str, **gains: float) -> Law:
-    """The law `name` of the library, with some of its gains changed.
+    """The law `name` of the library, with some of its gains changed. `law(...).named("slow")` gives it another name.
 
     Raises:
       ScenarioError: unknown law or gain, or a gain out of its range.

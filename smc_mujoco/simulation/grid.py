@@ -5,18 +5,19 @@
 Plants may be the suite's, by name, or models of your own; so may laws and conditions.
 """
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import MOST, ScenarioError, shown, taken, whole
+from smc_mujoco.common.errors import MOST, ScenarioError, ScenarioWarning, one_line, shown, taken, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import Law
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.control.law import Law, checked_name
+from smc_mujoco.mechanisms.plant import Plant, catalogue
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, find_condition
@@ -52,15 +53,20 @@ def grid(
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: a name that is not known, conditions of one name, gains that the set does not have, runs in which
-        nothing happens, as they begin at rest at 0 and stay there, or more than a million runs.
+      ScenarioError: a name that is not known, plants, laws or conditions that differ and have one name, gains that the
+        set does not have, runs in which nothing happens, as they begin at rest at 0 and stay there, or more than a
+        million runs.
+
+    Warns:
+      ScenarioWarning: gains of a set that were found for other parameters of the plant.
     """
     numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
     numbers = listed("seeds", numbers)
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
-    conditions = _apart(conditions)
+    conditions = [find_condition(condition) for condition in conditions]
+    _check_apart(plants, laws, conditions)
     made = [
         case(plant, law, condition, duration, gains, seed, starts)
         for plant in plants
@@ -88,9 +94,7 @@ def case(
     Args:
       changes: Scenario field -> value, over what the condition has.
     """
-    machine = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(machine, Plant):
-        raise ScenarioError(f"plant is {shown(plant)}: give a name, smc.plant(...) or smc.plant_from(...)")
+    machine = _machine(plant)
     asked, seed = find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
     fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
     if machine.name in sets.STUDY:
@@ -123,21 +127,52 @@ def _rests(scenario: Scenario) -> bool:
     return bool(np.abs(data.qacc).max() < STILL)
 
 
-def _apart(conditions: Sequence[str | Condition]) -> list[Condition]:
-    """The conditions, of which those that differ have names that differ."""
-    found = [find_condition(condition) for condition in conditions]
-    known: dict[str, Condition] = {}
-    for one in found:
-        if str(known.setdefault(one.name, one)) != str(one):
-            raise ScenarioError(f"two conditions have the name {one.name!r}: give each a name of its own")
-    return found
+def _check_apart(
+    plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
+) -> None:
+    """Raise ScenarioError for plants, laws or conditions that differ and have one name, by which tables tell them."""
+    machines = [_machine(plant) for plant in plants]
+    chosen = [law if isinstance(law, str) else coerce.component(law, "law") for law in laws]
+    _check_names("plants", [(p.name, p, (p.build, p.parameters, p.n)) for p in machines], "give each a grid of its own")
+    named = [(law if isinstance(law, str) else law.name, law, law) for law in chosen]
+    _check_names("laws", named, "name one of them, as smc.law(...).named('slow') or --laws \"slow: classical(k=2)\"")
+    _check_names("conditions", [(c.name, c, str(c)) for c in conditions], "give each a name of its own")
+
+
+def _check_names(what: str, things: Sequence[tuple[str, object, object]], cure: str) -> None:
+    """Raise ScenarioError where of things - name, thing, what tells it from others - two differ and have one name."""
+    known: dict[str, tuple[object, object]] = {}
+    for name, thing, content in things:
+        first, its = known.setdefault(name, (thing, content))
+        if its != content:
+            both = f"{one_line(str(first))} and {one_line(str(thing))}"
+            raise ScenarioError(f"two {what} have the name {name!r}, {both}: {cure}")
+
+
+def _machine(plant: str | Plant) -> Plant:
+    """A plant as given, or of that name."""
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(machine, Plant):
+        raise ScenarioError(f"plant is {shown(plant)}: give a name, smc.plant(...) or smc.plant_from(...)")
+    return machine
 
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """A law as given, or one of that name with its gains for the plant."""
     if not isinstance(law, str):
-        return coerce.component(law, "law")
-    return sets.law(plant, law, "default" if law == "none" else gains, seed)
+        return checked_name(coerce.component(law, "law"))
+    given = "default" if law == "none" else gains
+    found = sets.law(plant, law, given, seed)
+    known = catalogue().get(plant.name)
+    if given != "default" and known is not None and plant.parameters != known.parameters:
+        changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != known.parameters[name]]
+        warnings.warn(
+            f"gains of set {gains!r} were found for {plant.name} as it comes, and this one has {', '.join(changed)}: "
+            "tune the law on it, or give it gains of its own",
+            ScenarioWarning,
+            users_frame(),
+        )
+    return found
 
 
 def listed(what: str, values: object) -> list:

@@ -115,9 +115,13 @@ def _component(c: Component) -> dict:
 
 
 def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
-    template = known.get(data["name"])
-    if template is not None and template.function.__module__ == present_place(data["module"]):
-        return template.bind(data["gains"])
+    home = present_place(data["module"])
+    named = (
+        [known[data["name"]]] if data["name"] in known else known.values()
+    )  # one of the library may have been renamed
+    if template := next((one for one in named if one.function.__module__ == home), None):
+        bound = template.bind(data["gains"])
+        return bound if bound.name == data["name"] else bound.named(data["name"])
     return Component(
         kind=kind,
         name=data["name"],

@@ -20,6 +20,7 @@ from pathlib import Path
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
 from smc_mujoco.common.progress import Counter, counter
 from smc_mujoco.control.gain_sets import LAWS
+from smc_mujoco.control.law import checked_name
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -114,6 +115,7 @@ def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     for scenario in scenarios if several else ():  # one by one, as they may be without end
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
+        checked_name(scenario.law)
         found.setdefault(key(scenario), scenario)
     if not found:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")

@@ -3,6 +3,8 @@
 import dataclasses
 import math
 import os
+import pickle
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -231,6 +233,60 @@ def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
     assert set(table.column("failure")) == {None}
 
 
+@smc.law_function(gains={"k": 1.0})
+def pid(y, gains, memory):
+    return -gains.k * y.e, y.e
+
+
+SLOW, QUICK = smc.law("classical", k=2.0), smc.law("classical", k=6.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (
+            {"laws": [SLOW, QUICK]},
+            r"laws .* 'classical', classical\(k=2.*k=6.*: name one of them, as .*named\('slow'\)",
+        ),
+        ({"laws": ["classical", QUICK]}, "two laws have the name 'classical', classical and"),
+        (
+            {"plants": ["duffing", smc.plant("duffing", beta=5.0)]},
+            r"two plants have the name 'duffing', plant.*beta=1\b.* and .*beta=5\b",
+        ),
+        ({"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]}, "two conditions have the name 'worn gear'"),
+        ({"laws": [pid(k=2.0)]}, r"law 'pid' is yours .* or give law.named\('my_pid'\)"),
+    ],
+)
+def test_grid_refuses_two_things_of_one_name(changed, words):
+    given = {"plants": "duffing", "laws": "classical"}
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.grid(**(given | changed))
+    assert len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")])) == 6
+
+
+def test_named_law_is_another_in_tables(tmp_path):
+    slow = SLOW.named("slow")
+    assert pickle.loads(pickle.dumps(slow)) == slow
+    runs = smc.grid("duffing", [slow, QUICK], duration=0.1)
+    table = smc.study(runs, tmp_path)
+    assert table.column("law").tolist() == ["slow", "classical"]
+    again = smc.Table.read(tmp_path).scenario(0)
+    assert again == runs[0]
+    assert again.law.function is QUICK.function
+    assert smc.tune("duffing", slow, 2, conditions="nominal").law.name == "slow"
+    with pytest.raises(smc.ScenarioError, match="got its argument 'name' twice"):
+        smc.law("classical", k=2.0, name="slow")  # pyright: ignore[reportCallIssue]
+
+
+def test_grid_warns_of_gains_for_other_parameters():
+    with pytest.warns(smc.ScenarioWarning, match=r"found for duffing as it comes, .* has M = 20, beta = 50: tune"):
+        smc.grid(smc.plant("duffing", beta=50.0, M=20.0), "pid")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        smc.grid(smc.plant("duffing", beta=50.0), [SLOW, "none"])
+        smc.grid(smc.plant("pendulum_network", n=7), "pid")
+
+
 @pytest.mark.parametrize("search", [smc.grid, smc.margins, smc.tune, smc.basin])
 def test_start_is_set_by_condition_or_starts(search):
     far = smc.condition("far", x0=1.0)
@@ -358,7 +414,7 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
     runner, common = CliRunner(), ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"]
     tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
     assert runner.invoke(app, [*tuned, *common]).exit_code == 0
-    laws = "arm_pid.json,classical(k=5, c=2e0)"
+    laws = "arm_pid.json,classical(k=5, c=2e0),quick: classical(k=9)"
     bench = ["bench", "--plants", "arm.xml:shoulder", "--laws", laws, "--seeds", "1", "--duration", "0.1", *common]
     done = runner.invoke(app, bench)
     assert done.exit_code == 0, done.output
@@ -367,6 +423,7 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
     laws = {s.law.name: s.law for s in map(table.scenario, range(len(table)))}
     assert laws["pid"] == load(tmp_path / "arm_pid.json").law
     assert laws["classical"].gains == {"k": 5.0, "c": 2.0}
+    assert laws["quick"].gains["k"] == 9.0
 
 
 @pytest.mark.parametrize(

@@ -54,11 +54,14 @@ def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
 def law(text: str) -> "str | Law":
     """Return a law by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
 
-    The text is parsed and never evaluated.
+    Before a colon it may have a name of its own, as "slow: classical(k=2)". The text is parsed and never evaluated.
 
     Raises:
       ScenarioError: another text, an unknown law or gain, or a file that is no tuning.
     """
+    name, colon, rest = text.partition(":")
+    if colon and "(" not in name and not isinstance(found := law(rest.strip()), str):
+        return found.named(name.strip())
     if text.endswith(".json"):
         from smc_mujoco.analysis.tuning.result import load
 
