@@ -41,7 +41,7 @@ def law(body: str, more: str = "") -> str:
 
 
 FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
-WAITS = law("out[0] = -y->e;", "int smc_setup(void) { volatile int on = 1; while (on) { } return 0; }")
+WAITS = law("out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (;;) pause(); return 0; }")
 # state that is neither in memory nor in static data
 KEPT = """#include <fenv.h>
 #include <signal.h>
@@ -192,7 +192,9 @@ def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
 def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
     """The rest of the register holds what it likes."""
     target = tmp_path / "my_law.so"
-    source = file(law("out[0] = -y->e;").replace("    return 0;", "    return (int)(((long long)gains[0] << 32));"))
+    text = "long long smc_law(const double *y, const double *gains, double *memory, double *out)\n"
+    text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"  # the int in it is 0
+    source = file(text)
     line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
     subprocess.run(line, check=True)
     assert smc.run(scenario(smc.law_from_c(target, gains={"k": 3.0}))).failure is None
@@ -312,7 +314,7 @@ def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
 
 
 def test_a_set_up_or_a_loading_that_never_ends_is_ended(file):
-    starts = "__attribute__((constructor)) static void start(void) { volatile int on = 1; while (on) { } }"
+    starts = "#include <unistd.h>\n__attribute__((constructor)) static void start(void) { for (;;) pause(); }"
     for text, words in ((WAITS, "smc_setup did not end within 3 s"), (law("", starts), "loading did not end")):
         with pytest.raises(smc.ScenarioError, match=words):
             smc.law_from_c(file(text), timeout=3.0)
@@ -495,8 +497,11 @@ def test_isolated_a_law_may_give_up_far_away(file):
     assert smc.law_from_c(file(text), isolate=True).memory == 8
 
 
-def test_what_a_set_up_prints_without_end_is_not_kept(file):
-    text = '#include <stdio.h>\nint smc_setup(void) { for (;;) puts("a line of a law"); return 0; }'
+def test_what_a_set_up_prints_is_not_kept(file):
+    """60 MB of it, and then it waits."""
+    line = '"a line of a law, which is as long as lines of laws are wont to be"'
+    text = "#include <stdio.h>\n#include <unistd.h>\n"
+    text += f"int smc_setup(void) {{ for (int i = 0; i < 1000000; i++) puts({line}); for (;;) pause(); return 0; }}"
     tracemalloc.start()
     try:
         with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
