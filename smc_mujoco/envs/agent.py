@@ -3,8 +3,7 @@
     act = smc.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-A law sees what it would see in `smc.run`, and its episode is the trace of that run: it is the reference loop's own code
-that asks it.
+A law sees what it would see in `smc.run`, and its episode is the trace of that run: the reference loop's own code asks it.
 """
 
 import dataclasses
@@ -18,7 +17,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.envs.core import Setting
+from smc_mujoco.envs.core import Episode
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.guarded import Failure
@@ -32,7 +31,7 @@ def agent(
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
 ) -> "Agent":
-    """A law as an agent: a callable observation -> action, which starts afresh with each episode.
+    """Return a law as an agent: a callable observation -> action, which starts afresh with each episode.
 
     Args:
       law: a Law or the name of one.
@@ -42,7 +41,7 @@ def agent(
     Raises:
       ScenarioError: another environment, or what a Scenario refuses. The agent raises it where its law fails.
     """
-    source = _source(environment)
+    source = _episode(environment)
     scenario = dataclasses.replace(
         source.setting.scenario,
         law=law,  # pyright: ignore[reportArgumentType]
@@ -55,18 +54,18 @@ def agent(
 
 
 class Agent:
-    """What `agent` returns.
+    """A law that acts in an environment.
 
     Attributes:
-      source: the part of the environment that knows the time, its `sample`.
+      source: the environment's episode, which knows the time.
       loop: the reference loop of the scenario with the law in it, of which only the controller is used.
     """
 
-    def __init__(self, source: Any, loop: reference.Loop):
+    def __init__(self, source: Episode, loop: reference.Loop):
         self.source, self.loop = source, loop
 
     def __call__(self, observation: Any) -> np.ndarray:
-        """The action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
+        """Return the action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
         loop, k, n = self.loop, self.source.sample, self.loop.scenario.plant.n
         if k == 0:
             self.forget()
@@ -81,23 +80,23 @@ class Agent:
         return u[: loop.scenario.plant.driven] / loop.scenario.limits
 
     def forget(self) -> None:
-        """Begin anew: all memories zero, and the last commands, which the nominal model of coupled channels knows."""
+        """Set all memories to zero, and the last commands, which the nominal model of coupled channels uses."""
         loop = self.loop
         for memory in (*loop.memory, *loop.surface_memory, *loop.estimator_memory, loop.latest):
             memory[:] = 0.0
 
 
-def _source(environment: Any) -> Any:
-    """What has an environment's setting and counts its samples."""
+def _episode(environment: Any) -> Episode:
+    """Return the part of an environment that knows its setting and counts its samples."""
     for owner in (attribute(environment, "task"), attribute(environment, "unwrapped")):
-        if isinstance(attribute(owner, "setting"), Setting) and isinstance(attribute(owner, "sample"), int):
+        if isinstance(owner, Episode):
             return owner
     cure = "give one of smc_mujoco.suite, or a single one of smc_mujoco.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")
 
 
 def _positions_and_velocities(observation: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """x and v, (n,) each."""
+    """Return x and v, (n,) each."""
     found = getattr(observation, "observation", observation)
     if isinstance(found, Mapping) and "position" in found:
         return found["position"], found["velocity"]

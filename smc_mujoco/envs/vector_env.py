@@ -28,7 +28,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
-MOST = 1_000_000  # copies: a number that is surely meant as something else
+MAX_COPIES = 1_000_000  # a larger number is a mistake
 SEEDS = 2**64
 
 
@@ -70,7 +70,10 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
-        self.num_envs, self.setting = whole("num_envs", num_envs, 1, MOST), Setting(plant, task, changes, edit=strip)
+        self.num_envs, self.setting = (
+            whole("num_envs", num_envs, 1, MAX_COPIES),
+            Setting(plant, task, changes, edit=strip),
+        )
         relieve(self.setting.model)
         self.metadata = self.metadata | {"autoreset_mode": _mode(autoreset_mode)}
         most = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
@@ -88,7 +91,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start all copies: from seed, seed + 1, ... or one seed each; options x0 and v0 hold for all of them.
+        """Start all copies, from seed, seed + 1, ... or from one seed each. Options x0 and v0 hold for all of them.
 
         The option reset_mask, (num_envs,) of bool, says which are to start; the others stay as they are.
         """
@@ -102,7 +105,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return self.observe(), {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One control period of every copy, or its next start: observations, rewards, terminated, truncated, infos."""
+        """Take one control period of every copy, or start it anew; return its observations, rewards, ends and infos."""
         if not self.randoms:
             raise ScenarioError("these environments have not begun: call reset first")
         anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
@@ -127,7 +130,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return observations, rewards, terminated, truncated, infos
 
     def begin(self, which: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
-        """Start copies, (num_envs,) of bool, anew."""
+        """Start the copies in `which`, (num_envs,) of bool, anew."""
         ids = np.flatnonzero(which)
         with callback.uninstalled():
             self.batch.reset(ids.astype(np.int32), stage=0)
@@ -136,7 +139,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         self.samples[which], self.over[which], self.first[which] = 0, False, 0.0
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
-        """Step copies, None for all; in which of them MuJoCo gave up, (num_envs,) of bool."""
+        """Step copies, None for all. Return in which of them MuJoCo gave up, (num_envs,) of bool."""
         gone = np.zeros(self.num_envs, bool)
         for steps in self.setting.stretches(self.ctrl, commands, self.first):
             try:
@@ -148,7 +151,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return gone
 
     def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
-        """The observations of all copies, (num_envs, size); None for `lost`: who is lost is found out."""
+        """Return the observations of all copies, (num_envs, size). `lost`: who has left the world, if known."""
         x, v = self.state()
         out: np.ndarray = self.setting.lost(x, v) if lost is None else lost
         observations = self.setting.observe(x, v, self.samples)
@@ -157,11 +160,11 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return observations
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and velocities of all copies, (num_envs, n) each."""
+        """Return positions and velocities of all copies, (num_envs, n) each."""
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
 
     def _which(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
-        """The copies that a reset is for, and its other options."""
+        """Return the copies that a reset is for, and its other options."""
         if not isinstance(options, Mapping) or "reset_mask" not in options:
             return np.ones(self.num_envs, bool), options
         mask = options["reset_mask"]
@@ -173,7 +176,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return mask, {name: value for name, value in options.items() if name != "reset_mask"}
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """One seed a copy."""
+        """Return one seed for each copy."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
@@ -193,29 +196,29 @@ def _mode(mode: object) -> AutoresetMode:
 
 
 def strip(spec: mujoco.MjSpec) -> None:
-    """Take away what is only looked at, which MuJoCo would move along in every step: a third of its time.
+    """Delete what is only drawn: moving it along takes a third of MuJoCo's time.
 
-    Models of users stay as they are, but for sensors: a part that is fixed may be a floor, or hold a tendon.
+    Models of users lose their sensors alone: a fixed part may be a floor, or hold a tendon.
     """
     if not any(text.name == DIRECTLY for text in spec.texts):
         for thing in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
             spec.delete(thing)
         spec.compiler.fusestatic = True
-    # nobody reads them here: an observation is taken from the state
+    # nobody reads sensors here: an observation is taken from the state
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 
 
 def relieve(model: mujoco.MjModel) -> None:
-    """Let MuJoCo skip its search for constraints where there can be none: a tenth of its time."""
+    """Let MuJoCo skip the search for constraints where there are none: a tenth of its time."""
     if smooth(model) and not model.nflex:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
 
 
 def _scenery(geom: mujoco.MjsGeom) -> bool:
-    """Whether a geom neither moves nor touches anything."""
+    """Return whether a geom neither moves nor touches anything."""
     return _fixed(geom.parent) and not geom.contype and not geom.conaffinity
 
 
 def _fixed(body: mujoco.MjsBody | None) -> bool:
-    """Whether no joint moves a body."""
+    """Return whether no joint moves a body."""
     return body is None or (not body.joints and _fixed(body.parent))
