@@ -50,7 +50,7 @@ class Interval(NamedTuple):
 
 
 def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
-    """The median of runs, and its bootstrap interval.
+    """Return the median of runs, with its bootstrap interval.
 
     The median of an even number of runs is the mean of the middle two; the interval reaches from the resampled lower
     of the two to the resampled higher.
@@ -82,14 +82,14 @@ def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLE
 
 
 def middle(values: np.ndarray) -> np.ndarray:
-    """The median over the last axis of the values that are not NaN; NaN where all are."""
+    """Return the median over the last axis, leaving out NaN; NaN where all values are."""
     ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
     low, high = (np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2))
     return ((low + high) / 2)[..., 0]
 
 
 def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The lower and the upper of the middle two of each block in each resample of its seeds.
+    """Return the lower and upper of the middle two values of each block, in each resample of its seeds.
 
     Args:
       values: (blocks, n), NaN where no run is; no block is without any.
@@ -109,14 +109,14 @@ def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np
 
 
 def counts(drawn: np.ndarray, runs: np.ndarray) -> np.ndarray:
-    """How often each of a block's runs counts in each resample: as drawn, or once where none of them is."""
+    """Return how often each run of a block counts in each resample: as drawn, or once where none of them was drawn."""
     found = drawn[runs]
     found[:, ~found.any(axis=0)] = 1
     return found
 
 
 def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
-    """A share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927), which has a width at 0 and 1 too.
+    """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not empty at 0 and 1.
 
     A seed's own share lies in [0, 1] and so varies by p (1 - p) at most: with n the seeds, however many runs each has
     and however alike they are, the interval is wide enough.
@@ -131,7 +131,7 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int, resamples: int, seed: int) -> np.ndarray:
-    """How often each of n seeds comes in each resample, (n, resamples)."""
+    """Return how often each of n seeds is drawn in each resample, (n, resamples)."""
     whole("resamples", resamples, 99, 10**6)
     whole("seed", seed, 0, 2**63)
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
@@ -142,7 +142,7 @@ def draws(n: int, resamples: int, seed: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=32)
 def outermost(n: int, level: float, resamples: int) -> int:
-    """Which resample from either end, the outermost being 1, an interval of n >= 2 seeds ends at.
+    """Return at which resample, counted from either end, an interval of n >= 2 seeds ends.
 
     Hesterberg's expanded percentile, Phi(-sqrt(n / (n - 1)) t), t being Student's with n - 1 degrees of freedom.
     """
@@ -153,5 +153,5 @@ def outermost(n: int, level: float, resamples: int) -> int:
 
 
 def checked(level: float) -> float:
-    """A level of confidence."""
+    """Return a level of confidence, or refuse it."""
     return number("level", level, least=0.5, most=0.999)

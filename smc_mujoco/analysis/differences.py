@@ -15,7 +15,7 @@ ROUNDING, ALIKE = 1e-9, 1e-6
 
 
 def least_difference(value: ArrayLike, scale: ArrayLike = 0.0, resolution: ArrayLike = 0.0) -> np.ndarray:
-    """The least relevant difference between a value >= 0 and a smaller one.
+    """Return the least relevant difference between a value >= 0 and a smaller one.
 
     It is the largest of 3 % of the value, 0.5 % of the scale, and the resolution; any difference from inf is relevant.
 
@@ -28,18 +28,18 @@ def least_difference(value: ArrayLike, scale: ArrayLike = 0.0, resolution: Array
 
 
 def exceeds(a: ArrayLike, b: ArrayLike, scale: ArrayLike = 0.0, resolution: ArrayLike = 0.0) -> np.ndarray:
-    """Whether a is more than b by more than the least relevant difference; a, b >= 0, the rest as above."""
+    """Return whether a is larger than b by more than the least relevant difference; a, b >= 0."""
     return np.asarray(a) - least_difference(a, scale, resolution) > np.asarray(b)
 
 
 def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """1.0 where a is more than b but for rounding, -1.0 where less, 0.0 where they are tied; NaN where both are."""
+    """Return 1.0 where a is larger than b, -1.0 where smaller, 0.0 for a difference of rounding; NaN where both are."""
     tie = np.maximum(ROUNDING, ALIKE * np.minimum(np.abs(a), np.abs(b)))
     return np.where(np.isnan(a), np.nan, (a > b + tie).astype(float) - (b > a + tie))
 
 
 def coarse(values: np.ndarray) -> np.ndarray:
-    """Values without what may be rounding: 0 below 1e-9, and 20 binary digits."""
+    """Round values so that rounding errors vanish: 0 below 1e-9, else 20 binary digits."""
     share, exponent = np.frexp(np.where(np.abs(values) < ROUNDING, 0.0, values))
     with np.errstate(over="ignore"):
         return np.ldexp(np.round(share * 2**20), exponent - 20)

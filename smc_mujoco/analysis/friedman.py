@@ -28,7 +28,7 @@ class Friedman:
 
 
 def friedman(found: Comparison) -> Friedman | None:
-    """Friedman's test over the blocks, corrected for ties; None of one law or block."""
+    """Run Friedman's test over the blocks, corrected for ties; None for one law or one block."""
     from scipy.special import chdtrc
 
     k, blocks = found.centres.shape
@@ -47,7 +47,7 @@ def friedman(found: Comparison) -> Friedman | None:
 
 @functools.cache
 def _studentised(k: int, level: float) -> float:
-    """The quantile of the studentised range of k normal means, of which Demsar's q is 1 / sqrt(2)."""
+    """Return the quantile of the studentised range of k normal means; Demsar's q is 1 / sqrt(2) of it."""
     from scipy.stats import studentized_range
 
     return float(studentized_range.ppf(level, k, math.inf))

@@ -24,7 +24,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smc_mujoco.analysis.linearisation import ASIDE, Linear, holding, linear, rising, sampled
+from smc_mujoco.analysis.linearisation import DISPLACEMENTS, Linear, holding, linear, rising, sampled
 from smc_mujoco.common.errors import number
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -33,9 +33,10 @@ from smc_mujoco.mechanisms.plant import Plant
 
 
 def smallest_lam(plant: Plant, k1: float) -> float:
-    """The lam above which (1) is stable, continuous control: lam > -D and lam k1 > -K_j for every mode; at least 0.
+    """Return the lam above which (1) is stable in continuous control, at least 0.
 
-    By Routh-Hurwitz both coefficients of (1) must be positive. 0 bears the paper's claim out; inf: no lam does.
+    By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every mode. 0
+    confirms the paper's claim; inf: no lam is enough.
     """
     k1, at = number("k1", k1, least=0.0), linear(plant)
     soft = -float(at.modes[0])
@@ -44,7 +45,7 @@ def smallest_lam(plant: Plant, k1: float) -> float:
 
 
 def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, float]:
-    """Between which lam the loop is stable as it runs, sampled and held, without delay; (inf, inf): nowhere.
+    """Return the lam between which the sampled loop without delay is stable; (inf, inf): nowhere.
 
     A sample moves a mode by z+ = z + E z + Gamma u, z = (x, x'), u = -lam (k1, 1) z: exact. Jury's conditions, of the
     trace t and determinant d of the closed E, are d > 0, t + d < 0 and 4 + 2 t + d > 0, all affine in lam.
@@ -66,7 +67,7 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
 
 
 def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
-    """The input delay in s from which (1) is unstable; 0 if it is without one, inf if no delay makes it so.
+    """Return the input delay in s from which (1) is unstable: 0 if it is so without one, inf if no delay makes it so.
 
     Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
     right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|, a quadratic in w^2 without tau, which the phase then
@@ -74,7 +75,7 @@ def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 
     Sampled (control_period h): a delay of m periods makes it 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
     N = lam (k1, 1) adj(w - E) Gamma, and |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
     gives m, not whole: stable for all whole m below it, no more at the next. A loop still above 1 at the highest
-    frequency a sampled loop has, z = -1, bears less than one period.
+    frequency a sampled loop has, z = -1, tolerates less than one period.
     """
     lam, k1 = number("lam", lam, least=0.0), number("k1", k1, least=0.0)
     at, h = linear(plant), number("control_period", control_period, least=0.0)
@@ -85,7 +86,7 @@ def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 
 
 
 def _crossing(at: Linear, stiffness: float, lam: float, k1: float) -> float:
-    """The delay at which a mode first crosses, s."""
+    """Return the delay at which a mode first becomes unstable, s."""
     m, d, k = at.inertia, at.damping, stiffness
     delays = [math.inf]
     for square in _roots(m * m, d * d - 2.0 * m * k - lam * lam, k * k - (lam * k1) ** 2):
@@ -97,7 +98,7 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float) -> float:
 
 
 def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
-    """The same of a mode as it runs."""
+    """Return the delay at which a sampled mode first becomes unstable, s."""
     e, gamma = sampled(at, stiffness, h)
     t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
     n1, n0 = row @ gamma, -row @ _adjugate(e) @ gamma  # adj(w - E) = w - adj(E)
@@ -112,7 +113,7 @@ def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: fl
 
 
 def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: int = 0) -> float:
-    """By what factor the loop with a delay of whole control periods grows a period in the end: stable below 1.
+    """Return the growth per period of the loop with a delay of whole control periods, in the end: stable below 1.
 
     The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode: what `critical_delay` answers in closed form.
     """
@@ -132,7 +133,7 @@ def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: 
 
 
 def _roots(a: float, b: float, c: float) -> list[float]:
-    """Real roots of a z^2 + b z + c."""
+    """Return the real roots of a z^2 + b z + c."""
     return [float(z.real) for z in np.roots([a, b, c]) if abs(z.imag) <= 1e-9 * abs(z)]
 
 
@@ -144,7 +145,10 @@ def _adjugate(m: np.ndarray) -> np.ndarray:
 
 
 def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
-    """Where (1) rests under a constant d on every channel, worst channel, rad or m: |d| / (lam k1 + K) of one joint."""
+    """Return where (1) rests under a constant d on every channel, worst channel, rad or m.
+
+    Of one joint it is |d| / (lam k1 + K).
+    """
     lam, k1, d = number("lam", lam, least=0.0), number("k1", k1, least=0.0), number("d", d)
     at = linear(plant)
     loop = at.stiffness + lam * k1 * np.eye(plant.n)
@@ -152,7 +156,7 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 
 
 def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> float | None:
-    """The same without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|; inf if there is none.
+    """Return the same without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|; inf if none.
 
     None for a law without theory. Followed from x = 0 to the first summit of that force: beyond it nothing holds.
     """
@@ -162,15 +166,15 @@ def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> flo
     values, d = rising(force), abs(number("d", d))
     beyond = np.flatnonzero(values >= d)
     if beyond.size:
-        return float(np.interp(d, np.r_[0.0, values], np.r_[0.0, ASIDE[: values.size]]))
+        return float(np.interp(d, np.r_[0.0, values], np.r_[0.0, DISPLACEMENTS[: values.size]]))
     summit, most = _summit(force, values.size)
     return summit if d <= most else math.inf
 
 
-def borne(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
-    """The largest constant d, or dry friction, at which the plant rests within |x| <= most; None as of `rest_error`.
+def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
+    """Return the largest constant d, or dry friction, with which the plant rests within |x| <= most.
 
-    Dry friction up to this level cannot hold the plant further out; a plant may still happen to stop further in.
+    None as of `rest_error`. Dry friction up to this level cannot hold the plant further out. It may stop further in.
     """
     force = holding(plant, law, u_max)
     if force is None:
@@ -181,10 +185,10 @@ def borne(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float
 
 
 def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
-    """Where a force that rises over the first `size` places of ASIDE is largest, and how large."""
+    """Return where a force that rises over the first `size` of DISPLACEMENTS is largest, and how large."""
     from scipy.optimize import minimize_scalar
 
-    ends = ASIDE[max(size - 2, 0)], ASIDE[min(size, ASIDE.size - 1)]
+    ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]
     found = minimize_scalar(
         lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
     )

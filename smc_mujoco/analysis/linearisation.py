@@ -23,8 +23,8 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 
 SAME = 1e-6  # relative: what differs by less is called the same
-REACH = 10.0  # rad or m, chosen: beyond the first summit of every restoring force here
-ASIDE = np.geomspace(1e-7, REACH, 4000)  # where a force at rest is looked at: each 0.5 % further out
+MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first summit of every restoring force here
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # where a force at rest is looked at: each 0.5 % further out
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,12 +37,12 @@ class Linear:
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
-        """The modes' stiffnesses, (n,), smallest first; a negative one falls over by itself."""
+        """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by itself."""
         return np.linalg.eigvalsh(self.stiffness)
 
 
 def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
-    """The plant linearised at x = x' = 0.
+    """Linearise the plant at x = x' = 0.
 
     Args:
       factors: parameter name -> factor, for the true plant of a mismatch; None: the nominal one.
@@ -67,7 +67,7 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
         )
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
-        """-d f_i / d z_j / g, (n, n), by central differences."""
+        """Return -d f_i / d z_j / g, (n, n), by central differences."""
         found = np.empty((n, n))
         for j in range(n):
             moved = rest.copy()
@@ -90,7 +90,7 @@ def local(law: Law) -> tuple[float, float] | None:
 
 
 def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """E (2, 2) and Gamma (2,) of z+ = z + E z + Gamma u, z = (x, x'), of a mode over h in which u is held: exact.
+    """Return E (2, 2) and Gamma (2,) of a mode sampled with period h, z+ = z + E z + Gamma u, z = (x, x'): exact.
 
     E is what a sample changes, not the usual Phi = 1 + E: for short h all that there is to know is in the difference.
     """
@@ -126,7 +126,7 @@ def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.nda
 
 
 def rising(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """The force of `holding` at ASIDE, as far as it rises."""
-    values = force(ASIDE)
+    """Return the force of `holding` at DISPLACEMENTS, up to where it falls for the first time."""
+    values = force(DISPLACEMENTS)
     falls = np.flatnonzero(np.diff(np.r_[0.0, values]) < 0.0)
     return values[: falls[0]] if falls.size else values

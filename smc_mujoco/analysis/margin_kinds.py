@@ -1,6 +1,6 @@
-"""What is asked of a law for its margins: the kinds of trouble, their levels, and when a run bears one.
+"""The kinds of margins: what a law has to tolerate, at which levels, and when a run counts as tolerated.
 
-`SPECS` has a Kind for each. `margins` searches them.
+`MARGIN_KINDS` has a Kind for each. `margins` searches them.
 """
 
 import dataclasses
@@ -20,16 +20,16 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant
 from smc_mujoco.simulation.trace import Trace
 
-BEARS = 0.05  # of the scale: the audit's threshold for an ultimate bound
+TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
 RATE = 5.0  # 1/s: noise of the velocity over that of the position, as of the study's sensor
 LARGEST = 6.0  # N or N m: the study's u_max, beyond which no actuator of it holds anything
-HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, well beyond what is borne
+HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, well beyond what is tolerated
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A thing to be borne.
+    """A kind of margin: something of which a law tolerates some level.
 
     Attributes:
       label: its name in tables and figures.
@@ -50,35 +50,35 @@ class Kind:
     theory: Callable[[Scenario], float | None] = lambda base: None
 
     def unit_for(self, x: str) -> str:
-        """The unit where positions have the unit x, "rad" or "m"."""
+        """Return the unit where positions have the unit x, "rad" or "m"."""
         return self.unit.format(x=x, u=EFFORT[x])
 
     def scan(self, base: Scenario) -> list[float]:
-        """The levels looked at first in a scenario."""
+        """Return the levels that a search tries first in a scenario."""
         return list(dict.fromkeys(self.rounded(base, level) for level in self.levels))
 
     def rounded(self, base: Scenario, level: float) -> float:
-        """The nearest level that a scenario can have, above none."""
+        """Return the nearest level that a scenario can have, above none."""
         if not self.periods:
             return level
         return max(1, round(level / base.control_period)) * base.control_period
 
     def expected(self, base: Scenario) -> float | None:
-        """The largest level by linear theory; None where that has nothing to say of the law, plant or condition."""
+        """Return the largest level by linear theory; None where there is no theory for the law, plant or condition."""
         try:
             return None if _pushed(base) else self.theory(base)
         except ScenarioError:
             return None
 
 
-def bears(trace: Trace) -> bool:
-    """Whether a run did not fail and ended within 5 % of its scale, its free joints too, each group of its own."""
+def tolerates(trace: Trace) -> bool:
+    """Return whether a run did not fail and ended within 5 % of its scale, in every group of its channels."""
     try:
         refuse(trace)
     except ScenarioError:  # it failed, or diverged
         return False
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
-    return all(bound(part) <= BEARS * scale(part) for part in parts(trace).values())
+    return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in parts(trace).values())
 
 
 def _pushed(base: Scenario) -> bool:
@@ -87,7 +87,7 @@ def _pushed(base: Scenario) -> bool:
 
 
 def _doubled(largest: float) -> tuple[float, ...]:
-    """Nine levels, each twice the last."""
+    """Return nine levels, each twice the one before."""
     return tuple(largest * 2.0 ** (i - 8) for i in range(9))
 
 
@@ -97,12 +97,12 @@ def _critical_delay(base: Scenario) -> float | None:
 
 
 def _at_rest(base: Scenario) -> float | None:
-    most = BEARS * (max(map(abs, base.x0)) or 1.0)
-    return theory.borne(base.plant, base.law, most, min(base.limits))
+    most = TOLERATED_ERROR * (max(map(abs, base.x0)) or 1.0)
+    return theory.tolerated_force(base.plant, base.law, most, min(base.limits))
 
 
 def _rubbing(base: Scenario, level: float) -> Scenario:
-    """With so much dry friction more than there is."""
+    """Return the scenario with that much more dry friction."""
     others = tuple(part for part in base.friction if not isinstance(part, Coulomb))
     there = sum(part.level for part in base.friction if isinstance(part, Coulomb))
     return dataclasses.replace(base, friction=(*others, Coulomb(there + level)))
@@ -113,7 +113,7 @@ def _heavier(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})  # of the nominal one
 
 
-SPECS: dict[str, Kind] = {
+MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
         label="input delay",
         unit="s",

@@ -1,18 +1,18 @@
-"""Margins: the largest delay, disturbance, friction, mass ratio and noise that a law bears on a plant.
+"""Margins: the largest delay, disturbance, friction, mass ratio and noise that a law tolerates on a plant.
 
     for margin in margins(["duffing"], ["observer_free", "classical"], ["delay"]):
         print(margin.law, margin.value, margin.unit, margin.theory)
     of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # a law of your own
 
-A run bears a level if it does not fail and its ultimate bound is at most 5 % of its scale (`measure`): what is left
-after 10 s. (The envelope is then below its start too, as the paper's claim on delay asks: it starts at the scale.)
-The search looks at nine levels from small to large, then halves the interval below the FIRST that is not borne, until
-it is within one control period of delay, or 2 % of anything else. What a law bears need not be one interval: beyond a
-level that is not borne there may be larger ones that are, and between two that are borne one that is not. Noise is one
-realisation, seed 0, the same for every law; a disturbance is positive and acts on every channel.
-Theory says where rest turns unstable by delay: a smooth law then swings with an amplitude that grows from 0, and bears
-a little more. And where a push, or friction that sticks, holds the plant 5 % off: it may yet stick further in.
-All pairs and kinds advance together, a batch of runs a round.
+A run tolerates a level if it does not fail and its ultimate bound is at most 5 % of its scale (`conventions`): what is
+left after 10 s. (The envelope is then below its start too, as the paper's claim on delay asks: it starts at the scale.)
+The search runs nine levels from small to large. Then it halves the interval below the FIRST level that is not
+tolerated, until it is within one control period of delay, or 2 % of anything else. The tolerated levels need not be one
+interval: above a level that is not tolerated there may be larger ones that are, and between two that are one that is
+not. Noise is one realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel.
+Theory says from which delay rest is unstable: a smooth law then swings with an amplitude that grows from 0, and so
+tolerates a little more. It also says from where a push, or friction that sticks, holds the plant 5 % off: the plant may
+still stick further in. All pairs and kinds advance together, one batch of runs a round.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from smc_mujoco.analysis.margin_kinds import SPECS, bears
+from smc_mujoco.analysis.margin_kinds import MARGIN_KINDS, tolerates
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.control import gain_sets as sets
@@ -35,7 +35,7 @@ from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 
-KINDS = tuple(SPECS)
+KINDS = tuple(MARGIN_KINDS)
 FINE, COARSE = 0.02, 0.1  # of the level: where a search ends, in full and quick
 PERIODS = {FINE: 1, COARSE: 5}  # of control, likewise for a delay
 QUICK = 5.0  # s, of a quick search's runs
@@ -45,14 +45,14 @@ Report = Callable[[float, float], None]  # told the work done and the whole, as 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Margin:
-    """What one law bears of one thing on one plant.
+    """The largest level of one kind that one law tolerates on one plant.
 
     Attributes:
       plant, law: their names.
       kind: one of KINDS.
-      value: the largest level borne; NaN: not even none of it. Equal to `searched`: not found to fail.
+      value: the largest level tolerated; NaN: the law fails without any. Equal to `searched`: no failure was found.
       unit: of value, resolution, searched and theory.
-      resolution: the first level not borne is at most so much larger.
+      resolution: the first level not tolerated is at most this much larger.
       searched: the largest level tried.
       theory: the same by linear theory, or None where there is none.
     """
@@ -68,7 +68,7 @@ class Margin:
 
     @property
     def open(self) -> bool:
-        """Whether nothing that was tried was too much."""
+        """Whether every level that was tried is tolerated."""
         return self.value == self.searched
 
 
@@ -83,7 +83,7 @@ def margins(
     condition: str | Condition = "nominal",
     starts: Starts | None = None,
 ) -> list[Margin]:
-    """The margins of laws on plants: plant by plant, law by law, kind by kind.
+    """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
     Args:
       plants, laws: names, or plants and laws of your own, one or several.
@@ -118,37 +118,37 @@ def of(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
 ) -> list[Margin]:
-    """The margins of any scenarios, each as it stands but for what it has to bear; arguments as of `margins`.
+    """Return the margins of any scenarios, each left as it is but for the level that is searched.
 
     Args:
-      resolution: FINE or COARSE.
+      resolution: FINE or COARSE. Other arguments as of `margins`.
     """
     for kind in kinds:
-        find("kind of margin", kind, SPECS)
+        find("kind of margin", kind, MARGIN_KINDS)
     find("resolution", str(resolution), {str(known): known for known in PERIODS})
     searches = [_Search(base, kind, resolution) for base in bases for kind in kinds]
     work = _Work(searches, threads, report)
-    plain = work.borne(bases)
+    plain = work.tolerated(bases)
     for i, search in enumerate(searches):
         search.fine = plain[i // len(kinds)]
     while asked := [(search, level) for search in searches for level in search.asks()]:
-        found = work.borne([search.scenario(level) for search, level in asked])
-        for (search, level), borne in zip(asked, found, strict=True):
-            search.known[level] = borne
+        found = work.tolerated([search.scenario(level) for search, level in asked])
+        for (search, level), tolerated in zip(asked, found, strict=True):
+            search.known[level] = tolerated
     return [search.margin() for search in searches]
 
 
 class _Search:
-    """One pair and kind: the largest level known to be borne below the smallest known not to be."""
+    """The search for one margin: the largest tolerated level below the smallest one that is not."""
 
     def __init__(self, base: Scenario, kind: str, resolution: float):
-        self.base, self.name, self.kind, self.resolution = base, kind, SPECS[kind], resolution
-        self.fine: bool | None = None  # whether the scenario bears none of it
-        self.known: dict[float, bool] = {}  # level -> whether it is borne
+        self.base, self.name, self.kind, self.resolution = base, kind, MARGIN_KINDS[kind], resolution
+        self.fine: bool | None = None  # whether the scenario itself is tolerated
+        self.known: dict[float, bool] = {}  # level -> whether it is tolerated
         self.levels = self.kind.scan(base)
 
     def scenario(self, level: float) -> Scenario:
-        """The base with a level of what is to be borne."""
+        """Return the base with a level of the disturbance, delay, ... that is searched."""
         return self.kind.put(self.base, level)
 
     @property
@@ -158,20 +158,20 @@ class _Search:
 
     @property
     def bracket(self) -> tuple[float, float]:
-        """The largest level borne below the first that is not, and that; inf where none is known."""
-        first = min((level for level, borne in self.known.items() if not borne), default=math.inf)
+        """The largest tolerated level below the first that is not, and that one; inf where none is known."""
+        first = min((level for level, tolerated in self.known.items() if not tolerated), default=math.inf)
         return max((level for level in self.known if level < first), default=self.kind.none), first
 
     @property
     def step(self) -> float:
-        """How far apart the two may stay."""
+        """The distance between the two at which the search ends."""
         if self.kind.periods:
             return PERIODS[self.resolution] * self.base.control_period
         return self.resolution * max(self.bracket[0], self.levels[0])
 
     @property
     def left(self) -> float:
-        """How many runs are still to come, about."""
+        """About how many runs are still to come."""
         if not self.fine:
             return 0 if self.fine is False else len(self.levels) + 6
         if not self.known:
@@ -180,7 +180,7 @@ class _Search:
         return math.ceil(max(0.0, math.log2((high - low) / self.step))) if high < math.inf else 0
 
     def asks(self) -> list[float]:
-        """The levels to look at next; none when done."""
+        """Return the levels to run next; none when the search is done."""
         if not self.fine:
             return []
         if not self.known:
@@ -191,7 +191,7 @@ class _Search:
         return [self.kind.rounded(self.base, (low + high) / 2.0)]
 
     def margin(self) -> Margin:
-        """What was found."""
+        """Return the result."""
         low, high = self.bracket
         return Margin(
             plant=self.base.plant.name,
@@ -206,14 +206,14 @@ class _Search:
 
 
 class _Work:
-    """Runs, and how much of them is done."""
+    """The runs of all searches, and how much of them is done."""
 
     def __init__(self, searches: Sequence[_Search], threads: int | None, report: Report):
         self.searches, self.threads, self.report = searches, threads, report
         self.done = 0.0
 
-    def borne(self, scenarios: Sequence[Scenario]) -> list[bool]:
-        """Whether each of the scenarios is borne; their traces are dropped at once."""
+    def tolerated(self, scenarios: Sequence[Scenario]) -> list[bool]:
+        """Run scenarios, and return whether each is tolerated; their traces are dropped at once."""
         start = self.done
         now = sum(s.work for s in scenarios)
         later = sum(s.left * s.steps for s in self.searches)
@@ -224,7 +224,7 @@ class _Work:
 
         found = dict.fromkeys(range(len(scenarios)), False)
         for i, trace in stream(scenarios, self.threads, told):
-            found[i] = bears(trace)
+            found[i] = tolerates(trace)
         self.done = start + now
         return list(found.values())
 
@@ -235,7 +235,7 @@ def save(found: Sequence[Margin], path: str | os.PathLike) -> Path:
 
 
 def load(path: str | os.PathLike) -> list[Margin]:
-    """The margins that `save` wrote.
+    """Read the margins that `save` wrote.
 
     Raises:
       ScenarioError: no such file, or not of margins.
@@ -245,7 +245,7 @@ def load(path: str | os.PathLike) -> list[Margin]:
 
 
 def _margin(entry: dict[str, Any]) -> Margin:
-    """The margin in a file. Those of version 0.1 have null for NaN, and "inf"."""
+    """Return the margin in a file. Files of version 0.1 have null for NaN, and "inf"."""
     fields: dict[str, Any] = {name: math.inf if value == "inf" else value for name, value in entry.items()}
     if fields["value"] is None:
         fields["value"] = math.nan

@@ -28,16 +28,16 @@ class Columns(Protocol):
     """A table, a row a run: plant, law, condition, seed, failure, diverged_at, and every metric."""
 
     def column(self, name: str) -> np.ndarray:
-        """Values by row; None or NaN where there is none."""
+        """Return values by row; None or NaN where there is none."""
         ...
 
     def scenario(self, i: int) -> Scenario:
-        """What ran in row i; ScenarioError where that is not at hand."""
+        """Return what ran in row i, or raise ScenarioError where that cannot be restored."""
         ...
 
 
 def values(table: Columns, metric: str) -> np.ndarray:
-    """A metric by row, inf for a run that failed, NaN where it does not apply; of "settles" 0.0 or, if not, 1.0.
+    """Return a metric by row: inf for a failed run, NaN where it does not apply. "settles" is 0.0 if it does, else 1.0.
 
     It does not apply to a plant whose runs all lack it, but for those that failed.
     """
@@ -77,7 +77,7 @@ class Group:
 
     @property
     def plants(self) -> int:
-        """In how many plants the runs are."""
+        """The number of plants in the runs."""
         return len({plant for plant, _ in self.blocks})
 
     @property
@@ -87,7 +87,7 @@ class Group:
         return [int(self.rows[np.argmax(block == k)]) for k in range(self.shape[1])]
 
     def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray]]:
-        """The blocks in which a metric applies, and law -> (these blocks, seeds); of none, {}.
+        """Return the blocks in which a metric applies, and law -> (these blocks, seeds); {} for none.
 
         Scores are NaN in cells that not all laws have, and in repeats.
 
@@ -110,7 +110,7 @@ class Group:
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
-    """The groups of a table, in the order of its rows; () is all of it.
+    """Return the groups of a table, in the order of its rows; () is the whole table.
 
     Raises:
       ScenarioError: no runs, an unknown group, two runs in a cell, or runs of a cell that differ in more than the law.
@@ -157,7 +157,7 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, Any, Any] | None:
-    """The first entry in which two descriptions differ, with its values; None where only one of them has it."""
+    """Return the first entry in which two descriptions differ, with its values; None where only one of them has it."""
     for name in (key for key in one if key in two):
         a, b = one[name], two[name]
         if isinstance(a, list) and isinstance(b, list) and a and isinstance(a[0], dict) and len(a) == len(b):
@@ -172,7 +172,7 @@ def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, An
 
 
 def _outcomes(table: Columns) -> np.ndarray:
-    """A number a row, the same for runs that are the same in every metric, but for rounding."""
+    """Return a number for each row: the same for runs that are the same in every metric, but for rounding."""
     columns = []
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that was not there when the table was written
@@ -211,7 +211,7 @@ def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray
 
 
 def _repeats(outcome: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Where a column of (laws, seeds) is there and equal to an earlier one, (seeds,)."""
+    """Return where a column of (laws, seeds) equals an earlier one, (seeds,)."""
     found, seeds = there.copy(), np.flatnonzero(there)
     found[seeds[np.unique(outcome[:, there], axis=1, return_index=True)[1]]] = False
     return found
@@ -229,7 +229,7 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:
-    """The least relevant difference of two values of a metric in this unit, whatever they are; 0 of no scenario.
+    """Return the least relevant difference of any two values of a metric in this unit; 0 for no scenario.
 
     0.5 % of the scale of such values, see `differences`: of the largest |x0| of a driven channel, of the bound on u, of
     100 %. For a position also half a count of the encoder, where there is one.

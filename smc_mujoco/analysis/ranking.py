@@ -84,29 +84,29 @@ class Comparison:
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
-        """(laws, blocks), the medians, or means, over the seeds."""
+        """The medians, or means, over the seeds, (laws, blocks)."""
         return np.nanmean(self.cells, axis=2) if self.shares else middle(self.cells)
 
     @property
     def seeds(self) -> np.ndarray:
-        """(blocks,), how many each block has."""
+        """The number of seeds of each block, (blocks,)."""
         return (~np.isnan(self.cells[0])).sum(axis=1)
 
     @functools.cached_property
     def better(self) -> np.ndarray:
-        """(blocks, laws, laws), whether a law is better than another."""
+        """Whether a law is better than another, (blocks, laws, laws)."""
         own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
         lower = exceeds(rival, own, resolution=self.floors[:, None, None])
         return lower & (self.p <= 1 - self.level) & (self.seeds >= SEEDS)[:, None, None]
 
     @property
     def best(self) -> list[tuple[str, ...]]:
-        """Of each block the laws that none is better than."""
+        """The laws of each block that no other is better than."""
         return [tuple(np.array(self.laws)[~row].tolist()) for row in np.any(self.better, axis=1)]
 
     @property
     def pairs(self) -> int:
-        """How many comparisons the p-values are corrected for."""
+        """The number of comparisons that the p-values are corrected for."""
         return len(self.p) * math.comb(len(self.laws), 2)
 
 
@@ -136,7 +136,7 @@ def compare(
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
-    """The laws by name, and their scores (laws, blocks, seeds), if all have the same cells."""
+    """Return the laws by name and their scores (laws, blocks, seeds), if all laws have the same cells."""
     laws = tuple(sorted(scores))
     given = [np.atleast_2d(np.asarray(scores[law], float)) for law in laws]
     if not given or not given[0].size or len({g.shape for g in given}) > 1:
@@ -149,7 +149,7 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
 
 
 def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of each block of signs (blocks, n): the two-sided p-value, and the sign that prevails."""
+    """Return the two-sided p-value of each block of signs (blocks, n), and the sign that prevails."""
     from scipy.special import bdtr
 
     up, down = (signs > 0).sum(axis=1), (signs < 0).sum(axis=1)
@@ -158,7 +158,7 @@ def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holm(p: np.ndarray) -> np.ndarray:
-    """p-values, in any shape, corrected for their number."""
+    """Correct p-values, in any shape, for their number."""
     order = np.argsort(p, axis=None)
     found = np.empty(p.size)
     found[order] = np.minimum(np.maximum.accumulate(p.flat[order] * np.arange(p.size, 0, -1)), 1.0)
@@ -166,7 +166,7 @@ def holm(p: np.ndarray) -> np.ndarray:
 
 
 def ranks(found: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[Rank]:
-    """The laws' places, lowest mean rank first."""
+    """Return the laws' ranks, lowest mean rank first."""
     n, k = found.cells.shape[2], len(found.laws)
     mean = block_ranks(found.centres[None], found.floors).mean(axis=2)
     place = _places(mean)[0]
@@ -193,7 +193,7 @@ def ranks(found: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[
 
 
 def _drawn_centres(found: Comparison, drawn: np.ndarray) -> np.ndarray:
-    """(resamples, laws, blocks), the centres of resamples."""
+    """Return the centres of resamples, (resamples, laws, blocks)."""
     if not found.shares:
         return np.stack([sum(drawn_medians(own, drawn)) / 2 for own in found.cells], axis=1)
     means = []
@@ -205,7 +205,7 @@ def _drawn_centres(found: Comparison, drawn: np.ndarray) -> np.ndarray:
 
 
 def block_ranks(centres: np.ndarray, floors: np.ndarray) -> np.ndarray:
-    """The laws' ranks in each block, (..., laws, blocks) as the centres."""
+    """Return the laws' ranks in each block, (..., laws, blocks) as the centres."""
     lowered, twice = centres - least_difference(centres, resolution=floors), np.zeros(centres.shape, np.int16)
     for rival in range(centres.shape[-2]):
         own = slice(rival, rival + 1)
@@ -215,5 +215,5 @@ def block_ranks(centres: np.ndarray, floors: np.ndarray) -> np.ndarray:
 
 
 def _places(mean: np.ndarray) -> np.ndarray:
-    """Places by mean rank, (draws, laws); ties share theirs."""
+    """Return the places by mean rank, (draws, laws); ties share theirs."""
     return (mean.shape[1] + 1 + worse(mean[:, :, None], mean[:, None, :]).sum(axis=2)) / 2

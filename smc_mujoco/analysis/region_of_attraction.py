@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.linearisation import ASIDE
+from smc_mujoco.analysis.linearisation import DISPLACEMENTS
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.control.component import Template
@@ -60,7 +60,7 @@ Report = Callable[[float, float], None]  # told the work done and the most that 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Basin:
-    """What became of every initial state of a grid.
+    """The outcome of every initial state of a grid.
 
     Attributes:
       plant, law: their names.
@@ -82,7 +82,7 @@ class Basin:
 
     @property
     def share(self) -> float:
-        """Of the states that converge."""
+        """The share of the states that converge."""
         return float((self.outcome == CONVERGES).mean())
 
     def save(self, path: str | os.PathLike) -> Path:
@@ -104,7 +104,7 @@ def basin(
     report: Report = lambda done, most: None,
     condition: str | Condition = "nominal",
 ) -> Basin:
-    """The map of a law on a plant.
+    """Map the region of attraction of a law on a plant.
 
     Args:
       plant, law: names, or a plant and a law of your own.
@@ -138,10 +138,10 @@ def of(
     report: Report = lambda done, most: None,
     early: bool = True,
 ) -> Basin:
-    """The map of any scenario, each run as it stands but for its initial state; arguments as of `basin`.
+    """Map the region of attraction of any scenario, each run as it stands but for its initial state.
 
     Args:
-      early: whether decided states leave; False runs all of them to the end.
+      early: whether decided states leave; False runs all of them to the end. Other arguments as of `basin`.
 
     Raises:
       ScenarioError: channels of two units, a grid of nothing, or a duration too short for the rule.
@@ -187,7 +187,7 @@ def of(
 
 
 def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
-    """1, 0 or -1 by the module's rule for a grid x, v; None: it needs a longer run, which `final` ends."""
+    """Judge a run by the module's rule, for a grid x, v: 1, 0 or -1, or None where it needs a longer run."""
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
     far = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
@@ -208,13 +208,13 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
 
 
 def holdable(plant: Plant, u_max: float) -> float:
-    """The smallest x > 0 at which |u| <= u_max cannot hold a joint still against its own force; inf if everywhere.
+    """Return the smallest x > 0 at which |u| <= u_max cannot hold a joint against its own force; inf if it always can.
 
     Where f(x, 0) / g exceeds u_max: for the inverted pendulum m grav l sin x = u_max. A joint at rest further out falls
     on, until that force is smaller again, whatever the law.
     """
     p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
-    for x in ASIDE:
+    for x in DISPLACEMENTS:
         f, g = plant.nominal(np.full(plant.n, x), still, 0, p)
         if f / g > u_max:
             return float(x)
@@ -222,7 +222,7 @@ def holdable(plant: Plant, u_max: float) -> float:
 
 
 def load(path: str | os.PathLike) -> Basin:
-    """The map that `Basin.save` wrote.
+    """Read the map that `Basin.save` wrote.
 
     Raises:
       ScenarioError: no such file, or no map.
@@ -242,7 +242,7 @@ def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _summed(report: Report, done: float, most: float) -> Callable[[int], None]:
-    """A report of steps that adds them to what was done before."""
+    """Return a report that adds the steps done before."""
 
     def told(steps: int) -> None:
         nonlocal done

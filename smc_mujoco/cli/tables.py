@@ -311,7 +311,7 @@ def _winner_cell(board: Board | None) -> Text:
 
 def margins(kind: str, found: Sequence[Margin]) -> Table:
     """Return the margins of one kind: a line for each plant and law."""
-    made = titled(f"largest {kind} borne", "plant", "law")
+    made = titled(f"largest {kind} tolerated", "plant", "law")
     for head in ("margin", "to within", "theory"):
         made.add_column(head, justify="right", no_wrap=True)
     made.add_column("unit")

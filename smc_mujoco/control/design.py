@@ -13,7 +13,7 @@ STEP = 1e-6  # rad or m, and per second: of the central differences, about the c
 
 
 def linearised(plant: Plant) -> tuple[float, float, float]:
-    """a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; of a network, those of its least stable channel.
+    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; of a network, for its least stable channel.
 
     What a neighbour's motion does to a channel is no part of them.
 
@@ -47,7 +47,7 @@ def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
 
 
 def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
-    """The law `lqr` for a plant linearised at the origin: least integral of q[0] e^2 + q[1] de^2 + r u^2.
+    """Design the law `lqr` for a plant at the origin: least integral of q[0] e^2 + q[1] de^2 + r u^2.
 
     Args:
       of: a Plant or the name of one.

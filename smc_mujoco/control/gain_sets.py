@@ -87,7 +87,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
 
 
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
-    """The law with its gains for a plant, from a set. No warning tells of conditions that they miss: they are as found.
+    """Return the law with its gains for a plant, from a set. It warns of no condition that these gains miss.
 
     Args:
       seed: of a run; run s takes the gains from tuning seed s modulo the number of seeds that the law was tuned from.
@@ -132,12 +132,12 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
 
 
 def tunings(gains: str, name: str) -> int:
-    """From how many seeds a law was tuned for a set."""
+    """Return from how many seeds a law was tuned for a set."""
     return SEEDS[gains] if name in LAWS else 1
 
 
 def paper_plant(plant: object) -> str:
-    """The name of one of the paper's plants, which have conditions and gains; ScenarioError for any other plant."""
+    """Return the name of one of the paper's plants, which have gains; ScenarioError for any other plant."""
     if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
@@ -148,7 +148,7 @@ def paper_plant(plant: object) -> str:
 
 
 def file(plant: str, name: str, objective: str, seed: int = 0) -> Path:
-    """Where the tuning of a law on a plant for an objective from a seed is kept."""
+    """Return where the tuning of a law on a plant for an objective from a seed is kept."""
     ending = f"-{seed}" if seed else ""
     return Path(__file__).parent / "tuned_gains" / objective / f"{plant}-{name}{ending}.json"
 
@@ -166,7 +166,7 @@ def _found(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float
 
 
 def _cure(plant: Plant, name: str) -> str:
-    """What to do about a law that a set has no gains for on a plant."""
+    """Return what to do about a law that a set has no gains for on a plant."""
     example = next(iter(find_law(name).gains), "k")
     own = f"give the law with gains of its own, as {name}({example}=...)"
     if not plant.unscaled:

@@ -57,7 +57,7 @@ class Measurement(NamedTuple):
 
 @njit
 def sliding(y, c):
-    """The sliding variable s and the acceleration eq of the error that keeps it.
+    """Return the sliding variable s, and the acceleration of the error that keeps it constant.
 
     Those of the scenario's surface, eq included whether the law has the model or not; or s = de + c e, for which
     eq = -c de: left out where the law has no model, as model-free laws are published without it.
@@ -69,7 +69,7 @@ def sliding(y, c):
 
 @njit
 def command(y, v):
-    """The u that gives the error the acceleration v: (v - f + r'') / g with the model, v without."""
+    """Return the u that gives the error the acceleration v: (v - f + r'') / g with the model, v without."""
     if y.model == 0.0:
         return v
     return (v - y.f + y.ddr) / y.g
@@ -77,19 +77,19 @@ def command(y, v):
 
 @njit
 def input_gain(y):
-    """g as the law may know it: nominal with the model, 1 without."""
+    """Return g as the law may know it: nominal with the model, 1 without."""
     return y.g if y.model != 0.0 else 1.0
 
 
 @njit
 def sgn(a):
-    """Sign of a; 0 at 0."""
+    """Return the sign of a; 0 at 0."""
     return math.copysign(1.0, a) if a != 0.0 else 0.0
 
 
 @njit
 def power(a, p):
-    """[a]^p = |a|^p sgn(a), p > 0."""
+    """Return [a]^p = |a|^p sgn(a), p > 0."""
     return math.copysign(abs(a) ** p, a) if a != 0.0 else 0.0
 
 
@@ -129,7 +129,7 @@ def law_function(
 
 @functools.cache
 def catalogue() -> dict[str, Template]:
-    """Every law found in smc_mujoco.control.laws, by name."""
+    """Return every law found in smc_mujoco.control.laws, by name."""
     return discover("smc_mujoco.control.laws")
 
 
@@ -145,7 +145,7 @@ def checked_name(law: Law) -> Law:
 
 
 def law(name: str, **gains: float) -> Law:
-    """The law `name` of the library, with some of its gains changed. `law(...).named("slow")` gives it another name.
+    """Return the law `name` of the library, with some gains changed. `law(...).named("slow")` gives it another name.
 
     Raises:
       ScenarioError: unknown law or gain, or a gain out of its range.
@@ -154,7 +154,7 @@ def law(name: str, **gains: float) -> Law:
 
 
 def fits(law: Law | Template, plant: Plant) -> bool:
-    """Whether a law is for a plant: every one, those it names, or as they are, a model of the user's with partners."""
+    """Return whether a law is for a plant: for every plant, for one of its name, or for models of its kind."""
     if not law.plants or plant.name in law.plants:
         return True
     known = [plants_known()[name] for name in law.plants if name in plants_known()]
@@ -162,7 +162,7 @@ def fits(law: Law | Template, plant: Plant) -> bool:
 
 
 def laws(plant: Plant | str | None = None) -> list[str]:
-    """Names that `law` knows; with a plant, of those laws that are for it.
+    """List the names that `law` knows; with a plant, of the laws that are for it.
 
     A law without `plants` of its own is for every plant whose channels all have an actuator; `none` for every plant;
     one for joints without an actuator for models of yours that have such joints too.

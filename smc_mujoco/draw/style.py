@@ -62,7 +62,7 @@ RC = {
 
 
 def page():
-    """A context in which matplotlib draws in this style."""
+    """Return a context in which matplotlib draws in this style."""
     from matplotlib import rc_context
 
     return rc_context(RC)  # pyright: ignore[reportArgumentType]
@@ -123,7 +123,7 @@ def in_words(name: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """One label a trace: the given ones as they are, else the laws' names, numbered where a law comes again.
+    """Return one label a trace: the given ones, else the laws' names, numbered where a law comes again.
 
     Raises:
       ScenarioError: not as many labels as traces.
@@ -137,7 +137,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 
 
 def ending(trace: Trace) -> str:
-    """How a run ended before its time, "" if it did not: "diverged at 0.4 s" only where the plant went off."""
+    """Return how a run ended before its time, "" if it did not: "diverged at 0.4 s" only where the plant diverged."""
     if trace.diverged_at is None:
         return ""
     off = trace.failure is None or trace.failure.startswith(reference.LEFT_THE_WORLD)
@@ -145,7 +145,7 @@ def ending(trace: Trace) -> str:
 
 
 def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
-    """When plants change, s -> how, as "mass × 2"; with the labels in front where it is not all of them."""
+    """Return when plants change, s -> how, as "mass × 2"; with the labels in front where only some of them do."""
     found: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
         if jump := trace.scenario.jump:
@@ -159,7 +159,7 @@ def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
 
 @functools.cache
 def font(size: float, bold: bool = False):
-    """DejaVu Sans, as matplotlib brings it, as a font of Pillow; letters `size` high."""
+    """Return DejaVu Sans, which comes with matplotlib, as a font of Pillow; letters `size` high."""
     import matplotlib
     from PIL import ImageFont
 
@@ -168,12 +168,12 @@ def font(size: float, bold: bool = False):
 
 
 def width(text: str, size: float, bold: bool = False) -> float:
-    """How wide a text is, in the unit of the letters' size."""
+    """Return the width of a text, in the unit of the letters' size."""
     return font(10 * size, bold).getlength(text) / 10  # Pillow rounds small letters to pixels
 
 
 def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
-    """The text, on one line, cut with an ellipsis where it is wider than the room."""
+    """Return the text on one line, cut with an ellipsis where it is wider than the room."""
     text = cut = " ".join(text.split())
     while cut and width(cut if cut == text else f"{cut}…", size, bold) > room:
         cut = cut[:-1]
@@ -181,7 +181,7 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
-    """The traces, or the single one, if they can share axes.
+    """Return the traces as a list, if they can share axes.
 
     Raises:
       ScenarioError: none, or of several plants.
@@ -200,24 +200,24 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
 
 
 def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
-    """The traces of each group of channels, of traces of one plant: what shares a pair of axes."""
+    """Return the traces of each group of channels, for traces of one plant: each group shares a pair of axes."""
     kinds = zip(*(groups(trace.scenario.plant) for trace in traces), strict=True)
     return {kind[0]: [cut(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
 
 
 def units(group: Group) -> dict[str, str]:
-    """Units of the quantities x, v, u, s of a group's channels."""
+    """Return the units of x, v, u and s of a group's channels."""
     x = group.unit
     return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
 
 
 def quantity(group: Group) -> str:
-    """What x is: "angle" or "position", and "free angle" where no actuator drives it."""
+    """Return what x is: "angle" or "position", and "free angle" where no actuator drives it."""
     return ("" if group.driven else "free ") + {"rad": "angle", "m": "position"}[group.unit]
 
 
 def letter(group: Group) -> str:
-    """What x is called: q where no actuator drives it, as in a law's y.q."""
+    """Return the letter of x: q where no actuator drives it, as in a law's y.q."""
     return "x" if group.driven else "q"
 
 
@@ -228,16 +228,16 @@ def plant_name(trace: Trace) -> str:
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """#RRGGBB as three numbers, 0 .. 255."""
+    """Return #RRGGBB as three numbers, 0 .. 255."""
     return tuple(bytes.fromhex(colour[1:]))  # pyright: ignore[reportReturnType]
 
 
 def letters_on(colour: str) -> str:
-    """White or ink, whichever reads better on a colour (luma of ITU-R BT.601)."""
+    """Return white or ink, whichever is easier to read on a colour (luma of ITU-R BT.601)."""
     red, green, blue = rgb(colour)
     return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 140 else PAPER
 
 
 def short(value: float, digits: int = 2) -> str:
-    """A number in few digits, without an exponent where it has fewer than seven: 0.25, 6, 280."""
+    """Return a number in few digits, without an exponent where it has fewer than seven: 0.25, 6, 280."""
     return f"{float(f'{value:.{digits}g}'):g}"

@@ -14,7 +14,7 @@ SEED = 0
 
 
 def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) -> float:
-    """The largest |x'' - f| over the largest |f|, of states with |x| and |v| up to `reach`, without a command.
+    """Return the largest |x'' - f| over the largest |f|, for states with |x| and |v| up to `reach`, without a command.
 
     x'' is the mechanism's, f the plant's equation with the same parameters. One channel takes a grid of states, a
     network random ones.
@@ -44,7 +44,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
 
 
 def _states(n: int, reach: float) -> np.ndarray:
-    """States (m, 2, n) of n channels."""
+    """Return states (m, 2, n) of n channels."""
     if n > 1:
         return np.random.default_rng(SEED).uniform(-reach, reach, (STATES, 2, n))
     line = np.linspace(-reach, reach, GRID)

@@ -62,7 +62,7 @@ class Native(NamedTuple):
 
 
 class Coupled(abc.ABC):
-    """Base of nominal models that come compiled, and in which what the other channels were told last counts too."""
+    """Base of compiled nominal models that also depend on the last commands of the other channels."""
 
     @abc.abstractmethod
     def __call__(
@@ -146,12 +146,12 @@ class Plant:
 
     @property
     def driven(self) -> int:
-        """How many channels have an actuator: the first ones. Each has at most one joint that moves with it."""
+        """The number of channels with an actuator: the first ones. Each has at most one joint that moves with it."""
         return self.n // 2 if self.underactuated else self.n
 
     @property
     def free(self) -> int:
-        """How many channels are joints that are only measured: the last ones."""
+        """The number of channels that are only measured: the last ones."""
         return self.n - self.driven
 
     @property
@@ -177,11 +177,11 @@ class Plant:
         return f"it has no nominal model, of which tuning takes its scales: {self.unmodelled}" * bool(self.unmodelled)
 
     def spec(self) -> mujoco.MjSpec:
-        """The mechanism as an editable MjSpec, with default parameters."""
+        """Return the mechanism as an editable MjSpec, with default parameters."""
         return self.build(self.n)
 
     def load(self, factors: Mapping[str, float] | None = None, nuserdata: int = 0) -> mujoco.MjModel:
-        """The compiled ideal plant.
+        """Compile the ideal plant.
 
         Args:
           factors: parameter name -> factor on its value (the true plant's mismatch).
@@ -193,7 +193,7 @@ class Plant:
         return model
 
     def values(self, factors: Mapping[str, float]) -> Values:
-        """The parameters, each times its factor; `mass` stands for the plant's mass."""
+        """Return the parameters, each times its factor; `mass` stands for the plant's mass."""
         values = dict(self.parameters)
         for key, factor in factors.items():
             name = self.mass if key == "mass" else key
@@ -209,7 +209,7 @@ class Plant:
 
 
 def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
-    """The compiled model of a spec, for runs with userdata of that length."""
+    """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
     # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
@@ -224,19 +224,19 @@ def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
 
 
 def array(model: mujoco.MjModel, name: str) -> np.ndarray:
-    """The array of a model or option field that a Field names."""
+    """Return the array of a model or option field that a Field names."""
     owner = model.opt if name.startswith("opt.") else model
     return getattr(owner, name.removeprefix("opt."))
 
 
 def model_path(name: str) -> Path:
-    """The MJCF file models/<name>."""
+    """Return the path of the MJCF file models/<name>."""
     return shipped("models") / name
 
 
 @functools.cache
 def catalogue() -> dict[str, Plant]:
-    """Every plant found in smc_mujoco.mechanisms.plants, by name."""
+    """Return every plant found in smc_mujoco.mechanisms.plants, by name."""
     found: list[Plant] = []
     for module in modules("smc_mujoco.mechanisms.plants"):
         found += [value for value in vars(module).values() if isinstance(value, Plant)]
@@ -244,7 +244,7 @@ def catalogue() -> dict[str, Plant]:
 
 
 def plant(name: str, **parameters: float) -> Plant:
-    """The plant `name`, with some of its parameters (or its size n) changed.
+    """Return the plant `name`, with some of its parameters (or its size n) changed.
 
     Raises:
       ScenarioError: unknown name, or a parameter out of its range.
@@ -262,5 +262,5 @@ def plant(name: str, **parameters: float) -> Plant:
 
 
 def plants() -> list[str]:
-    """Names that `plant` knows."""
+    """List the names that `plant` knows."""
     return list(catalogue())

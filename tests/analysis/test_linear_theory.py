@@ -71,7 +71,7 @@ def test_a_law_that_switches_has_no_theory(name):
     law = own(plant, name)
     assert linearisation.local(law) is None
     assert linear_theory.rest_error(plant, law, 0.2) is None
-    assert linear_theory.borne(plant, law, 0.1) is None
+    assert linear_theory.tolerated_force(plant, law, 0.1) is None
 
 
 @pytest.mark.parametrize("lam", [-1.0, math.nan, math.inf])
@@ -211,7 +211,7 @@ def test_a_small_disturbance_needs_no_more_than_linear_theory(plant):
 @each_plant
 def test_what_is_borne_puts_the_plant_where_it_may_just_be(plant):
     law, most = own(plant), 0.02
-    level = linear_theory.borne(plant, law, most)
+    level = linear_theory.tolerated_force(plant, law, most)
     assert level is not None
     assert linear_theory.rest_error(plant, law, level) == pytest.approx(most, rel=1e-4)
 
@@ -225,12 +225,12 @@ def test_what_is_borne_is_the_largest_force_up_to_there(plant, k1, most):
     assert force is not None
     rises = force(np.linspace(0.0, most, 2_001)[1:])
     first = int(np.argmax(np.r_[np.diff(rises) < 0.0, True]))
-    assert linear_theory.borne(plant, law, most) == pytest.approx(max(rises[first], 0.0), rel=1e-6, abs=1e-9)
+    assert linear_theory.tolerated_force(plant, law, most) == pytest.approx(max(rises[first], 0.0), rel=1e-6, abs=1e-9)
 
 
 def test_the_actuators_bound_counts_where_it_is_below_lambda():
     plant, law = smc.plant("inverted_pendulum"), smc.law("observer_free", lam=40.0, k1=9.7)
-    bounded = linear_theory.borne(plant, law, 0.1, u_max=6.0)
+    bounded = linear_theory.tolerated_force(plant, law, 0.1, u_max=6.0)
     p = plant.parameters
     assert bounded == pytest.approx(
         6.0 - p["m"] * p["grav"] * p["l"] * math.sin(math.atanh(6.0 / 40.0) / 9.7), rel=0.01
@@ -240,7 +240,7 @@ def test_the_actuators_bound_counts_where_it_is_below_lambda():
 def test_beyond_what_the_law_can_hold_a_pendulum_rests_nowhere():
     plant = smc.plant("inverted_pendulum")
     law = smc.law("observer_free", lam=2.0, k1=9.7)
-    summit = linear_theory.borne(plant, law, 3.0)
+    summit = linear_theory.tolerated_force(plant, law, 3.0)
     assert summit is not None
     assert (linear_theory.rest_error(plant, law, 0.999 * summit) or math.inf) < 0.5
     assert linear_theory.rest_error(plant, law, 1.001 * summit) == math.inf

@@ -80,7 +80,7 @@ class Objective:
         return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
     def described(self) -> dict[str, Any]:
-        """As plain data that JSON holds, from which `described` makes it again."""
+        """Return it as plain data that JSON holds, from which `described` makes it again."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return values | {
             "conditions": [str(one) for one in self.conditions],
@@ -88,7 +88,7 @@ class Objective:
         }
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
-        """One run for each condition; every candidate has the same starts and the same noise.
+        """Return one run for each condition; every candidate has the same starts and the same noise.
 
         Raises:
           ScenarioError: a condition in which the plant starts at 0.
@@ -109,12 +109,12 @@ class Objective:
         return placed
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
-        """Tracking and variation of a candidate's runs, each summed over them; J = tracking + weight variation."""
+        """Return tracking and variation of a candidate's runs, each summed; J = tracking + weight variation."""
         parts = [self.parts(trace) for trace in traces]
         return sum(tracking for tracking, _ in parts), sum(variation for _, variation in parts)
 
     def parts(self, trace: Trace) -> tuple[float, float]:
-        """ITAE / sum |x0| in s^2, and TV / (u_max duration) in 1/s; of a failed run its price, and 0."""
+        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; of a failed run its price, and 0."""
         if trace.diverged_at is not None:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
@@ -124,7 +124,7 @@ class Objective:
 
 
 def described(data: Mapping[str, Any]) -> Objective:
-    """The objective of `Objective.described`; one from before there were starts has the default ones."""
+    """Return the objective that `Objective.described` wrote; one from before there were starts has the default ones."""
     found = dict(data.get("starts", {}))
     if found.get("x0") is not None:
         found["x0"] = tuple(found["x0"])
@@ -133,12 +133,12 @@ def described(data: Mapping[str, Any]) -> Objective:
 
 @functools.cache
 def catalogue() -> dict[str, Objective]:
-    """Objectives by name."""
+    """Return the objectives by name."""
     return {"balanced": Objective(), "tracking": Objective(weight=0.0)}
 
 
 def objective(given: object) -> Objective:
-    """An Objective, as given or by its name.
+    """Return an Objective, from one or its name.
 
     Raises:
       ScenarioError: neither.

@@ -43,7 +43,7 @@ class Evaluation:
 
     @property
     def failed(self) -> bool:
-        """Whether one of its runs did."""
+        """Whether one of its runs failed."""
         return self.tracking >= FAILED
 
 
@@ -98,12 +98,12 @@ class Tuned:
 
     @property
     def widened(self) -> list[str]:
-        """Gains of which a bound was moved."""
+        """Gains with a bound that was moved."""
         return [name for name in self.bounds if self.bounds[name] != self.searched[name]]
 
     @property
     def front(self) -> list[Evaluation]:
-        """The finals that none beats in both tracking and variation, by tracking; none that failed."""
+        """The finals that no other beats in both tracking and variation, by tracking; failed ones left out."""
         found: list[Evaluation] = []
         for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
             if not one.failed and (not found or one.variation < found[-1].variation):
@@ -125,7 +125,7 @@ class Tuned:
 
 
 def checked(path: str | os.PathLike) -> Path:
-    """The path, if a tuning can be saved under its name."""
+    """Return the path, if a tuning can be saved under its name."""
     path = Path(path)
     if path.suffix != ".json" or "\0" in path.name:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in .json")
@@ -133,7 +133,7 @@ def checked(path: str | os.PathLike) -> Path:
 
 
 def load(path: str | os.PathLike) -> Tuned:
-    """The tuning that `Tuned.save` wrote.
+    """Read the tuning that `Tuned.save` wrote.
 
     Raises:
       ScenarioError: no such file, or no tuning.
@@ -171,7 +171,7 @@ def _evaluation(gains: Sequence[float], objective: float, tracking: float, varia
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
-    """The tunings, best first, if all were made by the same rule with the same means.
+    """Return the tunings, best first, if all were made by the same rule with the same means.
 
     Raises:
       ScenarioError: one had another rule, plant, objective, budget, seed, versions or width of bounds than the first,
@@ -197,5 +197,5 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
 
 
 def versions() -> dict[str, str]:
-    """Of what the numbers of a tuning depend on."""
+    """Return the versions of the packages that the numbers of a tuning depend on."""
     return {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy", "scipy")}

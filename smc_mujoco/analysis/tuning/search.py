@@ -70,7 +70,7 @@ def tune(
     conditions: Sequence[Condition | str] | Condition | str | None = None,
     starts: Starts | None = None,
 ) -> Tuned:
-    """The law's best gains on the plant, by the rule that is the same for every law.
+    """Find the law's best gains on the plant, by the rule that is the same for every law.
 
     Args:
       law: its gains are the starting point of nothing: `Tuned.before` says what they cost. Those held keep their value.
@@ -122,11 +122,11 @@ def tune(
 
 
 class _Spent(Exception):
-    """The budget is."""
+    """Raised when the budget is spent."""
 
 
 class _Ledger:
-    """What was evaluated, cheaply and accurately, in order; raises _Spent when it is as much as the budget."""
+    """The evaluations, cheap and accurate, in order. It raises _Spent when they are as many as the budget allows."""
 
     def __init__(
         self,
@@ -146,11 +146,11 @@ class _Ledger:
 
     @property
     def best(self) -> Evaluation:
-        """The first of the best."""
+        """The first of the best evaluations."""
         return min(self.evaluations, key=lambda e: e.objective)
 
     def costs(self, logs: np.ndarray) -> np.ndarray:
-        """J of candidates given as columns of log10 gains (gains, candidates)."""
+        """Return J of candidates given as columns of log10 gains (gains, candidates)."""
         asked = [tuple(float(f"{10.0**z:.{DIGITS}g}") for z in column) for column in logs.T.tolist()]
         new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
         left = self.budget - len(self.evaluations)
@@ -187,17 +187,17 @@ class _Ledger:
 
 
 def _cheap(case: Scenario) -> Scenario:
-    """The case under Euler's method, if its own is RK4."""
+    """Return the case under Euler's method, if its own is RK4."""
     return dataclasses.replace(case, integrator="Euler") if case.integrator == "RK4" else case
 
 
 def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
-    """The law with other gains; search warns of no theorem's conditions."""
+    """Return the law with other gains; the search warns of no theorem's conditions."""
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
 def _search(ledger: _Ledger, start: search_space.Box, seed: int) -> search_space.Box:
-    """Spend the budget; the bounds in the end."""
+    """Spend the budget, and return the bounds at the end."""
     random, box = np.random.default_rng(seed), start
     members = _hypercube(box, random)
     with contextlib.suppress(_Spent):
@@ -216,7 +216,7 @@ def _search(ledger: _Ledger, start: search_space.Box, seed: int) -> search_space
 def _evolve(
     ledger: _Ledger, box: search_space.Box, members: np.ndarray, random: np.random.Generator, until: int
 ) -> np.ndarray:
-    """Evolve the members until so many are evaluated; from a population that has collapsed, a fresh one."""
+    """Evolve the members until that many are evaluated; return a fresh population where it has collapsed."""
     from scipy.optimize import differential_evolution
 
     found = differential_evolution(
@@ -237,7 +237,7 @@ def _evolve(
 
 
 def _hypercube(box: search_space.Box, random: np.random.Generator) -> np.ndarray:
-    """Log10 gains of a first population, (members, gains): the middle of the box, and a Latin hypercube's."""
+    """Return log10 gains of a first population, (members, gains): the middle of the box, and a Latin hypercube."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = np.log10(list(box.values())).T

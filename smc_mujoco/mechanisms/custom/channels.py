@@ -20,7 +20,7 @@ Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Channel:
-    """How a joint of an own model is driven.
+    """How a joint of a user's model is driven.
 
     Attributes:
       actuator: name of the motor that drives it; None: the only one that does.
@@ -39,7 +39,7 @@ class Channel:
 
 
 def given(channels: object) -> tuple[tuple[str, Channel], ...]:
-    """Joints with their Channels, from whatever the user gave."""
+    """Coerce what the user gave to joints with their Channels."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
     items = (
@@ -53,7 +53,7 @@ def given(channels: object) -> tuple[tuple[str, Channel], ...]:
 
 
 def channel(joint: object, value: object) -> Channel:
-    """A Channel, from one, a dict of its fields, or None."""
+    """Coerce a Channel, a dict of its fields, or None to a Channel."""
     if isinstance(value, Mapping):
         for key in value:
             find("field of a Channel", key, {field.name: None for field in dataclasses.fields(Channel)})
@@ -73,7 +73,7 @@ def channel(joint: object, value: object) -> Channel:
 
 
 def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
-    """Raise ScenarioError for joints that are not there or cannot be channels, and for flags that forbid control."""
+    """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that forbid control."""
     joints = [*(joint for joint, _ in asked), *partners]
     there = {model.joint(i).name: i for i in range(model.njnt) if model.joint(i).name}
     for joint in joints:
@@ -94,7 +94,7 @@ def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], .
 def starts(
     plant: str, model: mujoco.MjModel, joints: list[str], asked: tuple[tuple[str, Channel], ...], keyframe: str | None
 ) -> tuple[float, ...]:
-    """x0: as the channels say, else as the keyframe, else as the model has it.
+    """Return x0: from the channels, else from the keyframe, else from the model.
 
     The last alone may be outside a range, for nobody asked for it, and a scenario can have another.
     """
@@ -109,7 +109,7 @@ def starts(
 
 
 def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
-    """Raise ScenarioError for a start outside a joint's range, in a run that is to be."""
+    """Raise ScenarioError for a start outside a joint's range, unless the run is a recorded one."""
     for (joint, low, high), x in zip(ranges, x0, strict=False):
         if not (low - BEYOND <= x <= high + BEYOND or RECORDED.get()):
             raise ScenarioError(
@@ -120,7 +120,7 @@ def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
 
 @contextlib.contextmanager
 def recorded() -> Iterator[None]:
-    """Within it, what is read was run already, and is not refused for what would be today."""
+    """Skip validation of scenarios that are read from a recorded run."""
     token = RECORDED.set(True)
     try:
         yield
@@ -129,7 +129,7 @@ def recorded() -> Iterator[None]:
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
-    """Joint, least and largest position of each channel, rad or m; empty where none has limits."""
+    """Return joint, least and largest position of each channel, rad or m; empty where none has limits."""
     found = []
     for joint in map(model.joint, joints):
         low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)

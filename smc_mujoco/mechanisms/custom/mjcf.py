@@ -38,7 +38,7 @@ _lock = threading.Lock()  # who has changed how many digits MuJoCo writes
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Where a model comes from: a file, or a text with the files that it names.
+    """The source of a model: a file, or a text with the files that it names.
 
     Attributes:
       path: of the file, absolute; "" for a text.
@@ -54,11 +54,11 @@ class Source:
 
     @property
     def label(self) -> str:
-        """The file's name; of a text what its file would be called."""
+        """The file's name; of a text the name that its file would have."""
         return Path(self.path).name if self.path else f"{_modelname(self.text)}.xml"
 
     def read(self) -> mujoco.MjSpec:
-        """The model as an editable MjSpec.
+        """Return the model as an editable MjSpec.
 
         Raises:
           ScenarioError: MuJoCo cannot read it, or the file is another than it was.
@@ -75,7 +75,7 @@ class Source:
         return spec
 
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
-        """The spec of this model, compiled.
+        """Return the spec of this model, compiled.
 
         Raises:
           ScenarioError: MuJoCo cannot compile it.
@@ -87,7 +87,7 @@ class Source:
 
 
 def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
-    """Where a model comes from: the path of a file, the text of one, an MjSpec, or a mjcf.RootElement of dm_control.
+    """Coerce the path of a file, the text of one, an MjSpec, or a mjcf.RootElement of dm_control to a Source.
 
     Args:
       assets: name -> content of the files that a text names.
@@ -121,7 +121,7 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
 
 
 def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
-    """The source of a text whose files are all among the assets."""
+    """Return the source of a text whose files are all among the assets."""
     fits = isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(v, bytes) for k, v in assets.items())
     if not fits:
         raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes")
@@ -142,7 +142,7 @@ def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
 
 
 def _of_spec(spec: mujoco.MjSpec) -> Source:
-    """The source of an MjSpec as it is now: its XML with all digits, and the files that it names."""
+    """Return the source of an MjSpec as it is now: its XML with all digits, and the files that it names."""
     own = spec.copy()
     try:
         model = mjcb.compiled(own)
@@ -163,7 +163,7 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
 
 
 def _exactly(spec: mujoco.MjSpec) -> str:
-    """The XML of a compiled spec, with all digits where this MuJoCo can be told how many."""
+    """Return the XML of a compiled spec, with all digits where this MuJoCo can write them."""
     library = libmujoco.library()
     try:
         get, put = library._mjPRIVATE__get_xml_precision, library._mjPRIVATE__set_xml_precision
@@ -179,7 +179,7 @@ def _exactly(spec: mujoco.MjSpec) -> str:
 
 
 def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
-    """The first field in which two models differ by more than rounding, or ""."""
+    """Return the first field in which two models differ by more than rounding, or ""."""
     for name in fields(model):
         one, other = getattr(model, name), getattr(again, name)
         if one.shape != other.shape or not np.allclose(one, other, rtol=SAME, atol=SAME, equal_nan=True):
@@ -193,12 +193,12 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 
 def fields(model: mujoco.MjModel) -> list[str]:
-    """The names of the model's arrays of numbers."""
+    """Return the names of the model's arrays of numbers."""
     return [name for name in _fields(type(model)) if isinstance(getattr(model, name), np.ndarray)]
 
 
 def tried(source: Source, timeout: float) -> None:
-    """Compile a model in a process of its own, unless this process has had that done before.
+    """Compile a model in a process of its own, unless this process has done so before.
 
     Args:
       timeout: s.
@@ -234,7 +234,7 @@ def tried(source: Source, timeout: float) -> None:
 
 
 def _complaint(source: Source, last: str, code: int | None, timeout: float) -> ScenarioError:
-    """What the last line of a trial, and how its process ended, say of a model."""
+    """Return what is wrong with a model, from the last line of a trial and how its process ended."""
     stage, _, words = last.partition(" ")
     full = code == -getattr(signal, "SIGKILL", 0) or re.search(r"unknown exception|bad_alloc|memory|allocat", words)
     if full:
@@ -252,7 +252,7 @@ def _complaint(source: Source, last: str, code: int | None, timeout: float) -> S
 
 
 def broken(where: str, error: str) -> ScenarioError:
-    """MuJoCo's complaint about a model, in one line: what, and where."""
+    """Return MuJoCo's complaint about a model in one line: what, and where."""
     text = " ".join(error.split())
     line = re.search(r"[Ll]ine(?: number=)? ?(\d+)", text)
     place = f", line {line[1]}" if line and line[1] != "0" else ""
@@ -269,14 +269,14 @@ def broken(where: str, error: str) -> ScenarioError:
 
 
 def pick(label: str, kind: str, name: object, there: Mapping[str, int]) -> int:
-    """The number of what has that name in a model, or the ScenarioError that says what has one."""
+    """Return the number of what has that name in a model, or raise ScenarioError with the names that exist."""
     if not there:
         raise ScenarioError(f"unknown {kind} of {label} {shown(name)}: none has a name there, so give it one")
     return find(f"{kind} of {label}", name, there)
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of the file and of every file that it names: includes, attached models, meshes, textures; 64 hex digits.
+    """Hash the file and every file that it names (includes, attached models, meshes, textures): SHA-256, 64 hex digits.
 
     Where a name may stand for several files, all of them count.
     """
@@ -295,12 +295,12 @@ def digest(path: Path) -> str:
 
 
 def _sha256(parts: Iterable[bytes]) -> str:
-    """The hash of the parts' hashes."""
+    """Hash the hashes of the parts."""
     return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
 
 
 def _elements(model: Path | str | bytes) -> list[ET.Element]:
-    """The elements of an XML file or text; none where it is no such thing, of which MuJoCo tells."""
+    """Return the elements of an XML file or text; none where it cannot be parsed, which MuJoCo reports."""
     try:
         return list(ET.fromstring(model.read_bytes() if isinstance(model, Path) else model).iter())
     except (OSError, ValueError, ET.ParseError):
@@ -308,12 +308,12 @@ def _elements(model: Path | str | bytes) -> list[ET.Element]:
 
 
 def _files(elements: Iterable[ET.Element]) -> list[str]:
-    """The names of files in the attributes of elements."""
+    """Return the names of files in the attributes of elements."""
     return [value for element in elements for key, value in element.attrib.items() if key.startswith("file")]
 
 
 @functools.lru_cache(maxsize=32)
 def _modelname(text: str) -> str:
-    """The name that a model's text gives it, or "model"."""
+    """Return the name that a model's text gives it, or "model"."""
     root = next(iter(_elements(text)), None)
     return (root is not None and root.get("model")) or "model"

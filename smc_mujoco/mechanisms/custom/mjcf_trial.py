@@ -30,7 +30,7 @@ def limit(memory: int) -> None:
 
 
 class Trial:
-    """MuJoCo in this process, and the file that hears how far it comes."""
+    """MuJoCo in this process, and the file that is told how far it gets."""
 
     def __init__(self, order: dict[str, Any], told: TextIO):
         self.told = told
@@ -46,16 +46,16 @@ class Trial:
             self.library.mj_loadPluginLibrary(plugin.encode())
 
     def say(self, line: str) -> None:
-        """Tell a line."""
+        """Write a line to the report file."""
         print(line, file=self.told, flush=True)
 
     def fail(self, words: bytes | None) -> None:
-        """Tell what is wrong, and end."""
+        """Report what is wrong, and end."""
         self.say("error " + " ".join((words or b"").decode(errors="replace").split()))
         os._exit(0)
 
     def warned(self, words: bytes) -> None:
-        """End where MuJoCo warns that the file holds a NaN; its other warnings are of runs."""
+        """End where MuJoCo warns that the file holds a NaN; its other warnings concern runs."""
         if b"NaN" in words and b"XML" in words:
             self.fail(b"it holds a NaN")
 
@@ -88,7 +88,7 @@ class Trial:
 
 
 def main(place: str) -> None:
-    """Do what a JSON file asks: library, plugins, the model's path or its text and assets, memory, the file to tell."""
+    """Try the model that a JSON file describes: libraries, plugins, path or text with assets, memory, report file."""
     order = json.loads(Path(place).read_text())
     limit(order["memory"])
     with Path(order["told"]).open("w") as told:

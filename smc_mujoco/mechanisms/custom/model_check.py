@@ -30,7 +30,7 @@ KINDS = {
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for numbers that are none or enormous, and for names that plants use themselves."""
+    """Raise ScenarioError for NaN or enormous numbers, and for names that plants use themselves."""
     check_numbers(label, model)
     for name in [text.decode() for text in model.names.split(b"\0")]:
         begins = next((start for start in OURS if name.startswith(start)), None)
@@ -60,7 +60,7 @@ def check_numbers(label: str, model: mujoco.MjModel) -> None:
 
 
 def _where(model: mujoco.MjModel, field: str, i: int) -> str:
-    """At which body, joint, ... a field has its value of that number."""
+    """Return the body, joint, ... to which a number in a field belongs."""
     owner = field.partition("_")[0]
     if owner == "dof":
         owner, i = "jnt", int(model.dof_jntid[i])

@@ -18,14 +18,14 @@ CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
 class Motor(NamedTuple):
-    """The motor of a channel: the bound on its force, N m or N, and the actuators whose place it takes."""
+    """The motor of a channel: the bound on its force, N m or N, and the actuators that it replaces."""
 
     limit: float
     replaced: tuple[int, ...]
 
 
 def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, ideal: bool) -> Motor:
-    """The motor that drives a joint.
+    """Return the motor that drives a joint.
 
     Raises:
       ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
@@ -58,7 +58,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, 
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
-    """What an actuator is, if it is no motor."""
+    """Return what an actuator is, if it is not a motor."""
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
         return "is a servo, a damper or a muscle"
     if model.actuator_dyntype[i] != STILL or model.actuator_delay[i]:
@@ -73,7 +73,7 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
 
 
 def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
-    """The force that all ranges allow both ways, N m or N: that of the weaker way, so that |u| has one bound."""
+    """Return the force that all ranges allow in both directions, N m or N: |u| has one bound."""
     low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
     if not low < 0.0 < high:
         raise ScenarioError(f"{who} {low:g} to {high:g}, and a law pushes both ways: {cure}")
@@ -81,7 +81,7 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
 
 
 def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
-    """The least and the largest force of an actuator at its joint."""
+    """Return the least and the largest force of an actuator at its joint."""
     gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
     low, high = -math.inf, math.inf
     clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
@@ -95,7 +95,7 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
 
 
 def put(spec: mujoco.MjSpec, motors: Sequence[tuple[str, Motor]]) -> None:
-    """Put the channels' motors in, in this order, and keep the model's other actuators as parts without commands."""
+    """Add the channels' motors, in this order, and keep the model's other actuators as passive parts."""
     replaced = {i for _, motor in motors for i in motor.replaced}
     for i, actuator in enumerate(list(spec.actuators)):
         if i in replaced:

@@ -38,7 +38,7 @@ _lock = threading.Lock()
 
 
 class Places(NamedTuple):
-    """Where the channels lie: addresses into qpos, qvel and ctrl, (n,) each; ctrl of those driven, (driven,)."""
+    """The addresses of the channels in qpos, qvel and ctrl, (n,) each; ctrl of the driven ones, (driven,)."""
 
     qpos: np.ndarray
     qvel: np.ndarray
@@ -47,14 +47,14 @@ class Places(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Believed(Coupled):
-    """The nominal model of what `build` builds, with `fields` set by the parameters."""
+    """The nominal model of a user's plant: f and g computed by MuJoCo from the model without mismatch."""
 
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
     why_not: str = ""  # why there is none
 
     def __call__(self, x, v, i, p, /, u=None):
-        """f and g of channel i; NaN where there is no nominal model."""
+        """Return f and g of channel i; NaN where there is no nominal model."""
         if self.why_not:
             return np.nan, np.nan
         model, places, data, _ = prepared(self, frozen(vars(p)))
@@ -91,7 +91,7 @@ class Believed(Coupled):
 
 @dataclasses.dataclass(eq=False)
 class Lent:
-    """An mjData for one simulation, which the next takes over: freed and made anew, they leave holes in memory."""
+    """An MjData borrowed from a pool. Pooling avoids memory fragmentation."""
 
     data: mujoco.MjData
     spare: list[mujoco.MjData]
@@ -101,7 +101,7 @@ class Lent:
 
 
 def lend(model: mujoco.MjModel, spare: list[mujoco.MjData]) -> Lent:
-    """A spare mjData, or else another: whoever had it wrote only what each simulation writes before it reads."""
+    """Return an MjData from the pool, or a new one. Each simulation writes whatever it reads before it reads it."""
     try:
         data = spare.pop()
     except IndexError:
@@ -113,7 +113,7 @@ def lend(model: mujoco.MjModel, spare: list[mujoco.MjData]) -> Lent:
 def prepared(
     nominal: Believed, parameters: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
-    """The model with nominal parameters, where its channels lie, an mjData for calls from Python, and spare ones."""
+    """Return the model with nominal parameters, its channels' addresses, an MjData for Python, and the pool."""
     model = ready(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
@@ -128,7 +128,7 @@ def prepared(
 
 @functools.cache
 def functions() -> tuple:
-    """MuJoCo's C functions that the nominal model calls, in the order of _FUNCTIONS."""
+    """Return MuJoCo's C functions that the nominal model calls, in the order of _FUNCTIONS."""
     found = [getattr(libmujoco.library(), name) for name in _FUNCTIONS]
     for name, function in zip(_FUNCTIONS, found, strict=True):
         function.restype = None
@@ -138,7 +138,7 @@ def functions() -> tuple:
 
 @functools.cache
 def unknown() -> Function:
-    """A nominal model that knows nothing: NaN."""
+    """Return NaN for f and g: there is no nominal model."""
 
     def native(y, p, m, out):
         output = carray(pointer(out), (2,))

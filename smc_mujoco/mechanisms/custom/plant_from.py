@@ -53,7 +53,7 @@ class Drive(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class OwnModel:
-    """What builds the mechanism: n is not looked at, as the channels say it."""
+    """The builder of a user's mechanism. It ignores n, which the channels decide."""
 
     source: Source
     keyframe: str | None
@@ -85,12 +85,12 @@ class OwnModel:
 
     @property
     def argument(self) -> str:
-        """The model as the command line is given it, such as arm.xml:shoulder+elbow."""
+        """The model as written on the command line, such as arm.xml:shoulder+elbow."""
         path = os.path.relpath(self.source.path) if self.source.path else "FILE.xml"
         return f"{path}:{'+'.join(joint for joint, _ in self.channels)}"
 
     def about(self) -> dict:
-        """All that plant_from needs to make it again, as plain data."""
+        """Return all that plant_from needs to make it again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
         data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
         return data if self.source.path else data | _inside(self.source)
@@ -98,14 +98,14 @@ class OwnModel:
 
 @functools.lru_cache(maxsize=32)
 def _inside(source: Source) -> dict:
-    """A model's text and the files that it names, as JSON holds them."""
+    """Return a model's text and the files that it names, as JSON holds them."""
     assets = {name: base64.b64encode(content).decode() for name, content in source.assets}
     return {"text": source.text, "assets": assets}
 
 
 @dataclasses.dataclass(frozen=True)
 class OwnFields:
-    """The model fields that m and grav set: all masses and inertias, and gravity, in proportion to the model's."""
+    """The fields that m and grav set: all masses and inertias, and gravity, in proportion to the model's own."""
 
     mass: float
     gravity: float
@@ -127,7 +127,7 @@ def plant_from(
     assets: Mapping[str, bytes] | None = None,
     timeout: float = 20.0,
 ) -> Plant:
-    """An MJCF model as a plant.
+    """Make a plant of an MJCF model.
 
     Args:
       path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
@@ -188,7 +188,7 @@ def plant_from(
 
 
 def named(name: str | None, label: str) -> str:
-    """The plant's name; none of the library's, as laws, gains and conditions go by them."""
+    """Return the plant's name, which must differ from the library's, because laws and gains refer to plants by name."""
     if name is None:
         name = label.removesuffix(".xml")
         name = name if name not in catalogue() else label
@@ -200,7 +200,7 @@ def named(name: str | None, label: str) -> str:
 
 
 def smooth(model: mujoco.MjModel) -> bool:
-    """Whether the model can have no constraint: no limits, no dry friction, no contacts, nothing held together."""
+    """Return whether the model can have no constraint: no limits, dry friction, contacts or equalities."""
     flags = mujoco.mjtDisableBit
     if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
         return True
@@ -216,7 +216,7 @@ def smooth(model: mujoco.MjModel) -> bool:
 
 
 def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...]) -> str:
-    """Why there is no nominal model of the channels, or ""."""
+    """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
         return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT
     if model.nplugin or model.nflex:
@@ -233,7 +233,7 @@ def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...])
 
 
 def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...]) -> str:
-    """What there is to say of joints, by number, that move with the channels and are none."""
+    """Return what to say about joints, by number, that move with the channels but are not channels."""
     for number in loose:
         kind = mujoco.mjtJoint(model.jnt_type[number])
         if kind not in SIMPLE:
@@ -256,7 +256,7 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...
 
 
 def restored(data: Mapping, name: str) -> Plant:
-    """The plant that `OwnModel.about` tells of.
+    """Return the plant that `OwnModel.about` describes.
 
     Raises:
       ScenarioError: the file is gone, or another than it was.

@@ -24,7 +24,7 @@ SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, the block in its b
 
 
 def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
-    """End stops that let the cart's middle reach -x and x."""
+    """Add end stops that let the cart's middle reach -x and x."""
     machine = spec.body("machine")
     for side, sign in (("left", -1), ("right", 1)):
         buffers(spec, side, sign)
@@ -41,7 +41,7 @@ def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
 
 
 def peg(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
-    """A post on the front rail that lets a cart coming from the right get to x."""
+    """Add a post on the front rail that stops a cart coming from the right at x."""
     machine, place, y = spec.body("machine"), x - REACH - PIN, SIDES["front"]
     buffers(spec, "left", -1)
     box(machine, "peg_clamp", (place - 0.045, y - 0.042, 0.224), (place + 0.020, y + 0.042, 0.300), "graphite")
@@ -50,7 +50,7 @@ def peg(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
 
 
 def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
-    """Two rubber buffers at one end of the cart."""
+    """Add two rubber buffers at one end of the cart."""
     cart = spec.body("cart")
     for rail, y in SIDES.items():
         cart.add_geom(
@@ -63,7 +63,7 @@ def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
 
 
 def bed(spec: mujoco.MjSpec, length: float, friction: float = FRICTION) -> None:
-    """A rough bed of half a length, m, in place of the rails, on which the block lies."""
+    """Replace the rails by a rough bed of half that length, m, on which the block lies."""
     for geom in [g for g in spec.geoms if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")]:
         spec.delete(geom)
     machine, cart = spec.body("machine"), spec.body("cart")

@@ -7,7 +7,7 @@ STEPS = 12  # a turn
 
 
 def draw(spec, name, start, end, *, radius, turns, wire, material):
-    """Add the skin `name` to spec.
+    """Add a coil spring to spec, as the skin `name`.
 
     Args:
       start, end: (body, where the body is, where the wire ends), metres in the world with every joint at 0.
@@ -27,7 +27,7 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
 
 
 def tube(spec, name, start, end, *, span, radius, material):
-    """Add the skin `name` to spec: a round tube over the part `span`, (from, to) in [0, 1], of the way to the end.
+    """Add a round tube to spec, as the skin `name`, over the part `span`, (from, to) in [0, 1], of the way to the end.
 
     The other arguments as in `draw`. The tube stretches with the way.
     """
@@ -41,13 +41,13 @@ def tube(spec, name, start, end, *, span, radius, material):
 
 
 def _line(start, end):
-    """The way between two places in the world, its direction, and up."""
+    """Return the way between two places in the world, its direction, and up."""
     first, last = np.array(start[2], float), np.array(end[2], float)
     return first, last, (last - first) / np.linalg.norm(last - first), np.array([0.0, 0.0, 1.0])
 
 
 def _skin(spec, name, start, end, material, vertices, s):
-    """The skin of rings of vertices (rings, SIDES, 3) that follow the two bodies by 1 - s and s, (rings,)."""
+    """Add a skin of rings of vertices (rings, SIDES, 3), which follow the two bodies by 1 - s and s, (rings,)."""
     ring = np.arange(len(s) - 1)[:, None] * SIDES
     a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)

@@ -18,7 +18,7 @@ DRAWN = 50  # pendulums up to which springs are drawn: each has a thousand verti
 
 
 def compose(single, n, x0):
-    """The MjSpec of n pendulums taken from the model file `single`, at x0 (recycled) in keyframe `home`."""
+    """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (recycled) in keyframe `home`."""
     unit = mujoco.MjSpec.from_file(str(model_path(single)))
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     spec.modelname = f"{n}_{unit.modelname}s"
@@ -45,7 +45,7 @@ def compose(single, n, x0):
 
 
 def strip(unit, pendulum):
-    """Leave only the pendulum in `unit`; geom name -> the material it had, for the chain's own theme to give.
+    """Leave only the pendulum in `unit`, and return geom name -> the material it had.
 
     An attached body brings its file's assets and keyframes: a thousand copies would carry a thousand floors.
     """
@@ -59,7 +59,7 @@ def strip(unit, pendulum):
 
 
 def stand(spec, n):
-    """The body `machine`: two end posts and the shaft between them."""
+    """Add the body `machine`: two end posts and the shaft between them."""
     length = (n - 1) * PITCH
     shown = min(length, 8 * PITCH)  # the camera frames nine pendulums at most
     spec.stat.center = (0.0, shown / 2, HEIGHT)
@@ -107,14 +107,14 @@ def draw_spring(spec, i):
 
 
 def fields(model, p, side):
-    """The fields that p sets; side: +1 where the bobs stand above the shaft, -1 where they hang."""
+    """Yield the fields that p sets; side: +1 where the bobs stand above the shaft, -1 where they hang."""
     springs = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
     yield from pendulum_fields(model, p, side)
     yield Field("tendon_stiffness", springs, p.kc)
 
 
 def pendulum_fields(model, p, side):
-    """The fields of the pendulums alone, without the springs between them."""
+    """Yield the fields of the pendulums alone, without the springs between them."""
     n = size(model)
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
     rods = [model.geom(f"p{i}/rod").id for i in range(n)]
@@ -129,5 +129,5 @@ def pendulum_fields(model, p, side):
 
 
 def size(model):
-    """How many pendulums a chain's model has; what drives them may have joints of its own."""
+    """Return how many pendulums a chain's model has; actuators may have added joints of their own."""
     return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))

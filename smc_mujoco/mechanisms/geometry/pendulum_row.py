@@ -40,7 +40,7 @@ def bobs(spec):
 
 
 def springs(spec):
-    """Real springs between the rods in place of the torsion springs."""
+    """Replace the torsion springs by real springs between the rods."""
     n, side = len(spec.keys[0].qpos), _side(spec)
     for item in [*spec.tendons, *spec.skins]:
         spec.delete(item)
@@ -56,7 +56,7 @@ def springs(spec):
 
 
 def spring_fields(model, p, side):
-    """The fields that p sets where the springs are real ones."""
+    """Yield the fields that p sets where the springs are real ones."""
     couplings = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
     pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
     yield from pendulum_fields(model, p, side)
@@ -65,7 +65,7 @@ def spring_fields(model, p, side):
 
 
 def _side(spec):
-    """+1 where the bobs stand above their pivots, -1 where they hang."""
+    """Return +1 where the bobs stand above their pivots, -1 where they hang."""
     return 1.0 if spec.geom("p0/bob").pos[2] > 0.0 else -1.0
 
 
@@ -89,7 +89,7 @@ def _draw(spec, i, near, far, up):
 
 
 def _stand(spec, n, width):
-    """A beam behind the row between two posts, and a camera that looks at the row from the front."""
+    """Add a beam behind the row between two posts, and a camera that looks at the row from the front."""
     machine, end = spec.body("machine"), width / 2 + 0.20
     box(machine, "beam", (-end, BEAM[0], HEIGHT - 0.030), (end, BEAM[1], HEIGHT + 0.030), "graphite")
     for i in range(n):

@@ -70,7 +70,7 @@ class Backlash(Actuator):
 
 
 def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData) -> None:
-    """A body on the joint's own axis, beside the joint's body, with a pointer that tells where in the play it is."""
+    """Add a rotor on the joint's own axis, with a pointer that shows where in the play it is."""
     i = rigid.joint(joint.name).id
     body = rigid.jnt_bodyid[i]
     parent = rigid.body_parentid[body]

@@ -76,7 +76,7 @@ class Contact(Part):
                 object.__setattr__(self, name, number(f"Contact's {name}", value, least=0.0, most=most))
 
     def check(self, plant: Plant) -> None:
-        """Whether the plant offers it, and takes the numbers that were given.
+        """Raise ScenarioError where the plant does not offer it, or takes no such numbers.
 
         Raises:
           ScenarioError: an unknown kind, or a number that nothing of this kind takes.
@@ -111,7 +111,7 @@ def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
 
 @functools.cache
 def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco.MjSpec], None]) -> set[str]:
-    """Which numbers the pairs of a contact take."""
+    """Return which numbers the pairs of a contact take."""
     spec = build(n)
     edit(spec)
     sorts = {pair.name.partition(":")[0] + ":" for pair in spec.pairs}
@@ -119,7 +119,7 @@ def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco
 
 
 def damping_ratio(restitution: float) -> float:
-    """zeta of the spring and dashpot that give a restitution, 0.01 .. 1."""
+    """Return zeta of the spring and dashpot that give a restitution, 0.01 .. 1."""
     aim = -0.5 * math.log(max(restitution, DEAD))  # of zeta a / sin a, which grows with zeta: 0 at 0, 1 at 1
     low, high = 0.0, 1.0 + aim
     high *= high
@@ -130,7 +130,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _loss(zeta: float) -> float:
-    """-ln(e) / 2 of a damping ratio."""
+    """Return -ln(e) / 2 of a damping ratio."""
     if abs(zeta - 1.0) < 1e-6:
         return 1.0 + 2.0 / 3.0 * (zeta - 1.0)
     if zeta < 1.0:
@@ -139,7 +139,7 @@ def _loss(zeta: float) -> float:
 
 
 def solref(restitution: float, impedance: float) -> tuple[float, float]:
-    """MuJoCo's time constant in s, and damping ratio, of a restitution between bodies that move along a line.
+    """Return MuJoCo's time constant in s, and damping ratio, of a restitution between bodies that move along a line.
 
     In a = a0 + A f, A the inverse mass that the blow meets, MuJoCo makes f = (aref - a0) / (A + R), R = A' (1 - d) / d
     and A' its own guess of A, the mean over three directions: A / 3. Spring and dashpot act by A / (d A + (1 - d) A').
@@ -189,13 +189,13 @@ def _pair(
 
 
 def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
-    """A box that is felt and not seen: what lies behind a face, deep enough that no blow goes through."""
+    """Add an invisible box that can be hit: the depth behind a face, so thick that no blow goes through."""
     block = box(body, name, low, high, "ink")
     block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
 
 
 def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:
-    """A box between two corners, m in the body's frame."""
+    """Add a box between two corners, m in the body's frame."""
     a, b = np.array(low, float), np.array(high, float)
     return body.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=(a + b) / 2, size=(b - a) / 2, material=material
@@ -210,6 +210,6 @@ def bar(
     material: str,
     round_ends: bool = False,
 ) -> mujoco.MjsGeom:
-    """A round bar between two points, m in the body's frame."""
+    """Add a round bar between two points, m in the body's frame."""
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE if round_ends else mujoco.mjtGeom.mjGEOM_CYLINDER
     return body.add_geom(name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material)

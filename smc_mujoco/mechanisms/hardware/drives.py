@@ -71,7 +71,7 @@ class Lag(Drive):
 
     @property
     def delay(self) -> float:
-        """tau."""
+        """The time constant tau, s."""
         return self.tau
 
 

@@ -58,7 +58,7 @@ class Encoder(Part):
         return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
 
     def readings(self, step: float) -> int:
-        """How many readings MuJoCo must remember, with one a physics step of `step` s; 0 where none is late."""
+        """Return how many readings MuJoCo must keep, with one a physics step of `step` s; 0 where no sensor is late."""
         if not self.delay and not self.period:
             return 0
         return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
@@ -79,7 +79,7 @@ class Encoder(Part):
                 )
 
     def fields(self, model):
-        """Delay and period of every channel's two sensors."""
+        """Yield delay and period of every channel's two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
             yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
@@ -87,19 +87,19 @@ class Encoder(Part):
 
 
 def buffer(spec: mujoco.MjSpec, readings: int) -> None:
-    """Give every position and velocity sensor a history of so many readings."""
+    """Give every position and velocity sensor a history of that many readings."""
     for sensor in spec.sensors:
         sensor.nsample = readings
 
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The channels' position and velocity sensors, (2n,)."""
+    """Return the numbers of the channels' position and velocity sensors, (2n,)."""
     kinds = np.isin(model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL])
     return np.flatnonzero(kinds & np.isin(model.sensor_objid, joint_ids(model)))
 
 
 def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Fill the histories with what the sensors read now, so that a late sensor starts at the initial state."""
+    """Fill the histories with the present readings, so that a late sensor starts at the initial state."""
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
         gap = float(model.sensor_interval[sensor, 0]) or model.opt.timestep

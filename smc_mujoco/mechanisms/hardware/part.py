@@ -29,10 +29,10 @@ class Part:
     stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        """Add to a mechanism, once for every channel, what the part is made of."""
+        """Add what the part is made of to a mechanism, once for every channel."""
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        """The fields of the edited, compiled model that the part's numbers set."""
+        """Yield the fields of the edited, compiled model that the part's numbers set."""
         del model
         yield from ()
 
@@ -64,40 +64,40 @@ class Actuator(Part):
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
-    """The actuators that take commands, one a channel that is driven."""
+    """Return the actuators that take commands, one for each driven channel."""
     return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
 
 
 def driven(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
-    """The joints of the channels that have an actuator, in the order of `drives`."""
+    """Return the joints of the driven channels, in the order of `drives`."""
     return [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
 
 
 def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
-    """The channels' joints: the driven ones, and after them those that are only measured."""
+    """Return the channels' joints: first the driven ones, then those that are only measured."""
     names = [joint.name for joint in driven(spec)]
     measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
 
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The actuators that take commands."""
+    """Return the numbers of the actuators that take commands."""
     return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
 
 
 def driven_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The joints of the channels that have an actuator."""
+    """Return the numbers of the driven channels' joints."""
     names = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
     return np.array([model.joint(name.removeprefix(ROTOR)).id for name in names], int)
 
 
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The channels' joints, (n,): the driven ones, and after them those that are only measured."""
+    """Return the numbers of the channels' joints, (n,): first the driven ones, then those that are only measured."""
     found = driven_ids(model)
     measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return np.array([*found, *(joint for joint in measured if joint not in found)], int)
 
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
-    """The channels' degrees of freedom, (n,)."""
+    """Return the numbers of the channels' degrees of freedom, (n,)."""
     return model.jnt_dofadr[joint_ids(model)]

@@ -33,7 +33,7 @@ class Tandem(NamedTuple):
 
 
 def tandem(actuator: tuple[Actuator, ...], step: float) -> Tandem | None:
-    """What two drives in series do in a physics step of `step` s; None without a second drive."""
+    """Return what two drives in series do in a physics step of `step` s; None without a second drive."""
     drives = [part for part in actuator if part.drives]
     if len(drives) < 2:
         return None

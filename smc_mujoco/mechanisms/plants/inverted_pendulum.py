@@ -44,7 +44,7 @@ def nominal(x, v, i, p):
 
 
 def on_floor(spec):
-    """The machine lower, so that the bob reaches the floor."""
+    """Lower the machine so that the bob reaches the floor."""
     machine, down = spec.body("machine"), AXLE + L * cos(FALLEN) - BOB
     machine.pos = (0.0, 0.0, -down)
     for name in ("foot", "step"):
@@ -93,7 +93,7 @@ def peg(spec):
 
 
 def turned(angle):
-    """The quaternion that turns up towards x by an angle, rad."""
+    """Return the quaternion that turns up towards x by an angle, rad."""
     return cos(angle / 2), 0.0, sin(angle / 2), 0.0
 
 

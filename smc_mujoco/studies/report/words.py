@@ -8,7 +8,7 @@ import html
 import math
 import re
 
-from smc_mujoco.analysis.margin_kinds import SPECS
+from smc_mujoco.analysis.margin_kinds import MARGIN_KINDS
 from smc_mujoco.common.text import number as written
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.law import laws
@@ -61,7 +61,7 @@ def condition(name: str) -> str:
 
 def kind(name: str) -> str:
     """A kind of margin as people write it."""
-    return SPECS[name].label if name in SPECS else name.replace("_", " ")
+    return MARGIN_KINDS[name].label if name in MARGIN_KINDS else name.replace("_", " ")
 
 
 def metric(name: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.margin_kinds import BEARS, DELAYS
+from smc_mujoco.analysis.margin_kinds import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.control.law import law_function
 from smc_mujoco.metrics.catalogue import metrics
@@ -404,7 +404,9 @@ def test_a_jump_is_survived_if_x_stays_within_its_start(mild, hard, expected):
 def bearing(most: dict[str, float]) -> Told:
     """Law -> the largest delay borne, s."""
     return lambda s: {
-        "ultimate_bound": (0.9 if s.input_delay <= most[s.law.name] + 1e-9 else 1.1) * BEARS * max(map(abs, s.x0))
+        "ultimate_bound": (0.9 if s.input_delay <= most[s.law.name] + 1e-9 else 1.1)
+        * TOLERATED_ERROR
+        * max(map(abs, s.x0))
     }
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smc_mujoco.analysis.margin_kinds import BEARS, DELAYS
+from smc_mujoco.analysis.margin_kinds import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue, command, law_function, sliding
 from smc_mujoco.metrics import conventions
@@ -187,7 +187,7 @@ def _peak_after_jump(trace: Trace) -> float:
 )
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
     """Largest delay of the paper's law against each rival's; beside it linear theory's, sampled and held."""
-    longest, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (BEARS, 1.0))
+    longest, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (TOLERATED_ERROR, 1.0))
     found: list[Check | Beside] = []
     for plant in PLANTS:
         for law in RIVALS:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory
-from smc_mujoco.analysis.margin_kinds import BEARS, DELAYS
+from smc_mujoco.analysis.margin_kinds import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.trace import Trace
@@ -33,7 +33,9 @@ SMALL, LONG, PERIOD = 1e-3, 40.0, 5e-3  # of x0; s; s, of control and physics: t
 Pair = tuple[str, str]
 
 
-def largest_delays(runs: Runs, plants: Sequence[str], laws: Sequence[str], within: float = BEARS) -> dict[Pair, float]:
+def largest_delays(
+    runs: Runs, plants: Sequence[str], laws: Sequence[str], within: float = TOLERATED_ERROR
+) -> dict[Pair, float]:
     """Return (plant, law) -> the largest delay tolerated, s: 0 where none is, the last of DELAYS where all are.
 
     Args:
