@@ -41,7 +41,7 @@ class Kind:
       theory: the largest level by linear theory, or None where there is none; it may refuse the plant.
     """
 
-    label: str
+    label: str = ""
     unit: str
     levels: tuple[float, ...]
     put: Callable[[Scenario, float], Scenario]

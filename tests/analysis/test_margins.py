@@ -11,7 +11,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import margin_kinds
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
-from smc_mujoco.cli.commands.margins import QUICK, table
+from smc_mujoco.cli import tables
+from smc_mujoco.cli.commands.margins import QUICK
 from smc_mujoco.cli.commands.margins import margins as command
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.studies.paper import scenarios
@@ -300,7 +301,7 @@ def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_borne():
 
     console = Console(width=100)
     with console.capture() as captured:
-        console.print(table("delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]))
+        console.print(tables.margins("delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]))
     first, second = captured.get().splitlines()[-3:-1]
     assert "none" in first
     assert "any" in first

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
-from smc_mujoco.analysis.margin_kinds import BEARS
+from smc_mujoco.analysis.margin_kinds import TOLERATED_ERROR
 from smc_mujoco.common.files import from_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component
@@ -151,7 +151,7 @@ def bound(runs: Runs, plant: str) -> float:
 def comes_to_rest(runs: Runs, grid: Mapping[str, Scenario]) -> list[Check]:
     """Check of every named scenario that its ultimate bound is at most 5 % of |x0|."""
     return [
-        check(f"{name}: ultimate bound / |x0|", scores["ultimate_bound"] / scale(scenario), "<=", BEARS)
+        check(f"{name}: ultimate bound / |x0|", scores["ultimate_bound"] / scale(scenario), "<=", TOLERATED_ERROR)
         for (name, scenario), scores in zip(grid.items(), runs.scores(grid.values()), strict=True)
     ]
 
