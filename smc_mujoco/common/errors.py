@@ -155,8 +155,12 @@ def name(what: str, value: object) -> str:
 
 
 def users_frame() -> int:
-    """The stacklevel of a warning for which it points to the user's line: the nearest that is not in this package."""
+    """The stacklevel of a warning for which it points to the user's line: the nearest that is not in this package.
+
+    Nor in `dataclasses`, whose `replace` makes scenarios.
+    """
     frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "smc_mujoco":
+    inner = "smc_mujoco", "dataclasses"
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner:
         frame, level = frame.f_back, level + 1
     return level

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import warnings
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, user
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import fits
 from smc_mujoco.mechanisms.custom.channels import RECORDED, within
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import coerce
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
 
 MOST_STEPS = 100_000_000  # per run: minutes of computing
 MOST_TURNS = 3.0 * math.pi  # rad: chosen, as swing-ups overshoot within a turn and a half, and 10 may be degrees
+LEAST_PERCENT = 10.0  # of a mismatch: chosen, whole fives from here on may be percent
+LEAST_MILLISECONDS = 1.0  # s: chosen, as no plant here bears such a delay
+MOST_RATE = 100.0  # rad/s: chosen, 16 turns a second
+MOST_GAP = 0.5  # rad: chosen, 29 degrees of play
 MOST_DEGREES = 720.0  # nobody means degrees beyond
 MOST_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 
@@ -35,6 +41,7 @@ def check(scenario: "Scenario") -> None:
     check_mechanism(scenario)
     if not RECORDED.get():
         warn_of_degrees(scenario)
+        warn_of_units(scenario)
         warn_of_weak_motors(scenario)
 
 
@@ -133,6 +140,37 @@ def warn_of_degrees(s: "Scenario") -> None:
                     users_frame(),
                 )
                 return
+
+
+def warn_of_units(s: "Scenario") -> None:
+    """Warn of numbers that are surely meant in another unit: percent, ms or degrees."""
+    for told, cure in _other_units(s):
+        warnings.warn(f"{told}: {cure}", ScenarioWarning, users_frame())
+        return
+
+
+def _other_units(s: "Scenario") -> Iterator[tuple[str, str]]:
+    """Yield what is hardly meant as it stands, with what to give instead."""
+    for name, factor in s.mismatch.items():
+        if LEAST_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
+            yield (
+                f"mismatch makes {name} {factor:g} times the nominal one",
+                f"if it is {factor:g} % more, give {1 + factor / 100:g}",
+            )
+    if s.input_delay >= LEAST_MILLISECONDS:
+        yield f"input_delay is {s.input_delay:g} s", f"if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
+    for signal in (s.reference, *s.disturbance):
+        phase = signal.parameters().get("phase", 0.0)
+        if MOST_TURNS < abs(phase) <= MOST_DEGREES:
+            yield f"a phase is {phase:g} rad", f"if it is {phase:g} degrees, give math.radians({phase:g})"
+    turning = [v for unit, v in zip(s.plant.units, s.v0, strict=True) if unit == "rad"]
+    for v in turning:
+        if MOST_RATE < abs(v) <= 10 * MOST_DEGREES:
+            yield f"v0 is {v:g} rad/s", f"if it is {v:g} degrees per second, give math.radians({v:g})"
+    for part in s.actuator:
+        if isinstance(part, Backlash) and part.gap > MOST_GAP and "rad" in s.plant.units[: s.plant.driven]:
+            told = f"Backlash has a gap of {part.gap:g} rad"
+            yield told, f"if it is {part.gap:g} degrees, give math.radians({part.gap:g})"
 
 
 def warn_of_weak_motors(s: "Scenario") -> None:

@@ -12,12 +12,13 @@ pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
 import dataclasses
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, taken
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
 from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
@@ -78,6 +79,16 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
 
     Raises:
       ScenarioError: a number out of its range.
+
+    Warns:
+      ScenarioWarning: a spread of more than 1, which may be percent.
     """
+    if number("spread", spread, least=0.0) > 1.0:
+        warnings.warn(
+            f"spread is {spread:g}, which moves starts by {spread:g} times x0: if it is {spread:g} %, give "
+            f"{spread / 100:g}",
+            ScenarioWarning,
+            users_frame(),
+        )
     items = taken("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     return Starts(x0=None if x0 is None else tuple(number("x0", item) for item in items), spread=spread, by=by)

@@ -72,7 +72,8 @@ class Scenario:
 
     Warns:
       ScenarioWarning: a hinge's start or reference of more than one and a half turns, up to 720 rad, which may be meant
-        in degrees; a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
+        in degrees; a phase, a v0 or a Backlash that may be in degrees too; a mismatch that may be in percent, a delay
+        in ms; a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
     """
 
     plant: Plant

@@ -19,6 +19,28 @@ DEGREES = [
 ]
 
 
+UNITS = [
+    ({"mismatch": {"mass": 30}}, "mismatch makes mass 30 times the nominal one: if it is 30 % more, give 1.3"),
+    ({"input_delay": 5.0}, "input_delay is 5 s: if it is 5 ms, give 0.005"),
+    ({"disturbance": smc.Sine(0.2, 5.0, phase=90.0)}, r"a phase is 90 rad: .* math.radians\(90\)"),
+    ({"v0": 360.0}, r"v0 is 360 rad/s: .* give math.radians\(360\)"),
+    ({"actuator": smc.Backlash(2.0)}, r"Backlash has a gap of 2 rad: .* math.radians\(2\)"),
+]
+
+
+@pytest.mark.parametrize(("fields", "words"), UNITS)
+def test_numbers_in_another_unit_are_warned_of(fields, words):
+    plain = smc.Scenario(plant="inverted_pendulum", law="none", duration=6.0)
+    with pytest.warns(smc.ScenarioWarning, match=words) as caught:
+        dataclasses.replace(plain, **fields)
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_spread_in_percent_is_warned_of():
+    with pytest.warns(smc.ScenarioWarning, match=r"spread is 20, .* if it is 20 %, give 0.2"):
+        smc.starts(spread=20)
+
+
 @pytest.mark.parametrize("fields", DEGREES)
 def test_angles_of_several_turns_may_be_degrees(fields):
     with pytest.warns(
