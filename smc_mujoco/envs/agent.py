@@ -3,7 +3,8 @@
     act = smc.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-A law sees what it would see in `smc.run`, and its episode is the trace of that run: the reference loop's own code asks it.
+A law sees what it would see in `smc.run`, and its episode is the trace of that run: the code of the reference loop asks
+it.
 """
 
 import dataclasses
