@@ -1,13 +1,73 @@
-"""What the tests share: this package's plugin, also where it is not installed, and pytest's for testing plugins."""
+"""What the tests share: this package's plugin, also where it is not installed, and pytest's for testing plugins.
+
+    pytest --quick    # the first case of every test, in files whose tests take little
+
+Compiled code is kept in one folder, so that all workers, all child processes, and copies of the package that tests
+install elsewhere compile a function once.
+"""
 
 import importlib
+import os
+from pathlib import Path
 
 import pytest
 
 pytest_plugins = ["pytester"]
+
+ROOT = Path(__file__).parents[1]
+os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba"))
+
+# What --quick takes: files whose tests need less than about 0.1 s of processor time each, counting first cases.
+QUICK = {
+    "analysis/test_linear_theory.py",
+    "analysis/test_ranking.py",
+    "analysis/tuning/test_search_space.py",
+    "cli/test_lawbook.py",
+    "control/test_estimator.py",
+    "control/test_gain_sets.py",
+    "control/test_policy.py",
+    "control/test_surface.py",
+    "draw/test_style.py",
+    "draw/test_viewer.py",
+    "mechanisms/hardware/test_contact.py",
+    "mechanisms/hardware/test_drives.py",
+    "mechanisms/hardware/test_encoder.py",
+    "mechanisms/hardware/test_friction.py",
+    "mechanisms/hardware/test_tandem.py",
+    "mechanisms/test_fidelity.py",
+    "mechanisms/test_models.py",
+    "metrics/test_catalogue.py",
+    "simulation/test_conditions.py",
+    "simulation/test_offsets.py",
+    "simulation/test_realistic.py",
+    "simulation/test_scenario.py",
+    "simulation/test_scenario_warnings.py",
+    "simulation/test_signals.py",
+    "studies/paper/test_general_laws.py",
+    "studies/test_run_key.py",
+    "test_architecture.py",
+    "test_readme.py",
+    "testing/test_step_responses.py",
+}
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Load the plugin, unless its entry point has: then, with its options, before they are read."""
     if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin("smc_mujoco.testing.plugin"):
         pluginmanager.register(importlib.import_module("smc_mujoco.testing.plugin"), "smc_mujoco")
+    parser.addoption("--quick", action="store_true", help="only the first case of each test, of files that take little")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out files that are not quick, where that is asked for."""
+    path = collection_path
+    left_out = path.suffix == ".py" and path.relative_to(ROOT / "tests").as_posix() not in QUICK
+    return True if config.getoption("quick") and left_out else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep the first case of each test, where that is asked for."""
+    if config.getoption("quick"):
+        first = set({item.nodeid.split("[")[0]: item for item in reversed(items)}.values())
+        config.hook.pytest_deselected(items=[item for item in items if item not in first])
+        items[:] = [item for item in items if item in first]

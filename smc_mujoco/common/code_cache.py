@@ -21,6 +21,7 @@ from typing import Any
 
 import llvmlite
 import numba
+from numba.core import config
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCPUCodegen, RuntimeLinker
 from numba.core.registry import cpu_target
@@ -43,8 +44,9 @@ class Cache:
           RuntimeError: there is no folder to write to.
           ScenarioError: the function reaches what cannot be told from other things.
         """
-        folder = CompileResultCacheImpl(body).locator.get_cache_path()
-        self.path = Path(folder) / f"{body.__name__}-{_key(body, signature)}{ENDING}"
+        given = config.CACHE_DIR and Path(config.CACHE_DIR) / "smc_mujoco"  # one folder for all copies of the package
+        folder = given or Path(CompileResultCacheImpl(body).locator.get_cache_path())
+        self.path = folder / f"{body.__name__}-{_key(body, signature)}{ENDING}"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what CFunc reads of a compile result, or None where no whole file is there."""
@@ -75,7 +77,8 @@ class Cache:
 def _key(body: Callable, signature: Any) -> str:
     """Return the hash of what the machine code of a function depends on."""
     codegen = cpu_target.target_context.codegen()
-    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    given = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
+    settings = sorted((given | {"NUMBA_CACHE_DIR": ""}).items())
     parts = sys.version, numba.__version__, llvmlite.__version__, codegen.magic_tuple(), settings, signature
     # decorators and intrinsics change the code, but not the function's fingerprint
     told = [*map(str, parts), fingerprint.package("studies"), fingerprint.of(body)]

@@ -37,7 +37,7 @@ print(*keys_of_shipped(reverse=True))
 def python(code: str, *arguments: object, folder: Path) -> subprocess.Popen:
     """A new Python process that finds this package, the tests here and the modules in a folder."""
     places = [str(Path(smc.__file__).parents[1]), str(Path(__file__).parent), str(folder)]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places), "NUMBA_CACHE_DIR": str(folder)}
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True)
 
@@ -134,6 +134,7 @@ def test_no_folder_to_write_is_done_without(monkeypatch):
     def nowhere(*arguments):
         raise RuntimeError("cannot cache function: no locator available")
 
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(code_cache, "CompileResultCacheImpl", nowhere)
     assert not taken(scaled(2.0))
 

@@ -637,14 +637,14 @@ def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     handler = mujoco.get_mju_user_warning()
     before = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, 0.2)
-    begin = time.perf_counter()
+    begin = time.process_time()
     try:
         with pytest.raises(KeyboardInterrupt):
             plainly(scenario(law, duration=10_000.0, integrator="Euler"))
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    assert time.perf_counter() - begin < 10.0  # on a loaded machine; the run itself would take a minute
+    assert time.process_time() - begin < 10.0  # s of processor time; the run itself would take a minute
     assert mujoco.get_mjcb_control() is None
     assert mujoco.get_mju_user_warning() is handler
     assert smc.run(scenario()).diverged_at is None
