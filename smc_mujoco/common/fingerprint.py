@@ -22,10 +22,10 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.types import Type
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
+from smc_mujoco.common.jit import AtAddress
 
 PACKAGE = Path(__file__).parents[1]
 BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
@@ -33,18 +33,6 @@ PRESENTATION = ("studies/report", "cli")  # folders that show results and do not
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
-
-
-class AtAddress:
-    """A C function of the callback's type that is compiled already.
-
-    Attributes:
-      address: of the function, good for as long as this object lives.
-      digest: a hash of its machine code.
-    """
-
-    address: int
-    digest: str
 
 
 @functools.cache
@@ -137,8 +125,6 @@ class _CodePickler(pickle._Pickler):
             contents = obj.co_code, obj.co_exceptiontable, *names, obj.co_consts
         elif isinstance(obj, type):
             kind, contents = obj.__qualname__, _class_contents(obj)
-        elif isinstance(obj, Type):  # without the number that numba gives a type when it first meets it
-            kind, contents = str(obj), obj.key
         elif isinstance(obj, set | frozenset):
             contents = sorted(obj, key=repr)
         elif isinstance(obj, Mapping):

@@ -4,27 +4,29 @@
 # (an intrinsic is called without its typing context)
 import contextlib
 import functools
+import hashlib
+import io
 import os
 import re
 from collections import namedtuple
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
 
 from llvmlite import ir
 from numba import from_dtype, njit, types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import Dispatcher
 from numba.core.errors import TypingError
 from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
-from smc_mujoco.common.code_cache import Cache
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.remade import remade
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
+DIGEST = hashlib.sha256().digest_size
 
 if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread that compiled in its parent
     os.register_at_fork(
@@ -138,29 +140,74 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
-        with contextlib.suppress(RuntimeError, ScenarioError):  # nowhere to write, or nothing to know it by
-            made._cache = Cache(body, made._sig)
+        with contextlib.suppress(RuntimeError):  # nowhere to write
+            made._cache = Cache(body)
     with held_back():
         made.compile()
     return made
 
 
+class Cache(FunctionCache):
+    """Cache of a compiled function on disk. A damaged file is compiled again; a disk without room holds none."""
+
+    def __init__(self, body: Callable):
+        super().__init__(body)
+        locator = self._impl.locator
+        self._cache_file = Sealed(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Write it, unless the disk is full or the files are somebody else's."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class Sealed(IndexDataCacheFile):
+    """Files of numba's cache, each with a hash at its end. A file whose hash does not fit counts as missing."""
+
+    def _load_index(self) -> dict:
+        return super()._load_index() if _whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        return super()._load_data(name) if _whole(self._data_path(name)) else None
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        written = io.BytesIO()
+        yield written
+        with super()._open_for_write(filepath) as file:
+            file.write(written.getvalue() + hashlib.sha256(written.getvalue()).digest())
+
+
+def _whole(path: str) -> bool:
+    """Whether a file of the cache is there and as it was written."""
+    try:
+        held = Path(path).read_bytes()
+    except OSError:
+        return False
+    return hashlib.sha256(held[:-DIGEST]).digest() == held[-DIGEST:]
+
+
 class Function:
-    """A compiled C function, kept alive; `address` is where it lies. What calls shipped functions is kept on disk."""
+    """A compiled C function, kept alive; `address` is where it lies."""
 
     def __init__(self, body: Callable):
         try:
-            self._cfunc = compiled(SIGNATURE, body, cache=_calls_shipped(body))
+            self._cfunc = compiled(SIGNATURE, body)
         except Exception as error:  # numba raises many kinds; each means the same to the caller
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address
 
 
-def _calls_shipped(body: Callable) -> bool:
-    """Whether the compiled functions that it closes over are this package's, and there is one."""
-    closed_over = [cell.cell_contents for cell in body.__closure__ or ()]
-    called = [item.py_func for item in closed_over if isinstance(item, Dispatcher)]
-    return bool(called) and all(function.__module__.split(".")[0] == "smc_mujoco" for function in called)
+class AtAddress:
+    """What is a C function of the callback's type already.
+
+    Attributes:
+      address: where it lies, as long as this lives.
+      digest: a hash of its machine code.
+    """
+
+    address: int
+    digest: str
 
 
 class Uncompiled:

@@ -19,8 +19,7 @@ from collections.abc import Callable
 from numba import carray
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.fingerprint import AtAddress
-from smc_mujoco.common.jit import Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
+from smc_mujoco.common.jit import AtAddress, Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement

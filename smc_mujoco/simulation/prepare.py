@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.fingerprint import AtAddress
-from smc_mujoco.common.jit import Function, NotCompilable
+from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state

@@ -25,6 +25,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
@@ -902,7 +903,55 @@ def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integr
     assert np.isnan(trace.x[k:]).all()
 
 
-# (p) memory, forks and Ctrl-C
+# (p) the cache on disk, memory, forks and Ctrl-C
+
+FRESH = """
+from added import added
+from numba import types
+from smc_mujoco.common.jit import compiled
+made = compiled(types.float64(types.float64), added, cache=True)
+assert made.ctypes(1.0) == 3.0
+print(made.cache_hits)
+"""
+
+
+def hits(folder: Path) -> str:
+    """How often a new process takes the compiled function from the cache in a folder, "0" or "1"."""
+    (folder / "added.py").write_text("def added(x):\n    return x + 2.0\n")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(folder)])}
+    done = subprocess.run(
+        [sys.executable, "-c", FRESH], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+def flipped(data: bytes) -> bytes:
+    """With one bit changed, in what is compiled or in the index' names."""
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
+
+
+def test_a_damaged_cache_is_written_anew(tmp_path):
+    assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+    damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
+    for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
+        for path in (tmp_path / "__pycache__").glob(name):
+            path.write_bytes(damage(path.read_bytes()))
+        assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", full)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    def doubled(x):
+        return 2.0 * x
+
+    assert compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")

@@ -12,7 +12,7 @@ import re
 import textwrap
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
-from smc_mujoco.common.fingerprint import AtAddress
+from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import Late, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.c import build

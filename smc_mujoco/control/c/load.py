@@ -22,8 +22,7 @@ from numba import carray
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
-from smc_mujoco.common.fingerprint import AtAddress
-from smc_mujoco.common.jit import Function, call_int, pointer
+from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.c import build, sandbox
 from smc_mujoco.control.component import Template, template
 from smc_mujoco.control.law import Measurement
