@@ -143,7 +143,7 @@ renderer = gl.renderer(model, 48, 64)
 renderer.update_scene(mujoco.MjData(model))
 assert renderer.render().shape == (48, 64, 3)
 assert dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context)) == held, "something is left in MuJoCo"
-other = gl.renderer(model)  # closed by nobody
+sys.keep = gl.renderer(model)  # closed by nobody, and freed last
 """
 
 
