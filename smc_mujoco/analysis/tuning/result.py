@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective, described
-from smc_mujoco.analysis.tuning.search_space import Box, at_bound, box
+from smc_mujoco.analysis.tuning.search_space import DECADES, Box, at_bound, box
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, write_json
 from smc_mujoco.common.version import __version__
@@ -189,11 +189,22 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         if len(one.history) != one.budget:
             counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
             raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
-        for gain, ends in (box(one.law, one.scales) if one.law.template else {}).items():
+        for gain, ends in _bounds(one).items():
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
     return sorted(tuned, key=lambda one: one.objective)
+
+
+def _bounds(tuned: Tuned) -> Box:
+    """Return the bounds that the rule gives; of a law that is not at hand only their width can be told."""
+    if tuned.law.template:
+        return box(tuned.law, tuned.scales)
+    one_sided = 10.0**DECADES  # of a force, which is searched up to u_max
+    return {
+        gain: (low, low * (one_sided if high / low < 2.0 * one_sided else one_sided**2))
+        for gain, (low, high) in tuned.bounds.items()
+    }
 
 
 def versions() -> dict[str, str]:

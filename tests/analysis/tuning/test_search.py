@@ -196,6 +196,9 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found):
         "bounds": dataclasses.replace(rival, bounds=dict(rival.bounds) | {"k": (1e-3, 1e3)}),
         "budget ": dataclasses.replace(rival, history=rival.history * 2),
     }
+    away = dataclasses.replace(rival, law=dataclasses.replace(rival.law, function=None))
+    assert len(compare([away, found])) == 2
+    unequal["bounds "] = dataclasses.replace(away, bounds=dict(away.bounds) | {"k": (1e-3, 1e3)})
     for what, one in unequal.items():
         with pytest.raises(smc.ScenarioError, match=what.strip()):
             compare([found, one])
