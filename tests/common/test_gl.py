@@ -135,7 +135,7 @@ def test_importing_the_package_changes_nothing_of_the_process(wish):
 
 
 PICTURE = """
-import sys, mujoco
+import sys, threading, mujoco
 held = dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context))
 from smc_mujoco.common import gl
 model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
@@ -143,7 +143,7 @@ renderer = gl.renderer(model, 48, 64)
 renderer.update_scene(mujoco.MjData(model))
 assert renderer.render().shape == (48, 64, 3)
 assert dict(vars(sys.modules[mujoco.Renderer.__module__].gl_context)) == held, "something is left in MuJoCo"
-sys.keep = gl.renderer(model)  # closed by nobody, and freed last
+threading.keep = gl.renderer(model)  # closed by nobody, and freed after MuJoCo's modules
 """
 
 
