@@ -202,7 +202,7 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
 def leaderboard(boards: Sequence[Board]) -> Table:
     """Return a table of boards: a part for each group, a line for each law, a column for each metric."""
     metrics = {board.metric: board.unit for board in boards}
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)  # the box keeps columns apart
     lines = max((metric.count("_") for metric in metrics), default=0)
     table.add_column("law", no_wrap=True, min_width=0 if boards else 30)
     for metric, unit in metrics.items():

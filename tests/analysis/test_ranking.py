@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -540,6 +541,16 @@ def checked(boards: list[Board]) -> int:
             assert not set(board.wins(entry.law)) & set(board.losses(entry.law))
             assert entry.rank.best == (not board.losses(entry.law))
     return named
+
+
+def test_no_number_of_a_board_breaks_over_two_lines_at_80_columns():
+    values = np.tile(np.linspace(0.0071, 0.0095, 20), 2)
+    laws = np.repeat(["conditioned_super_twisting", "implicit_first_order"], 20)
+    names = ["settling_time", "ultimate_bound", "itae", "tv_rate"]
+    table = Stand(law=laws, seed=np.tile(np.arange(20), 2), **dict.fromkeys(names, values))
+    text = printed(leaderboard(table))
+    assert len(re.findall(r"0\.00\d\d–0\.00\d\d", text)) == 2 * len(names)
+    assert max(map(len, text.splitlines())) <= 80
 
 
 STIFF = smc.plant("duffing", beta=5.0)
