@@ -226,7 +226,9 @@ def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | No
     """Yield a group's lines: the winner in each block if there are several, then every law, and the winner overall."""
     largest = max(own.values(), key=lambda board: len(board.blocks))
     several = len(largest.blocks) > 1
-    yield [Text(f"{name}\n", "bold").append(f"{largest.cells} runs,\n{_sample(largest.blocks)}", "dim not bold")]
+    only = "" if several else _folded(largest.name(largest.blocks[0])) + "\n"
+    runs = f"{largest.cells} run{'s' * (largest.cells != 1)},\n{_sample(largest.blocks)}"
+    yield [Text(f"{name}\n", "bold").append(only, "italic not bold").append(runs, "dim not bold")]
     for block in largest.blocks if several else ():
         at = block.plant, block.condition
         blocks = [

@@ -54,7 +54,7 @@ def _brief(value: object) -> str:
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """The error for a name that is not among `known`, with the nearest that is."""
-    names = sorted(known)
+    names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
     hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}" if names else "there are none"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")

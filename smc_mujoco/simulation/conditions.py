@@ -136,6 +136,8 @@ def find_condition(value: Condition | str) -> Condition:
         raise ScenarioError(f"condition is {shown(value)}: give a name, or smc.condition(...)")
     if ":" in value:
         return parsed(value)
+    if set("=(") & set(value):
+        raise ScenarioError(f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3")
     found = [find("condition", part.strip(), NAMED) for part in value.split("+")]
     return sum(found[1:], start=found[0])
 
@@ -179,7 +181,13 @@ def from_file(path: Path) -> list[Condition]:
     """
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
-    return [find_condition(line) for line in lines if line and not line.startswith("#")]
+    found = []
+    for number, line in enumerate(lines, 1):
+        try:
+            found += [find_condition(line)] if line and not line.startswith("#") else []
+        except ScenarioError as error:
+            raise ScenarioError(f"line {number} of {str(path)!r}: {error}") from None
+    return found
 
 
 def _value(node: ast.expr) -> Any:

@@ -549,6 +549,7 @@ def test_no_number_of_a_board_breaks_over_two_lines_at_80_columns():
     names = ["settling_time", "ultimate_bound", "itae", "tv_rate"]
     table = Stand(law=laws, seed=np.tile(np.arange(20), 2), **dict.fromkeys(names, values))
     text = printed(leaderboard(table))
+    assert "nominal" in text.split()  # the one condition
     assert len(re.findall(r"0\.00\d\d–0\.00\d\d", text)) == 2 * len(names)
     assert max(map(len, text.splitlines())) <= 80
 

@@ -136,6 +136,7 @@ def test_what_happens_once_does_so_at_half_time():
         (": input_delay=0.01", "a condition's name"),
         ("noise: input_delay=0.01", "is a name of the suite"),
         ("noisy", "did you mean 'noise'"),
+        ("worn friction=Coulomb(0.05)", "has no colon: write a name, a colon and fields"),
         ("noise + ", "unknown condition ''"),
         ("a" * 10**5 + ": x=" + "(" * 10**4, "cannot be read"),
     ],
@@ -150,6 +151,9 @@ def test_a_file_holds_a_condition_a_line(tmp_path):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
     assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
+    path.write_text("# two\n\nworn x0=1\n")
+    with pytest.raises(smc.ScenarioError, match=r"line 3 of .*conditions.txt.* has no colon"):
+        from_file(path)
     with pytest.raises(smc.ScenarioError, match="no file of conditions"):
         from_file(tmp_path / "none.txt")
 
@@ -434,6 +438,8 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
         (("basin", "duffing", "--condition", "a: b=1"), "unknown field"),
         (("bench", "--plants", "arm.xml"), "names no joints"),
         (("bench", "--plants", "arm.xml:"), "names no joints"),
+        (("bench", "--condition", "worn.txt"), "no file 'worn.txt': give a file of conditions"),
+        (("claims", "99"), "choose from T, 1, 3, 4, 5, 7, 10, 11"),
         (("tune", "duffing", "classical", "--conditions", "noisy"), "did you mean 'noise'"),
     ],
 )

@@ -23,7 +23,8 @@ def bench(
         str | None, typer.Option(help=f"Laws, as a,b, or all; default the report's short list. {options.OWN_GAINS}")
     ] = None,
     conditions: Annotated[
-        str | None, typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants.")
+        str | None,
+        typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants, or none beside --condition."),
     ] = None,
     condition: options.Conditions = None,
     x0: options.Middle = None,

@@ -109,10 +109,13 @@ def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Conditi
     Raises:
       ScenarioError: an unknown name, or a text or file that cannot be read.
     """
+    from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
     found = [find_condition(name) for name in named]
     for text in own or ():
+        if ":" not in text and (os.sep in text or Path(text).suffix) and not os.path.exists(text):
+            raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
         found += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
     return found
 
