@@ -22,7 +22,6 @@ from smc_mujoco.cli.commands import (
     tune,
     view,
 )
-from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
 
@@ -86,4 +85,4 @@ COMMANDS = {
     "export-c": export_c.export_c,
 }
 for name, command in COMMANDS.items():
-    app.command(name)(mendable()(command))
+    app.command(name)(command)

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, loading, wrote
+from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
 
 
+@mendable()
 def basin(
     plant: Annotated[str, typer.Argument(metavar="PLANT", help="One that `list` shows, or FILE.xml:joint.")],
     law: Annotated[str, typer.Option(help=f"One that `laws` shows. {options.OWN_GAINS}")] = "observer_free",

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, loading, wrote
+from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
 
 
+@mendable()
 def bench(
     quick: Annotated[
         bool,

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading
+from smc_mujoco.cli.terminal import loading, mendable
 
 
+@mendable()
 def list_() -> None:
     """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study."""
     with loading():
@@ -39,6 +40,7 @@ def list_() -> None:
     console.print(tables.catalogue("Conditions, for smc.paper.comparison(plant, condition)", [("", names)]))
 
 
+@mendable()
 def laws(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="A law, a surface or a velocity estimator; all without one.")

@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import loading
+from smc_mujoco.cli.terminal import loading, mendable
 from smc_mujoco.common.errors import ScenarioError
 
 OPTIONS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # arguments of law_from_c, with which its sentences end
 
 
+@mendable()
 def check_c(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
     gains: Annotated[

@@ -6,10 +6,11 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, loading
+from smc_mujoco.cli.terminal import Clock, loading, mendable
 from smc_mujoco.common.errors import printable
 
 
+@mendable()
 def claims(
     ids: Annotated[
         list[str] | None,

@@ -5,9 +5,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import loading
+from smc_mujoco.cli.terminal import loading, mendable
 
 
+@mendable()
 def export_c(
     law: options.LawName,
     gains: Annotated[str, typer.Option(metavar="NAME=VALUE,...", help="Gains; the law's own where left out.")] = "",

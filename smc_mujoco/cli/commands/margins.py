@@ -6,11 +6,12 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, loading, wrote
+from smc_mujoco.cli.terminal import Clock, loading, mendable, wrote
 
 QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturbance"]}
 
 
+@mendable()
 def margins(
     plants: Annotated[
         list[str] | None,

@@ -6,10 +6,11 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import loading
+from smc_mujoco.cli.terminal import loading, mendable
 from smc_mujoco.common.errors import printable
 
 
+@mendable()
 def report(
     quick: Annotated[bool, typer.Option("--quick", help="A look in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),

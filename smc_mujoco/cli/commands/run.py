@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, loading
+from smc_mujoco.cli.terminal import Clock, loading, mendable
 
 
+@mendable()
 def run(
     name: options.SceneName,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,

@@ -7,9 +7,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import loading
+from smc_mujoco.cli.terminal import loading, mendable
 
 
+@mendable()
 def view(
     name: options.SceneName,
     condition: Annotated[

@@ -14,7 +14,6 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import lam_range
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.claims import claims as command
-from smc_mujoco.cli.terminal import mendable
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
@@ -441,7 +440,7 @@ def test_a_command_beyond_lambda_is_seen():
 def terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     app = typer.Typer()
-    app.command()(mendable()(command))
+    app.command()(command)
     return lambda *arguments: CliRunner().invoke(app, list(arguments))
 
 
