@@ -486,3 +486,9 @@ def test_a_claim_that_is_none_ends_in_a_sentence(terminal):
     done = terminal("999")
     assert done.exit_code == 2
     assert "unknown claim '999'" in done.stderr
+
+
+@pytest.mark.parametrize(("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")])
+def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
+    (claim,) = claims(only=["18"], gains="study", quick=quick)
+    assert claim.measured.endswith(told)

@@ -69,6 +69,7 @@ def reduces_chattering(runs: Runs) -> list[Check]:
     where="abstract, section 3",
     measured="max |u| over every run of the study: its five plants in every condition of the ideal mechanisms, and "
     "with an actuator without a bound; and all that other claims and the table have run of this law",
+    quick="in three of these conditions",
     holds_if="<= lambda",
     note="u is read behind the actuator's bound, 6 in the study: a lambda above it is put to the test by the runs "
     "without that bound. The check cannot fail for the law as it is, |tanh| being at most 1; it can for a mutant.",
@@ -94,6 +95,7 @@ def bounded(runs: Runs) -> list[Check | Beside]:
     "robust to noise, disturbance, parameter variation",
     where="abstract",
     measured=f"ultimate bound under noise, disturbance ({', '.join(DISTURBED)}) and mass times 0.7 and 1.3",
+    quick=f"under noise, {DISTURBED[0]} and mass times 1.3",
     holds_if="<= 5 % of |x0|",
 )
 def robust(runs: Runs) -> list[Check]:
@@ -109,6 +111,7 @@ def robust(runs: Runs) -> list[Check]:
     where="abstract",
     measured="settling time of both networks, N = 2, 5, 10, 20, 50 and 1000, runs of 3 s under implicitfast; the five "
     "starting angles recur",
+    quick="N = 2 to 50",
     holds_if="within 2x of N = 2",
 )
 def scalable(runs: Runs) -> list[Check]:

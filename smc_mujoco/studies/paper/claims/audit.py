@@ -41,6 +41,7 @@ class Entry:
       text: what the paper says, in a few words.
       where: the section of the paper.
       measured: what is run, and what is measured on it.
+      quick: what a quick audit measures instead, where that is less.
       holds_if: the threshold, in words.
       evidence: from runs under one set of gains to checks and the numbers beside them.
       note: what a reader must know to judge the numbers: why a part is not testable, what stands for what.
@@ -57,6 +58,7 @@ class Entry:
     note: str = ""
     late: bool = False
     quantifier: str = NAMED
+    quick: str = ""
 
 
 def claim(id: str, text: str, **fields: Any) -> Callable[[Evidence], Entry]:
@@ -121,7 +123,7 @@ def claims(
         for entry in sorted(entries, key=lambda entry: entry.late):
             found[entry.id][name] = entry.evidence(runs)
             report(1)
-    return [judged(entry, found[entry.id]) for entry in entries]
+    return [judged(entry, found[entry.id], quick) for entry in entries]
 
 
 def wanted(only: Iterable[str | int] | None) -> list[Entry]:
@@ -154,7 +156,7 @@ def evaluations(
     return len(wanted(only)) * len(sets(gains, quick))
 
 
-def judged(entry: Entry, found: dict[str, Found]) -> Claim:
+def judged(entry: Entry, found: dict[str, Found], quick: bool = False) -> Claim:
     """Return a claim with its verdict, from what was found under each set of gains."""
     verdicts = {name: verdict(some, entry.quantifier) for name, some in found.items()}
     overall, flips, sentence = combined(verdicts, entry.quantifier)
@@ -163,7 +165,7 @@ def judged(entry: Entry, found: dict[str, Found]) -> Claim:
         id=entry.id,
         text=entry.text,
         where=entry.where,
-        measured=entry.measured,
+        measured=entry.measured + (f"; here, quickly, {entry.quick}" if quick and entry.quick else ""),
         holds_if=entry.holds_if,
         verdict=overall,
         numbers={name: checks for name, (checks, _) in told.items()},

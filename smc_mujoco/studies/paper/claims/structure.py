@@ -77,6 +77,7 @@ def no_tuning(runs: Runs) -> list[Check | Beside]:
     where="section 3",
     measured="ultimate bound with xdot from each estimator, as the library has it, of an x read with noise of 0.001 "
     "and 0.01",
+    quick="of 0.01",
     holds_if="<= 5 % of |x0|",
 )
 def with_estimators(runs: Runs) -> list[Check]:
