@@ -16,6 +16,11 @@ ends are order statistics too, and cover as the binomial distribution says: 93 %
 A block may have fewer runs than there are seeds: seeds that change nothing in it are one run. It is fixed all the same,
 and a resample that draws none of its runs takes each of them once.
 
+An interval tells of starts and noise, and of little else. Gains that were tuned from three seeds come in turn, run s
+with those of tuning seed s modulo 3, and so 16 runs hold three samples of tuning, not 16: where gains differ much from
+one tuning seed to the next, the runs of one tuning are alike, the interval is too narrow, and the sign test of
+`ranking` too sure. Of laws tuned from one seed the intervals hold for these gains alone.
+
 The median of several blocks is the median of their medians. A law with the lower median in every block then has the
 lower one over all of them; the median of all runs together does not promise that.
 """

@@ -1,7 +1,7 @@
 """A table's runs by group, and in each the cells - plant, condition, seed - in which every law ran.
 
 for group in groups(table, by=("plant",)):
-    group.scores(values(table, "itae"))        # law -> (blocks, seeds), as `ranking` takes them
+    group.scores(values(table, "itae"))        # law -> (blocks, seeds), and its outcomes, as `ranking` takes them
 """
 
 import contextlib
@@ -63,7 +63,8 @@ class Group:
       shape: laws, blocks, seeds.
       places: where among these each row is, flat.
       seeds: of each block, in how many every law ran.
-      repeats: (blocks, seeds), whether every law has done the same, but for rounding, in an earlier seed.
+      outcome: (laws, blocks, seeds), equal for runs of a law that are the same but for rounding; -1 where no run is.
+      repeats: (blocks, seeds), whether every law has done the same in an earlier seed.
     """
 
     name: Mapping[str, str]
@@ -73,6 +74,7 @@ class Group:
     shape: tuple[int, int, int]
     places: np.ndarray
     seeds: tuple[int, ...]
+    outcome: np.ndarray
     repeats: np.ndarray
 
     @property
@@ -86,16 +88,16 @@ class Group:
         block = np.unravel_index(self.places, self.shape)[1]
         return [int(self.rows[np.argmax(block == k)]) for k in range(self.shape[1])]
 
-    def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray]]:
-        """Return the blocks in which a metric applies, and law -> (these blocks, seeds); {} for none.
+    def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Return the blocks in which a metric applies, law -> (these blocks, seeds), and law -> its outcomes in them.
 
-        Scores are NaN in cells that not all laws have, and in repeats.
+        Of no blocks, {} twice. Scores are NaN in cells that not all laws have, and in repeats.
 
         Raises:
           ScenarioError: the laws share no cell.
         """
         if np.isnan(by_row[self.rows]).all():
-            return [], {}
+            return [], {}, {}
         cube = np.full(self.shape, np.nan)
         cube.flat[self.places] = by_row[self.rows]
         common = ~np.isnan(cube).any(axis=0)
@@ -106,7 +108,8 @@ class Group:
         common &= ~self.repeats
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
-        return blocks.tolist(), dict(zip(self.laws, cube[:, blocks][:, :, seeds], strict=True))
+        own, outcomes = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in (cube, self.outcome))
+        return blocks.tolist(), own, outcomes
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
@@ -206,6 +209,7 @@ def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray
         shape=shape,
         places=places,
         seeds=tuple(there.sum(axis=1).tolist()),
+        outcome=outcome,
         repeats=np.stack([_repeats(outcome[:, k], there[k]) for k in range(shape[1])]),
     )
 

@@ -14,6 +14,9 @@ another in a block if three things hold.
   of laws in all blocks: the probability that any law is wrongly called better, in any block, is at most 1 - level.
 - There are at least 16 seeds. With fewer, hardly anything survives the correction.
 
+A seed is a sample of two laws if it changes one of the two. Seeds in which both do what they did together in an earlier
+one are that one run over again: they count once in the test and among the 16, whatever other laws do in them.
+
 A law that no other is better than is among the best of its block; where it alone is, it is the winner there. "Better"
 follows the medians, so every block has a best law, and a winner has the lowest median.
 
@@ -73,6 +76,7 @@ class Comparison:
       floors: (blocks,), the least difference of medians that is relevant whatever they are.
       level: of confidence.
       p: (blocks, laws, laws), of the sign test, corrected, that a law is ahead of another; 1 where it is not.
+      runs: (blocks, laws, laws), in how many seeds two laws did not do what both did in an earlier one.
     """
 
     laws: tuple[str, ...]
@@ -81,6 +85,7 @@ class Comparison:
     floors: np.ndarray
     level: float
     p: np.ndarray
+    runs: np.ndarray
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
@@ -97,7 +102,7 @@ class Comparison:
         """Whether a law is better than another, (blocks, laws, laws)."""
         own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
         lower = exceeds(rival, own, resolution=self.floors[:, None, None])
-        return lower & (self.p <= 1 - self.level) & (self.seeds >= SEEDS)[:, None, None]
+        return lower & (self.p <= 1 - self.level) & (self.runs >= SEEDS)
 
     @property
     def best(self) -> list[tuple[str, ...]]:
@@ -111,13 +116,18 @@ class Comparison:
 
 
 def compare(
-    scores: Mapping[str, ArrayLike], floors: ArrayLike = 0.0, shares: bool = False, level: float = 0.95
+    scores: Mapping[str, ArrayLike],
+    floors: ArrayLike = 0.0,
+    shares: bool = False,
+    level: float = 0.95,
+    outcomes: Mapping[str, ArrayLike] | None = None,
 ) -> Comparison:
     """Compare every law with every other in every block.
 
     Args:
       scores: law -> (blocks, n) or (n,), lower is better, inf for never; NaN, in all laws, where no run is.
       floors: one for all blocks, or one for each, see `Comparison`.
+      outcomes: law -> a number a cell, equal where the law did the same from two seeds. Default: all runs differ.
 
     Raises:
       ScenarioError: no laws, or not of the same cells.
@@ -126,13 +136,20 @@ def compare(
     k, blocks, _ = cells.shape
     pairs = np.array([*itertools.combinations(range(k), 2)], int).reshape(-1, 2)
     p, p_of = np.ones((blocks, k, k)), np.ones((blocks, len(pairs)))
-    tested = [_sign_test(worse(cells[a], cells[b])) for a, b in pairs]
+    ran = np.tile(~np.isnan(cells[0]), (len(pairs), 1, 1))
+    if outcomes is not None:
+        did = [np.atleast_2d(outcomes[law]) for law in laws]
+        ran &= np.array([_distinct(did[a], did[b], ran[0]) for a, b in pairs], bool).reshape(ran.shape)
+    tested = [_sign_test(np.where(own, worse(cells[a], cells[b]), 0)) for (a, b), own in zip(pairs, ran, strict=True)]
+    runs = np.zeros((blocks, k, k), int)
+    for (a, b), own in zip(pairs, ran, strict=True):
+        runs[:, a, b] = runs[:, b, a] = own.sum(axis=1)
     for j, (value, _) in enumerate(tested):
         p_of[:, j] = value
     for (a, b), (_, ahead), value in zip(pairs, tested, holm(p_of).T, strict=True):
         p[:, a, b], p[:, b, a] = np.where(ahead < 0, value, 1.0), np.where(ahead > 0, value, 1.0)
     widths = np.broadcast_to(np.asarray(floors, float), blocks)
-    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=checked(level), p=p)
+    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=checked(level), p=p, runs=runs)
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -146,6 +163,16 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
     if (missing != missing[0]).any() or missing[0].all(axis=0).any() or missing[0].all(axis=1).any():
         raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws alike")
     return laws, cells
+
+
+def _distinct(one: np.ndarray, other: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Where, of cells that are there, two laws' outcomes are not both those of an earlier seed; (blocks, seeds)."""
+    found = np.zeros(there.shape, bool)
+    for k, own in enumerate(there):
+        seeds = np.flatnonzero(own)
+        both = np.stack([one[k, seeds], other[k, seeds]])
+        found[k, seeds[np.unique(both, axis=1, return_index=True)[1]]] = True
+    return found
 
 
 def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,8 @@
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6, kept whatever the results.
 - tuned: what `tuning` finds for every general law with 96 evaluations, with a price on the variation of u. The laws of
-  LAWS are tuned from three seeds, all others from one, so that the spread of tuning shows in their results.
+  LAWS are tuned from three seeds, all others from one, so that the spread of tuning shows in their results. Three
+  tunings are three samples of it, however many runs take them in turn.
 - tracking: the same for the laws of LAWS, from one seed and without that price.
 - default: the law's own.
 

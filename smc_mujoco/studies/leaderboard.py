@@ -47,6 +47,8 @@ class Block:
       best: the laws that none is better than.
       seeds: how many every law ran from.
       runs: how many of these are distinct: in the others every law does what it does in an earlier one.
+      most: how many distinct runs two laws have at most: a seed that changes neither is no sample of the two.
+      fewest: how many two of the best have at least; `most` where there is one.
     """
 
     plant: str
@@ -55,6 +57,8 @@ class Block:
     best: tuple[str, ...]
     seeds: int
     runs: int
+    most: int
+    fewest: int
 
     @property
     def winner(self) -> str | None:
@@ -65,7 +69,7 @@ class Block:
     def sample(self) -> str:
         """The size of the sample in words, such as "20 seeds, 1 distinct run"."""
         seeds = f"{self.seeds} seed{'s' * (self.seeds > 1)}"
-        return seeds if self.runs == self.seeds else f"{seeds}, {self.runs} distinct run{'s' * (self.runs > 1)}"
+        return seeds if self.runs == self.seeds else f"{seeds}, {_distinct(self.runs)}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -139,7 +143,11 @@ class Board:
                 )
         if told:
             return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(told)}"
-        return f"no winner: {self.why}" if self.why else f"no winner, undefeated: {_listed(self.best)}"
+        if self.why:
+            return f"no winner: {self.why}"
+        fewest = min(block.fewest for block in self.blocks)
+        few = f", of two of which there {'are' if fewest > 1 else 'is'} {_distinct(fewest)}"
+        return f"no winner, undefeated: {_listed(self.best)}{few * (fewest < SEEDS)}"
 
     @property
     def why(self) -> str:
@@ -151,12 +159,18 @@ class Board:
     @property
     def too_few(self) -> str:
         """The size of the sample in words, if no block has enough runs for a winner; else ""."""
-        most = max(self.blocks, key=lambda block: block.runs)
+        most = max(self.blocks, key=lambda block: block.most)
         if most.runs < SEEDS:
             return most.sample + ", too few" * (most.runs == most.seeds)
-        if 2.0 ** (1 - most.runs) * self.pairs > 1 - self.level:  # the least p-value of the sign test
+        if most.most < SEEDS:
+            return f"{most.sample}, of two laws {_distinct(most.most)}"
+        if 2.0 ** (1 - most.most) * self.pairs > 1 - self.level:  # the least p-value of the sign test
             return f"{most.sample}, too few for {self.pairs} comparisons"
         return ""
+
+
+def _distinct(runs: int) -> str:
+    return f"{runs} distinct run{'s' * (runs > 1)}"
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -175,7 +189,8 @@ def leaderboard(
     """Compare the laws of a table in each metric within each group.
 
     Only cells - plant, condition, seed - that every law of the group has are compared; a run that failed is inf in all
-    metrics. Seeds in which every law does the same are one sample. A metric that does not apply to a group has no board
+    metrics. Seeds in which both of two laws do what they did in
+    an earlier one are no further samples of the two. A metric that does not apply to a group has no board
     there.
 
     Args:
@@ -190,11 +205,11 @@ def leaderboard(
     for group in cells.groups(table, by):
         ran = cells.scenarios(table, group)
         for metric, unit in units.items():
-            there, scores = group.scores(by_row[metric])
+            there, scores, outcomes = group.scores(by_row[metric])
             if not scores:
                 continue
             floors = [cells.floor(ran[k], unit) for k in there]
-            found = compare(scores, floors, metric == SETTLES, level)
+            found = compare(scores, floors, metric == SETTLES, level, outcomes)
             blocks = tuple(_block(group, found, at, k) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1
             board = Board(
@@ -216,6 +231,9 @@ def leaderboard(
 def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
     """Return block k of a group, which is number `at` of those compared."""
     plant, condition = group.blocks[k]
+    runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws])
+    best = runs[np.ix_(laws, laws)][np.triu_indices(laws.sum(), 1)]
+    most = int(runs.max()) if len(laws) > 1 else int(found.seeds[at])
     return Block(
         plant=plant,
         condition=condition,
@@ -223,6 +241,8 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
         best=found.best[at],
         seeds=group.seeds[k],
         runs=int(found.seeds[at]),
+        most=most,
+        fewest=int(best.min(initial=most)),
     )
 
 

@@ -24,9 +24,9 @@ from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies import study as run_study
 from smc_mujoco.studies.leaderboard import METRICS, Board, leaderboard
 from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.study import study as run_study
 
 INF = math.inf
 FEW = 199  # resamples
@@ -503,6 +503,19 @@ def test_the_table_says_who_wins_and_where_none_does():
     assert max(map(len, printed(leaderboard(study()), width=80).splitlines())) <= 80
 
 
+def test_a_leaderboard_breaks_no_number_at_80_columns():
+    factors = [1.2345e-5 * 2**i * near for i in range(6) for near in (1.0, 1.01)]  # two by two they are tied
+    names = ["observer_free_adaptive", *(f"law{i}" for i in range(11))]
+    scores = dict(zip(names, blocks(*factors)[:, None], strict=True))
+    values = np.concatenate([own[0] for own in scores.values()])
+    others = dict.fromkeys(("settling_time", "ultimate_bound", "tv_rate"), values)
+    boards = leaderboard(stand(scores, **others), METRICS)
+    narrow, wide = (printed(boards, width=width) for width in (80, 300))
+    assert max(map(len, narrow.splitlines())) <= 80
+    assert sorted(re.findall(r"[0-9.e-]+", narrow)) == sorted(re.findall(r"[0-9.e-]+", wide))
+    assert "#11.5" in narrow
+
+
 def test_a_real_table_has_what_a_leaderboard_needs():
     pa = pytest.importorskip("pyarrow")
     table_type = pytest.importorskip("smc_mujoco.studies.table").Table
@@ -607,12 +620,33 @@ def test_seeds_that_change_nothing_are_one_sample():
     assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
 
 
-def test_a_seed_is_a_sample_if_it_changes_one_law_or_another_metric():
+def test_a_seed_is_a_sample_of_two_laws_if_it_changes_one():
     still, moved = np.ones((1, 20)), blocks(2.0)
     (board,) = leaderboard(stand({"a": still, "b": moved}), ["itae"])
     assert (board.cells, board.winner) == (20, "a")
     other = stand({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
     assert leaderboard(other, ["itae"])[0].cells == 20
+
+
+def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
+    still, moved = np.ones((1, 20)), blocks(2.0)
+    (board,) = leaderboard(stand({"a": moved, "b": 0.01 * still, "c": 0.02 * still}), ["itae"])
+    (block,) = board.blocks
+    assert (block.runs, block.most, block.fewest) == (20, 20, 1)
+    assert (block.best, board.winner, board.losses("a")) == (("b", "c"), None, ["c0"])
+    assert board.verdict == "no winner, undefeated: b, c, of two of which there is 1 distinct run"
+
+
+def test_compare_counts_distinct_runs_of_each_pair():
+    low, high = blocks(1.0, 2.0, seeds=20)
+    did = {"a": np.arange(20), "b": np.arange(20) // 2, "c": np.arange(20) % 2}
+    found = compare({"a": low, "b": high, "c": 2 * high}, outcomes={law: own[None] for law, own in did.items()})
+    assert found.runs[0].tolist() == [[0, 20, 20], [20, 0, 20], [20, 20, 0]]
+    found = compare({"a": low, "b": high, "c": 2 * high}, outcomes=did | {"a": did["b"]})
+    assert found.runs[0, 0, 1] == found.runs[0, 1, 0] == 10
+    assert found.p[0, 0, 2] == found.p[0, 1, 2] < found.p[0, 0, 1] == pytest.approx(2 * 0.5**10)
+    assert not found.better[0, 0, 1]
+    assert found.better[0, 1, 2]
 
 
 def test_one_condition_without_randomness_is_one_sample_beside_others():

@@ -27,7 +27,7 @@ def scores(table: "Table") -> tuple[Score, ...]:
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         for metric in words.COLUMNS:
-            _, by_law = group.scores(by_row[metric])
+            _, by_law, _ = group.scores(by_row[metric])
             for law in sorted(by_law, key=order.index):
                 block, interval = known[plant, condition, metric], median_of(by_law[law])
                 score = Score(
