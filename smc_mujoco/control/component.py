@@ -260,6 +260,26 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
         return False
 
 
+def _gains(gains: object) -> dict[str, Gain]:
+    """Return gains as stated in a decorator, a number or a Gain each.
+
+    Raises:
+      ScenarioError: no such mapping, a name or a default that is none, or a gain that is divided by an unknown one.
+    """
+    if not isinstance(gains, Mapping | None):
+        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
+    found: dict[str, Gain] = {}
+    for key, value in (gains or {}).items():
+        if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
+            raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
+        gain = value if isinstance(value, Gain) else Gain(value)
+        found[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
+    for key, gain in found.items():
+        if gain.over is not None and gain.over not in found:
+            raise unknown(f"gain that {key} is divided by", gain.over, found)
+    return found
+
+
 def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
     """Return the Template of a function, or the decorator that makes it where no function is given yet.
 
@@ -295,14 +315,7 @@ def template(
       ScenarioError: a gain's name is no identifier, its default no number, memory no whole number in 1 .. 10000, or
         the function's name longer than 100 characters.
     """
-    if not isinstance(gains, Mapping | None):
-        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    found: dict[str, Gain] = {}
-    for key, value in (gains or {}).items():
-        if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
-            raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
-        gain = value if isinstance(value, Gain) else Gain(value)
-        found[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
+    found = _gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")

@@ -54,6 +54,7 @@ class Gain:
       positive: whether it must be greater than 0.
       nonnegative: whether it must be at least 0.
       held: whether tuning keeps it as it is: an initial value, an exponent, a table's size, a processor's range.
+      over: name of the gain that the law divides it by, b of the force k / b. Tuning then takes no k above u_max b.
     """
 
     default: float
@@ -61,6 +62,7 @@ class Gain:
     positive: bool = False
     nonnegative: bool = False
     held: bool = False
+    over: str | None = None
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit for these values of all gains."""

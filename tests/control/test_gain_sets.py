@@ -49,6 +49,19 @@ def test_no_force_among_the_gains_is_more_than_the_actuator_gives():
             assert all(found.gains[gain] <= found.scales["F"] * (1.0 + 1e-3) for gain in forces), found
 
 
+@pytest.mark.parametrize(("gain_set", "plant", "seed"), TUNINGS)
+def test_no_gain_over_another_is_more_than_the_actuator_gives(gain_set, plant, seed):
+    """The force k / b of the observers' laws is bounded as every force is."""
+    divided = 0
+    for found in shipped(gain_set, plant, seed):
+        for name, gain in found.law.template.gains.items():
+            if gain.over is not None:
+                force = found.gains[name] / found.gains[gain.over]
+                assert force <= found.scales["F"] * (1.0 + search_space.ROUNDING), found
+                divided += 1
+    assert divided
+
+
 def test_a_law_with_a_wider_budget_than_its_rivals_is_refused():
     fair = shipped("tuned", "duffing")[:3]
     favoured = dataclasses.replace(fair[0], budget=512)

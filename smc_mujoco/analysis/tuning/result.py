@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective, described
-from smc_mujoco.analysis.tuning.search_space import DECADES, Box, at_bound, box
+from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, write_json
 from smc_mujoco.common.version import __version__
@@ -93,8 +93,17 @@ class Tuned:
 
     @property
     def at_bound(self) -> dict[str, str]:
-        """Gains that are within 2 % of a bound they were searched in -> "lower" or "upper"."""
-        return at_bound(self.gains, self.searched)
+        """Gains that are within 2 % of a bound they were searched in, or all the actuator gives: "lower" or "upper"."""
+        return at_bound(self.gains, self.searched) | {
+            name: "upper" for name, most in self._largest.items() if self.gains[name] >= most * (1.0 - ROUNDING)
+        }
+
+    @property
+    def _largest(self) -> dict[str, float]:
+        """Return the most that the actuator gives of gains that the law divides by another one."""
+        u_max = self.definition.u_max
+        found = largest(self.law, self.law.gains, math.inf if u_max is None else u_max)
+        return {name: most for name, most in found.items() if name in self.bounds}
 
     @property
     def widened(self) -> list[str]:
@@ -193,6 +202,10 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
+        for gain, most in one._largest.items():
+            if one.gains[gain] > most * (1.0 + ROUNDING):
+                pair = f"{one.law.name}'s {gain} is {one.gains[gain]:g}, and its actuator gives {most:g}"
+                raise ScenarioError(f"laws tuned beyond their actuator cannot be compared, {pair}: tune them alike")
     return sorted(tuned, key=lambda one: one.objective)
 
 

@@ -100,7 +100,7 @@ def tune(
     start = search_space.box(law, scales)
     before = goal.terms(run(cases, threads))
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
-        ledger = _Ledger(goal, cases, tuple(start), budget, threads, drawn.advance)
+        ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
         box = _search(ledger, start, seed)
     best = min(ledger.finals, key=lambda e: e.objective)
     return Tuned(
@@ -133,11 +133,12 @@ class _Ledger:
         goal: Objective,
         cases: Sequence[Scenario],
         names: tuple[str, ...],
+        u_max: float,
         budget: int,
         threads: int | None,
         report: Report,
     ):
-        self.goal, self.cases, self.names = goal, cases, names
+        self.goal, self.cases, self.names, self.u_max = goal, cases, names, u_max
         self.cheap = [_cheap(case) for case in cases]
         self.budget, self.threads, self.report = budget, threads, report
         self.evaluations: list[Evaluation] = []
@@ -151,7 +152,7 @@ class _Ledger:
 
     def costs(self, logs: np.ndarray) -> np.ndarray:
         """Return J of candidates given as columns of log10 gains (gains, candidates)."""
-        asked = [tuple(float(f"{10.0**z:.{DIGITS}g}") for z in column) for column in logs.T.tolist()]
+        asked = [self.gains(column) for column in logs.T.tolist()]
         new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
         left = self.budget - len(self.evaluations)
         found = self.evaluate(new[:left], self.cheap)
@@ -161,6 +162,13 @@ class _Ledger:
         if len(new) >= left:
             raise _Spent
         return np.array([self.known[gains] for gains in asked])
+
+    def gains(self, logs: Sequence[float]) -> tuple[float, ...]:
+        """Return the gains of a candidate, none of them above what the actuator can give, see `search_space`."""
+        found = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
+        for name, most in search_space.largest(self.cases[0].law, found, self.u_max).items():
+            found[name] = min(found[name], _rounded(most))
+        return tuple(found.values())
 
     def decide(self, count: int) -> None:
         """Run the best of the first candidates accurately, as many as a stage has finalists."""
@@ -184,6 +192,11 @@ class _Ledger:
             )
             for gains, (tracking, variation) in zip(candidates, terms, strict=True)
         ]
+
+
+def _rounded(gain: float) -> float:
+    """Return a gain as it is printed."""
+    return float(f"{gain:.{DIGITS}g}")
 
 
 def _cheap(case: Scenario) -> Scenario:

@@ -9,6 +9,11 @@ The plant gives four scales, and they give every gain its own:
 
 A gain with the unit of F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a
 force by itself, such as lambda of -lambda tanh(s), is searched up to F: what the actuator cannot give is not a gain.
+A gain that the law divides by another one, such as k of the force k / b where b is the law's own guess of g, is
+bounded in the same way: k at most u_max b, for the b of each candidate. The law says so, `Gain(2.0, ACCELERATION,
+over="b")`. A law that has the model divides by the plant's g instead: its k is stated as a force and searched up to
+F = u_max / M. Gains k and b are tuned without the model, and with it, where g is less than b, k / g may be more.
+
 A law states the unit of each gain where it states the gain, and which gains are held at the value the law came with:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
@@ -37,6 +42,7 @@ from smc_mujoco.mechanisms.plant import Plant
 DECADES = 1.5  # chosen: to either side of a scale; a factor 1000 in all
 NEAR = 0.02  # of a bound's range in log space: as near counts as being at the bound
 WIDENING = 1.0  # decades
+ROUNDING = 1e-3  # of a gain: twice what four digits may add to it
 
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
 
@@ -125,6 +131,13 @@ def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
         if min(place, 1.0 - place) <= NEAR:
             found[name] = "lower" if place < 0.5 else "upper"
     return found
+
+
+def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
+    """Return the most that the actuator can give of each gain that the law divides by another one: u_max b of k / b."""
+    known = law.template.gains if law.template else {}
+    values = {**law.gains, **gains}
+    return {name: u_max * values[gain.over] for name, gain in known.items() if gain.over is not None}
 
 
 def movable(law: Component, sides: Mapping[str, str]) -> dict[str, str]:

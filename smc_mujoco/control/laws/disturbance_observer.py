@@ -21,7 +21,7 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 @law_function(
     gains={
-        "k": Gain(2.0, ACCELERATION, nonnegative=True),
+        "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
         "c": Gain(2.5, RATE, nonnegative=True),
         "l": Gain(20.0, RATE, positive=True),
         "b": Gain(3.0, INPUT_GAIN, positive=True),

@@ -124,6 +124,24 @@ def test_a_force_is_searched_up_to_what_the_actuator_gives_and_no_further():
     assert search_space.movable(smc.law("observer_free"), {"lam": "lower"}) == {"lam": "lower"}
 
 
+@pytest.mark.parametrize("law", ["extended_state", "disturbance_observer"])
+def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law):
+    tuned = tune("duffing", law, budget=STAGE, objective=LEAN)
+    order = list(tuned.bounds)
+    forces = [e.gains[order.index("k")] / e.gains[order.index("b")] for e in tuned.history]
+    assert 5.0 < max(forces) <= 6.0 * (1.0 + search_space.ROUNDING)
+    assert sum(force > 6.0 * (1.0 - search_space.ROUNDING) for force in forces) > 3
+    beyond = dataclasses.replace(tuned, law=dataclasses.replace(tuned.law, gains={**tuned.law.gains, "k": 1e3}))
+    assert beyond.at_bound["k"] == "upper"
+    with pytest.raises(smc.ScenarioError, match="beyond their actuator"):
+        compare([tuned, beyond])
+
+
+def test_a_gain_is_divided_by_one_that_the_law_has():
+    with pytest.raises(smc.ScenarioError, match="gain that k is divided by 'B'"):
+        smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(lambda y, gains, memory: (0.0, 0.0))
+
+
 def test_what_is_held_keeps_the_value_it_came_with():
     tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=5, objective=LEAN)
     assert tuned.law.gains["k0"] == 1.25
