@@ -284,8 +284,7 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
     """Return the Template of a function, or the decorator that makes it where no function is given yet.
 
     Raises:
-      TypeError: an option that this kind of component does not have.
-      ScenarioError: an option out of its range.
+      ScenarioError: an option that this kind of component does not have, or one out of its range.
     """
     options = dict(options)
     for old, new in RENAMED.items():
@@ -293,7 +292,7 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
             warnings.warn(f"{kind}_function's {old} is now {new}: write that", DeprecationWarning, users_frame())
             options[new] = options.pop(old)
     if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
-        raise TypeError(f"{kind}_function() got an unexpected keyword argument {min(foreign)!r}")
+        raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind].__optional_keys__)
     decorate = template(kind, **options)
     return decorate if function is None else decorate(function)
 

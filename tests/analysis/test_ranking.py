@@ -584,6 +584,7 @@ STIFF = smc.plant("duffing", beta=5.0)
 )
 def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
     given = {"plants": "duffing", "conditions": smc.condition("worn", friction=smc.Coulomb(0.05)), "duration": 1.0}
+    given |= {"gains": "default"}
     for law, fields, refused in (("pid", {}, False), ("pid", changed, True)):
         runs = smc.grid(**(given | {"laws": "classical"})) + smc.grid(**(given | fields | {"laws": law}))
         rows = [run_key.row(s) for s in runs]

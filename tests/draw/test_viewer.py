@@ -143,7 +143,7 @@ def test_in_pause_nothing_moves_and_nothing_is_lost(shown):
         view.frame(viewer, FRAME)
     after = view.step, view.loop.data.qpos, view.loop.log, view.data.time
     for one, other in zip(before, after, strict=True):
-        np.testing.assert_array_equal(one, other)
+        assert np.asarray(one).tobytes() == np.asarray(other).tobytes()
     assert "paused" in viewer.texts[-1]
     assert "paused" not in viewer.texts[0]
     view.key(live.SPACE)

@@ -531,6 +531,7 @@ WILD = """
 import json, math, warnings
 import smc_mujoco as smc
 warnings.simplefilter("ignore", smc.PlainLoopWarning)
+warnings.simplefilter("ignore", smc.ScenarioWarning)
 def law(function):
     return smc.law_function()(function)()
 def run(law, **fields):

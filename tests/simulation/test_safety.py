@@ -395,7 +395,7 @@ def test_a_run_is_the_first_thing_in_a_process_with_a_callback_of_its_own_and_pu
 LARGE = [
     scenario(made(lambda y, gains, memory: (0.0, 0.0), memory=10_000), plant=smc.plant("pendulum_network", n=50)),
     scenario(disturbance=[smc.OrnsteinUhlenbeck(0.1, 0.1)] * 40, plant=smc.plant("pendulum_network", n=50)),
-    scenario(input_delay=1.0, duration=2.0, plant=smc.plant("pendulum_network", n=20)),
+    scenario(input_delay=0.9, duration=2.0, plant=smc.plant("pendulum_network", n=20)),
     scenario(velocity=smc.estimator_function(memory=5000)(lambda y, gains, memory: y.v)()),
     scenario(duration=10.0),
 ]
