@@ -54,6 +54,7 @@ def test_no_gain_over_another_is_more_than_the_actuator_gives(gain_set, plant, s
     """The force k / b of the observers' laws is bounded as every force is."""
     divided = 0
     for found in shipped(gain_set, plant, seed):
+        assert found.law.template is not None
         for name, gain in found.law.template.gains.items():
             if gain.over is not None:
                 force = found.gains[name] / found.gains[gain.over]
