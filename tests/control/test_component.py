@@ -31,9 +31,9 @@ def test_old_word_works_with_a_deprecation_warning(old, value, new):
 
 
 @pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
-def test_option_of_no_such_component_is_a_type_error(decorator):
+def test_option_of_no_such_component_is_one_sentence(decorator):
     option = "colours" if decorator is smc.law_function else "plants"
-    with pytest.raises(TypeError, match=option):
+    with pytest.raises(smc.ScenarioError, match=f"unknown option of .*{option}"):
         decorator(**{option: ()})
 
 

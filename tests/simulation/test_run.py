@@ -536,7 +536,7 @@ def law(function):
     return smc.law_function()(function)()
 def run(law, **fields):
     return smc.run(smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields))
-for factor in (1e-300, 1e-30, 1e-16, 1e30, 1e308):
+for factor in (1e-300, 1e-30, 1e-16, 1e15):  # beyond 1e15 a parameter is refused
     run("none", mismatch={"mass": factor})
     run("none", jump=smc.Jump(0.01, {"mass": factor}))
     run(law(lambda y, gains, memory: (float(json.dumps(y.t)), 0.0)), mismatch={"mass": factor})

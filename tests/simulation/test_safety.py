@@ -918,7 +918,8 @@ print(made.cache_hits)
 def hits(folder: Path) -> str:
     """How often a new process takes the compiled function from the cache in a folder, "0" or "1"."""
     (folder / "added.py").write_text("def added(x):\n    return x + 2.0\n")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), str(folder)])}
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment["PYTHONPATH"] = os.pathsep.join([str(PACKAGE.parent), str(folder)])
     done = subprocess.run(
         [sys.executable, "-c", FRESH], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
