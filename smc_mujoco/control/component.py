@@ -335,7 +335,7 @@ def template(
         name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
-        except TypeError as error:
+        except (TypeError, ValueError) as error:  # ValueError: a builtin without a signature
             raise ScenarioError(f"{kind} {name!r} takes (y, gains, memory): {error}") from None
         return Template(
             kind=kind,

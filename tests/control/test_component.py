@@ -41,3 +41,8 @@ def test_option_of_no_such_component_is_one_sentence(decorator):
 def test_word_that_cannot_be_drawn_is_refused(option):
     with pytest.raises(smc.ScenarioError, match=next(iter(option))):
         smc.law_function(**option)
+
+
+def test_builtin_without_a_signature_is_refused():
+    with pytest.raises(smc.ScenarioError, match=r"law 'type' takes \(y, gains, memory\)"):
+        smc.law_function()(type)
