@@ -170,7 +170,9 @@ def still(
 def clock(traces: Trace | Sequence[Trace], fps: float) -> np.ndarray:
     """The times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
     traces = style.same_plant(traces)
-    fps = number("fps", fps, least=1.0, most=120.0)
+    fps = number("fps", fps)
+    if not 1.0 <= fps <= 120.0:
+        raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
     return np.arange(int(end(traces) * fps + 1e-6) + 1) / fps
 
 
