@@ -12,7 +12,7 @@ chosen.
     swing_up      1 - cos x of toppling hinges, x of others  x'                 hanging within 0.1 rad, 0 in others
     synchronise   x - the channels' mean                     x' - its mean      the largest of the plant's x0
 
-and within the ranges of the joints, which a model of yours may have.
+In a model of yours whose joints have ranges, starts also lie within these.
 """
 
 import functools

@@ -105,7 +105,11 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return self.observe(), {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Take one control period of every copy, or start it anew; return its observations, rewards, ends and infos."""
+        """Move every copy on by one control period, and start those anew whose episode is over.
+
+        Returns:
+          Observations, rewards, terminated, truncated and infos, as gymnasium has them.
+        """
         if not self.randoms:
             raise ScenarioError("these environments have not begun: call reset first")
         anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
@@ -130,7 +134,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return observations, rewards, terminated, truncated, infos
 
     def begin(self, which: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
-        """Start the copies in `which`, (num_envs,) of bool, anew."""
+        """Begin new episodes of the copies where `which`, (num_envs,) of bool, is true."""
         ids = np.flatnonzero(which)
         with callback.uninstalled():
             self.batch.reset(ids.astype(np.int32), stage=0)

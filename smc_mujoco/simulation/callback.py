@@ -3,8 +3,8 @@
     with installed():
         batch.step(nstep=1000)
 
-The callback is global to the process: `installed` holds a lock, and puts back what was there before. Simulations
-whose userdata hold no record of ours are left alone.
+The callback is global to the process: `installed` holds a lock, and puts back what was there before. The callback does
+nothing in simulations of others: it knows ours by the magic number in their userdata.
 """
 
 # pyright: reportCallIssue=false

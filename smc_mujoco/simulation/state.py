@@ -100,17 +100,18 @@ def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
     return tuple(
         values.get(name, 0) if (kind := dtype[name]).names is None else as_tuple(kind, values.get(name, {}))
         for name in dtype.names or ()
-        if name != "unused"
-    ) + ((np.zeros(8),) if "unused" in (dtype.names or ()) else ())
+    )
 
 
 class Buffer:
-    """Float64 numbers in one array, whose parts are addressed before it is made.
+    """Float64 numbers for one array. A part has a place at once, and an address once the array is made.
 
-    buffer = Buffer()
-    gains = buffer.put([6.0, 3.0])      # a place
-    array = buffer.array()
-    buffer.address(gains)               # where the gains lie, as long as `array` lives
+    In use:
+
+        buffer = Buffer()
+        gains = buffer.put([6.0, 3.0])      # a place
+        array = buffer.array()
+        buffer.address(gains)               # where the gains lie, as long as `array` lives
     """
 
     def __init__(self) -> None:

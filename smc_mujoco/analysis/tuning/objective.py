@@ -49,7 +49,8 @@ class Objective:
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
-      u_max: bound on |u| of every law, N or N m; None: as in a grid, 6 or what the motors of a model of yours give.
+      u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or what the strongest motor gives
+        where the plant is a model of yours.
 
     Raises:
       ScenarioError: an unknown condition, or a number out of its range.
