@@ -1,10 +1,12 @@
 """Integral-chain differentiator: x1' = x2, x2' = x3, x3' = -w^3 (x1 - x) - 3 w^2 x2 - 3 w x3; gives (x2, x3).
 
-The reading enters only the last of three integrators, so noise is smoothed before it reaches the velocity x2, where an
-observer corrects every state by it. The price is a lag: x2 is x' behind w^3 / (p + w)^3, late by 3 / w. White noise
-passes to x2 with the gain sqrt(h w^3) / 4 and to x3 with sqrt(3 h w^5) / 4, for small w h. All poles at -w [rad/s]: the
-source's epsilon is 1 / w, its coefficients 1, 3, 3. Steps are exact for readings joined by straight lines: the matrix
-exponential of a triple pole is exp(-w h) (1 + N h + N^2 h^2 / 2), N = A + w. Starts from the first reading, at rest.
+The reading enters only the last of three integrators, so noise is smoothed before it reaches the velocity x2. An
+observer corrects every state by the reading instead. The price is a delay: x2 is x' filtered by w^3 / (p + w)^3, 3 / w
+late. For small w h, white noise passes to x2 with the gain sqrt(h w^3) / 4 and to x3 with sqrt(3 h w^5) / 4. All poles
+are at -w; in the source epsilon is 1 / w and the coefficients are 1, 3, 3. The discretisation is exact for readings
+joined by straight lines: the matrix exponential of a triple pole is exp(-w h) (1 + N h + N^2 h^2 / 2) with N = A + w.
+It starts from the first reading, at rest.
+Gains: w, bandwidth [1/s].
 Source: J. Liu & X. Wang, Advanced Sliding Mode Control for Mechanical Systems, Springer 2012, section 8.5, eq. 8.37.
 """
 
@@ -20,7 +22,7 @@ def integral_chain(y, gains, memory):
     if memory[0] == 0.0:
         memory[0], memory[1], memory[4] = 1.0, y.x, y.x
     slope = (y.x - memory[4]) / h
-    # from where the chain would be behind an endless ramp: (x - 3 slope / w, slope, 0)
+    # deviation from the steady state on a ramp, (x - 3 slope / w, slope, 0)
     p, v, a = memory[1] - memory[4] + 3.0 * slope / w, memory[2] - slope, memory[3]
     n1, n2, n3 = w * p + v, w * v + a, -(w**3) * p - 3.0 * w * w * v - 2.0 * w * a  # N (p, v, a)
     m1, m2, m3 = w * n1 + n2, w * n2 + n3, -(w**3) * n1 - 3.0 * w * w * n2 - 2.0 * w * n3

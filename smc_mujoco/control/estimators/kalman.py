@@ -2,11 +2,12 @@
 
     predict z = (1, h, h^2/2; 0, 1, h; 0, 0, 1) z;  z += (alpha, beta / h, 2 gamma / h^2) (x - z_1);  gives (z_2, z_3)
 
-The linear estimator of least variance for that model. Its gains in closed form: the innovation's spectrum times |z-1|^6
-is P(z) P(1/z) = m^3 + lam (1 - m/4 + m^2/120) up to a factor, with m = 2 - z - 1/z and lam = q h^5 / sigma^2; the roots
-of P are the three inside the unit circle, and P(z) = (z-1)^3 + alpha (z-1)^2 + beta z (z-1) + gamma z (z+1). For small
-h they lie on a circle of radius (q / (sigma^2 h))^(1/6) rad/s, 100 for the defaults at 1 ms. Exact on parabolas once
-they are forgotten. sigma [m or rad], q [(m/s^3)^2 s]: only q / sigma^2 matters. Starts from the first reading, at rest.
+This is the linear estimator of least variance for that model. Its gains have a closed form. The innovation's spectrum
+times |z-1|^6 is, up to a factor, P(z) P(1/z) = m^3 + lam (1 - m/4 + m^2/120) with m = 2 - z - 1/z and lam = q h^5 /
+sigma^2. The roots of P are the three roots inside the unit circle, and P(z) = (z-1)^3 + alpha (z-1)^2 + beta z (z-1) +
+gamma z (z+1). For small h they lie on a circle of radius (q / (sigma^2 h))^(1/6) rad/s, 100 for the defaults at 1 ms.
+Parabolas are tracked exactly once the start has decayed. The filter starts from the first reading, at rest.
+Gains: sigma, noise of the reading [m]; q, density of the jerk [(m/s^3)^2 s]. Only q / sigma^2 matters.
 Sources: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82(1):35, 1960; P.
 Kalata, "The tracking index: a generalized parameter for alpha-beta and alpha-beta-gamma target trackers", IEEE Trans.
 Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index); the factorisation is worked out here.
@@ -27,12 +28,12 @@ def kalman(y, gains, memory):
     if memory[0] == 0.0:
         memory[0], memory[1] = 1.0, y.x
         lam = gains.q * h**5 / gains.sigma**2
-        # m = -c, the negative root: Newton falls on it from a bound above, where the cubic is convex
+        # m = -c, the negative root, by Newton's method from an upper bound, where the cubic is convex
         c = lam / 120.0 + (lam / 4.0) ** 0.5 + lam ** (1.0 / 3.0)
         for _ in range(20):
             c -= (c**3 - lam * (1.0 + c / 4.0 + c * c / 120.0)) / (3.0 * c * c - lam * (0.25 + c / 60.0))
         p = 1.0 + c / 2.0 - (c + c * c / 4.0) ** 0.5
-        # the others: m^2 - (c - lam / 120) m + lam / c
+        # the other roots: m^2 - (c - lam / 120) m + lam / c
         half = (c - lam / 120.0) / 2.0
         root = cmath.sqrt(half * half - lam / c)
         at_zero, at_one, at_minus = -p, 1.0 - p, -1.0 - p

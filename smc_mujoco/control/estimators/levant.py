@@ -2,18 +2,21 @@
 
     z_i' = -m_i L^((i+1)/(n+1)) [z_0 - x]^((n-i)/(n+1)) + z_(i+1), i = 0 .. n, z_(n+1) = 0;  gives (z_1, z_2)
 
-Exact after finite time where |d^(n+1) x / dt^(n+1)| <= L; sampled, the error of z_i is O(L h^(n+1-i)), and under noise
-|eta| <= eps O(L^(i/(n+1)) eps^((n+1-i)/(n+1))): the best order possible. m of n = 1: 1.5, 1.1; 2: 2, 2.12, 1.1;
-3: 3, 4.16, 3.06, 1.1, those of the recursive form with 1.1, 1.5, 2, 3. Explicit Euler steps, with the Taylor terms
-h^j z_(i+j) / j! without which n >= 2 loses its orders. What is given is the z of the sample's time, from the samples
-before. The default L follows a rule that looks at no run: the largest jerk of an actuator with the lag tau that turns
-from -U to U, 2 g U / tau, with U = 6, g = 8 of the study's lightest plants and tau = 20 ms, the lag of its realistic
-conditions. Less loses what is rougher, more costs noise. At a control period of 20 ms its O(L h^2) is several units:
-take less there. Where the acceleration is used, L should be little above the plant's own largest jerk.
-Starts from the first reading, at rest; with n = 1 the acceleration given is 0.
-Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (n = 1);
-A. Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control 76(9):924, 2003;
-M. Livne & A. Levant, "Proper discretization of homogeneous differentiators", Automatica 50(8):2007, 2014.
+The estimates are exact after a finite time if |d^(n+1) x / dt^(n+1)| <= L. Sampled, the error of z_i is O(L h^(n+1-i)).
+Under noise |eta| <= eps it is O(L^(i/(n+1)) eps^((n+1-i)/(n+1))), the best possible order. The coefficients m are 1.5,
+1.1 for n = 1; 2, 2.12, 1.1 for n = 2; 3, 4.16, 3.06, 1.1 for n = 3: those of the recursive form with 1.1, 1.5, 2, 3.
+Integrated by explicit Euler steps with the Taylor terms h^j z_(i+j) / j!, without which n >= 2 loses its accuracy. The
+output is z before the update by the current sample. With n = 1 the acceleration is 0. It starts from the first reading,
+at rest.
+
+The default L is computed, not tuned: the largest jerk of an actuator with the lag tau that reverses from -U to U, 2 g U
+/ tau, for U = 6, g = 8 of the study's lightest plants and tau = 20 ms, the lag of its realistic conditions. A smaller L
+fails on rougher signals, a larger one amplifies noise. At a control period of 20 ms the error O(L h^2) is several
+units, so choose a smaller L there. If the acceleration is used, L should be little above the plant's own largest jerk.
+Gains: L, bound on the derivative of order n + 1 [m/s^(n+1)]; order, n.
+Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (n = 1); A.
+Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control 76(9):924, 2003; M.
+Livne & A. Levant, "Proper discretization of homogeneous differentiators", Automatica 50(8):2007, 2014.
 """
 
 import math
@@ -26,7 +29,7 @@ from smc_mujoco.control.units import Gain, Unit
 
 @njit
 def correction(a, p, m, L, share):
-    """-m L^share [a]^p; for p = 0 the sign of a."""
+    """Return -m L^share [a]^p, where [a]^0 is the sign of a."""
     if a == 0.0:
         return 0.0
     return -math.copysign(m * L**share * abs(a) ** p, a)

@@ -3,10 +3,11 @@
     velocity = sum_i c_i x_i,  c_i = sum_m p_m(t_i) p_m'(t_N) / |p_m|^2,  m = 0 .. degree;  acceleration with p_m''
 
 p_m are the polynomials orthogonal on the window's N samples (Gram's): p_(m+1) = t p_m - b_m p_(m-1), |p_m|^2 = N b_1 ..
-b_m, b_m = m^2 (N^2 - m^2) / (4 (4 m^2 - 1)). Exact on polynomials of its degree once they fill the window; on smooth
-signals the velocity's error is O(h^degree). White noise of x passes with the gain |c|, for degree 2
-sqrt(12 (2N-1) (8N-11) / (N (N^2-1) (N^2-4))) / h. Before the window is full, the first reading stands for those before.
-Window and degree are rounded down, and kept within 2 .. 128 and 1 .. window - 1.
+b_m, b_m = m^2 (N^2 - m^2) / (4 (4 m^2 - 1)). Polynomials of this degree are exact once they fill the window. On smooth
+signals the error of the velocity is O(h^degree). White noise of x passes with the gain |c|, for degree 2 sqrt(12 (2N-1)
+(8N-11) / (N (N^2-1) (N^2-4))) / h. Until the window is full, the first reading fills it. Window and degree are rounded
+down, and limited to 2 .. 128 and 1 .. window - 1.
+Gains: window, number of readings; degree, of the polynomial.
 Sources: A. Savitzky & M. Golay, "Smoothing and differentiation of data by simplified least squares procedures", Anal.
 Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing and differentiation by the convolution
 (Savitzky-Golay) method", Anal. Chem. 62(6):570, 1990 (Gram polynomials, end points).
@@ -15,9 +16,7 @@ Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing and different
 from smc_mujoco.control.estimator import estimator_function
 from smc_mujoco.control.units import Gain
 
-MOST = 128  # readings that the memory holds
-
-
+MOST = 128  # readings in memory
 FITS = {
     f"whole numbers, a window of 2 to {MOST} and a degree of 1 to window - 1, else the nearest": lambda g: (
         g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MOST
@@ -40,7 +39,8 @@ def savitzky_golay(y, gains, memory):
         for i in range(N):
             memory[readings + i] = y.x
             t, norm, b = i - end, float(N), 0.0
-            p, p_, q, q_, dq, dq_, ddq, ddq_ = 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0  # p at t; q, q', q'' at the end
+            # p at t; q, q', q'' at the end; with _ those of degree m - 1
+            p, p_, q, q_, dq, dq_, ddq, ddq_ = 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for m in range(1, degree + 1):
                 p, p_ = t * p - b * p_, p
                 ddq, ddq_ = end * ddq + 2.0 * dq - b * ddq_, ddq
@@ -55,7 +55,7 @@ def savitzky_golay(y, gains, memory):
     memory[1] = (newest + 1) % N
     v, a = 0.0, 0.0
     for i in range(N):
-        x = memory[readings + (newest + 1 + i) % N] - y.x  # a constant has no derivative: less rounding
+        x = memory[readings + (newest + 1 + i) % N] - y.x  # less rounding: a constant has no derivative
         v += memory[velocities + i] * x
         a += memory[accelerations + i] * x
     return v / y.dt, a / y.dt**2

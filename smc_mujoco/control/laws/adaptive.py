@@ -1,7 +1,9 @@
 """Adaptive gain: u = -K sgn(s), K' = gamma |s|, K(0) = k0, s = de + c e.
 
-With V = s^2/2 + (K - k*)^2 / (2 gamma) the bound k* on the matched force need not be known; but K only grows, so noise
-and sampling wind it up without end (adaptive_leak mends that). K is integrated by the explicit Euler rule.
+K grows until it exceeds the matched disturbance, so a bound k* on the disturbance need not be known. The proof uses V =
+s^2/2 + (K - k*)^2 / (2 gamma). K never falls, so noise and sampling make it grow without limit; `adaptive_leak`
+prevents this. K is integrated by the explicit Euler method.
+Gains: gamma, adaptation rate [N/m]; c, slope of the surface [1/s]; k0, initial K [N].
 Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; Plestan, Shtessel, Bregeault & Poznyak,
 "New methodologies for adaptive sliding mode control", Int. J. Control 83(9):1907, 2010.
 """

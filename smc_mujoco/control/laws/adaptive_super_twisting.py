@@ -1,9 +1,11 @@
 """Adaptive super-twisting: u = -K [s]^(1/2) + w, w' = -2 eps K sgn(s), K' = rate sgn(|s| - mu) while K >= least.
 
-K(0) = k0; below `least`, K' = rate. K grows outside the layer |s| <= mu and falls inside, so that neither the bound
-nor the slope of d need be known: |s| ends in a layer of the order of mu, and K at about what d asks for. `rate` is the
-source's w1 sqrt(g1/2). Explicit Euler rule for w and K. A start beyond mu makes K grow all the way: mu too small for
-the noise or the period, and it grows without end.
+K starts at k0. Below `least`, K' = rate. K grows outside the layer |s| <= mu and falls inside it, so neither a bound on
+d nor a bound on d' need be known. |s| ends in a layer of the order of mu, with K about as large as d requires. If s
+starts outside the layer, K grows until s is inside. If mu is too small for the noise or the control period, K grows
+without limit. w and K are integrated by the explicit Euler method.
+Gains: rate, of K, w1 sqrt(g1/2) in the source [N m^-1/2 s^-1/2]; eps, ratio of the two gains [m^1/2 s^-3/2]; mu,
+half-width of the layer [m/s]; least and k0, of K [N (s/m)^1/2]; c, slope of the surface [1/s].
 Source: Y. Shtessel, M. Taleb & F. Plestan, "A novel adaptive-gain supertwisting sliding mode controller: methodology
 and application", Automatica 48(5):759, 2012 (its beta is 2 eps K; the conference version halves it).
 """

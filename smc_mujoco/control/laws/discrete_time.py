@@ -1,10 +1,11 @@
 """Discrete-time sliding mode: u = -k sat((s / dt + d_) / k), d_ = (s - s_) / dt - u_; s = de + c e, _ a sample earlier.
 
-d_ is the mean disturbance of the last period, exactly, and is taken for that of the next: s+ = dt (d - d_) in one
-sample where |u| < k (deadbeat). For |d'| <= L the residual is |s| <= dt^2 L, of second order, and u does not chatter.
-What d_ is subtracted from is the u that was held, k or the actuator's bound, so nothing winds up. It needs to know g:
-d_ holds (g - 1) u_ as well, and the linear loop z^2 + 2 (g - 1) z + 1 - g is stable for 0 < g < 4/3 only; beyond, u
+d_ is the exact mean disturbance of the last period, used as a prediction for the next. If |u| < k, s+ = dt (d - d_)
+after one sample (deadbeat). For |d'| <= L the residual is |s| <= dt^2 L, of second order, without chattering. u_ is the
+saturated command, limited by k and by the actuator's bound, so nothing winds up. The law needs to know g, because d_
+contains (g - 1) u_ too: the linear loop z^2 + 2 (g - 1) z + 1 - g is stable only for 0 < g < 4/3. For larger g, u
 swings between its bounds.
+Gains: k, bound of u [N]; c, slope of the surface [1/s].
 Source: W.-C. Su, S. V. Drakunov & U. Ozguner, "An O(T^2) boundary layer in sliding mode for sampled-data systems", IEEE
 Trans. Autom. Control 45(3):482, 2000 (law and order); V. Utkin & S. Drakunov, "On discrete-time sliding modes", IFAC
 Nonlinear Control Systems Design 1989 (bounded u); the condition on g: Jury's, derived here.

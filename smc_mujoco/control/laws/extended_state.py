@@ -2,13 +2,15 @@
 
     z1' = z2 + 3 w (e - z1);  z2' = z3 + b u + 3 w^2 (e - z1);  z3' = w^3 (e - z1)
 
-d = e'' - b u is everything but b u: friction, coupling, gravity, an input gain g other than b, the reference. Where
-|d'| <= J, |d - z3| <= 3 J / w in the end (continuous time, b = g), and k above that, not above |d|, keeps s = 0: so k,
-and with it the chattering k h, may be small. Model-free b is a gain, and the loop of z3 by itself stays stable for
-0 < g / b < 9 at small w h, 6.6 at w h = 0.8, 3.9 at 2; with the model b = g, and f and r'' are told to the observer and
-fed forward, so that d is what the model misses. The u in it is the one after saturation, so z3 does not wind up.
-Observer discretised exactly in its poles, all at exp(-w h), for u held over the period. It needs e of relative degree
-2, and so takes no surface. Default b: chosen between the 1 / kg and 8 / (kg m^2) of the plants.
+d = e'' - b u is the total disturbance: friction, coupling, gravity, the reference, and an input gain g other than b. If
+|d'| <= J and b = g, then |d - z3| <= 3 J / w in the end (continuous time). k has to exceed only this error, not |d|, to
+keep s = 0, so k can be small, and the chattering k dt with it. Without the model b is a gain, and the loop of z3 alone
+is stable for 0 < g / b < 9 at small w dt, 6.6 at w dt = 0.8, 3.9 at 2. With the model b = g, and f and r'' are known to
+the observer and fed forward, so d is the error of the model. The observer uses u after saturation, so z3 does not wind
+up. It is discretised exactly for u constant over the period, with all poles at exp(-w dt). It needs e of relative
+degree 2, so the law takes no surface.
+Gains: k, switching gain [m/s^2]; c, slope of the surface [1/s]; w, bandwidth of the observer [1/s]; b, assumed input
+gain [1/kg], by default between the 1 / kg and 8 / (kg m^2) of the plants.
 Sources: J. Han, "From PID to active disturbance rejection control", IEEE Trans. Ind. Electron. 56(3):900, 2009
 (observer); Z. Gao, "Scaling and bandwidth-parameterization based controller tuning", American Control Conference 2003
 (poles); R. Miklosovic, A. Radke & Z. Gao, "Discrete implementation and generalization of the extended state observer",
@@ -35,8 +37,8 @@ def extended_state(y, gains, memory):
     h, p = y.dt, math.exp(-gains.w * y.dt)
     b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
     if memory[0] == 0.0:
-        memory[0], memory[1], memory[2] = 1.0, y.e - y.dt * y.de, y.de  # so that the first prediction is what is read
-    # memory: started, z1, z2, z3, and the acceleration b u + f - r'' of the period that ends now
+        memory[0], memory[1], memory[2] = 1.0, y.e - y.dt * y.de, y.de  # the first prediction is the reading
+    # memory: started, z1, z2, z3, and the acceleration b u + f - r'' of the last period
     push = memory[3] + memory[4]
     z1, z2 = memory[1] + h * memory[2] + h * h / 2.0 * push, memory[2] + h * push
     miss = y.e - z1

@@ -1,25 +1,28 @@
 """Hierarchical: u = (a g u1 + gq u2 - k sgn(S) - rate S) / (a g + gq), S = a s1 + s2, s1 = de + c1 e, s2 = dq + c2 q.
 
-For a joint e'' = f + g u - r'' that has an actuator and a joint q'' = fq + gq u that moves with it and has none. Each
-would stay on its own surface under u1 = (r'' - f - c1 de) / g and u2 = (-fq - c2 dq) / gq; the law mixes the two, so
-that S' = -k sgn(S) - rate S. While u is not at its bound, S = 0 from ln(1 + rate |S(0)| / k) / rate on, and it stays
-there against a matched force d with |(a g + gq) d| < k; a larger one leaves |S| <= (|(a g + gq) d| - k) / rate.
-Sampled explicitly, S chatters within about k dt. It has the model by default; s1 may be the scenario's surface instead.
+For a joint with an actuator, e'' = f + g u - r'', that moves a joint without one, q'' = fq + gq u. Under u1 = (r'' - f
+- c1 de) / g the first joint stays on its surface, under u2 = (-fq - c2 dq) / gq the second. The law mixes the two so
+that S' = -k sgn(S) - rate S. While u is not saturated, S = 0 from the time ln(1 + rate |S(0)| / k) / rate on, and stays
+0 under a matched disturbance d with |(a g + gq) d| < k. A larger one leaves |S| <= (|(a g + gq) d| - k) / rate. Sampled
+explicitly, S chatters within about k dt. A scenario gives this law the nominal model by default. s1 may be the
+scenario's surface instead.
 
-On S = 0 what is left must bring both joints in. Its authors conclude so from V = S^2/2 by Barbalat's lemma, which gives
-no more than S -> 0; to first order, without friction, it holds just if the roots p of
+The motion on S = 0 must bring both joints to rest. The authors conclude this from V = S^2/2 by Barbalat's lemma, which
+proves only S -> 0. To first order, without friction, both joints come to rest if and only if the roots p of
 
     (1 - a L) p^3 + (c2 - a L c1) p^2 + a grav p + a c1 grav = 0,    L = 4 l/3 for cart_pole, -l for overhead_crane
 
-lie on the left (x + L q is a flat output: its second derivative is grav q). With a > 0 that is 0 < c1 < c2, and
-a L < 1. The default gains are chosen: p = -2 1/s, three times, for cart_pole. u is singular where a g = -gq, for
-cart_pole at cos q = a L, 63 degrees; past it the pole is lost.
+lie in the left half-plane (x + L q is a flat output: its second derivative is grav q). For a > 0 this means 0 < c1 < c2
+and a L < 1. The default gains give cart_pole a triple root at p = -2 1/s. u is singular at a g = -gq, for cart_pole at
+cos q = a L, 63 degrees; beyond this angle the pole falls.
 
-A model of yours takes it where its joint turns as theirs do: q > 0 leans a pole the way x grows, and swings a load the
-other way; else turn the joint's axis round.
+A model of your own can use the law if its joint has the same sign: q > 0 leans a pole towards growing x, and swings a
+load the other way. If it does not, reverse the axis of the joint.
 
-Without the model, f = fq = gq = 0 and g = 1: u = -(k sgn(S) + rate S) / a. That has the sign of the crane's a g + gq
-and not of the pole's, where gq < 0 outweighs a g: it brings the crane in and drops the pole.
+Without the model f = fq = gq = 0 and g = 1, so u = -(k sgn(S) + rate S) / a. Its sign is right for the crane, and wrong
+for the pole, because gq < 0 outweighs a g there: the crane comes to rest, and the pole falls.
+Gains: a, weight of the first joint's surface; c1 and c2, slopes of the surfaces [1/s]; k, switching gain [m/s^2]; rate,
+reaching rate [1/s].
 Source: W. Wang, J. Yi, D. Zhao & D. Liu, "Design of a stable sliding-mode controller for a class of second-order
 underactuated systems", IEE Proc. Control Theory Appl. 151(6):683, 2004; the roots are worked out here.
 """
@@ -46,5 +49,5 @@ def hierarchical(y, gains, memory):
     reaching = -gains.k * sgn(s) - gains.rate * s
     if y.model == 0.0:
         return reaching / gains.a, s
-    drift = gains.a * (y.f - y.ddr - eq) + y.fq + gains.c2 * y.dq  # of S without u
+    drift = gains.a * (y.f - y.ddr - eq) + y.fq + gains.c2 * y.dq  # S' without u
     return (reaching - drift) / (gains.a * y.g + y.gq), s

@@ -1,9 +1,11 @@
 """First-order sliding mode, implicit: u = -k sat(s / (k dt)), s = de + c e, sat(a) = min(max(a, -1), 1).
 
-The backward Euler rule for s' = u, u in -k sgn(s): u solves s + dt u = s+, u = -k sgn(s+). It is classical while
-|s| > k dt, and within s+ = 0 where classical would chatter: under |d| <= D < k the residual is |s| <= dt D, and u
-follows -d of the sample before, its total variation that of d. It is a boundary layer of k dt, the least that does not
-chatter. It needs to know g: model-free g = 1 is taken, and where the true g is 2 or more it chatters as classical does.
+This is the backward Euler method for s' = u with the sign at the end of the period: u solves s+ = s + dt u and u = -k
+sgn(s+). For |s| > k dt it equals `classical`. Within k dt it gives s+ = 0, where `classical` would chatter. Under |d|
+<= D < k the residual is |s| <= dt D, and u is -d of the sample before, with the total variation of d. It is a boundary
+layer of width k dt, the smallest that does not chatter. The law needs to know g: without the model it assumes g = 1,
+and for a true g of 2 or more it chatters as `classical` does.
+Gains: k, switching gain [N]; c, slope of the surface [1/s].
 Source: V. Acary, B. Brogliato & Y. Orlov, "Chattering-free digital sliding-mode control with state observer and
 disturbance rejection", IEEE Trans. Autom. Control 57(5):1087, 2012.
 """

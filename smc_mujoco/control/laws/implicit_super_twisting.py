@@ -1,11 +1,12 @@
 """Implicit super-twisting: u = -k1 [z]^(1/2) + w+, w+ = w - dt k2 sgn(z) at z = s + dt u, the s one period ahead.
 
-With b = s + dt w it is solved in closed form: |b| <= dt^2 k2: z = 0 and u = w+ = -s/dt; beyond, u = -k1 r sgn(b) + w+
-with w+ = w - dt k2 sgn(b) and r = sqrt(dt^2 k1^2/4 + |b| - dt^2 k2) - dt k1/2 = sqrt(|z|). No chattering by sampling;
-but a constant d leaves s = dt d whatever the gains, for w comes to hold -d and u the deadbeat -s/dt:
-`proper_super_twisting` mends that. It counts on s' = u + d: where the plant's g is above 2 and not known to it, the
-deadbeat part overshoots, and it chatters like the explicit law. Condition: k2 > L, k1 > sqrt(k2 + L).
-Under saturation it winds up as the explicit law does.
+The equations have a closed solution. Let b = s + dt w. If |b| <= dt^2 k2, then z = 0 and u = w+ = -s/dt. Otherwise u =
+-k1 r sgn(b) + w+ and w+ = w - dt k2 sgn(b), with r = sqrt(|z|) = sqrt(dt^2 k1^2/4 + |b| - dt^2 k2) - dt k1/2. Sampling
+causes no chattering. But a constant d leaves s = dt d whatever the gains, because w tends to -d and u to the deadbeat
+value -s/dt; `proper_super_twisting` removes this error. The law assumes s' = u + d: if g is above 2 and unknown to the
+law, the deadbeat part overshoots, and the law chatters like the explicit one. Condition: k2 > L and k1 > sqrt(k2 + L)
+for |d'| <= L. Under saturation w winds up as in the explicit law.
+Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s].
 Source: B. Brogliato, A. Polyakov & D. Efimov, "The implicit discretization of the supertwisting sliding-mode control
 algorithm", IEEE Trans. Autom. Control 65(8):3707, 2020, eq. 7 to 11.
 """

@@ -1,11 +1,12 @@
 """Integral sliding mode: u = v0 - M sgn(s), s = s0 - s0(0) + q int s0 dt, s0 = de + c e, v0 = -c de - q s0.
 
-v0 is the wanted acceleration of the nominal loop s0' = -q s0, e'' = -(c + q) de - c q e; s is what s0 has done beyond
-it. s(0) = 0: there is no reaching phase, and the loop is the nominal one from the start, for M above every force
-that v0 leaves out. It is a law with a model: without one it takes f = 0, g = 1, and M must cover g too,
-g M > |f + (g - 1) v0 + d|. Where u saturates s leaves 0, and what follows is a reaching phase after all. s is
-integrated by the explicit Euler rule, which costs |s| = O(dt), as sampling does. The nominal loop on another surface is
-s0' = -q s0 too.
+v0 is the acceleration of the nominal loop s0' = -q s0, that is e'' = -(c + q) de - c q e. s is the deviation of s0 from
+this loop. Because s(0) = 0 there is no reaching phase: the error follows the nominal loop from the start if M exceeds
+every force that v0 leaves out. The law assumes a model. Without one it takes f = 0 and g = 1, so M must cover the true
+g too: g M > |f + (g - 1) v0 + d|. If u saturates, s leaves 0, and a reaching phase follows. s is integrated by the
+explicit Euler method, which costs |s| = O(dt), as sampling does. With a surface of the scenario as s0 the nominal loop
+is s0' = -q s0 too.
+Gains: M, switching gain [N]; c, slope of s0 [1/s]; q, decay rate of s0 [1/s].
 Source: V. Utkin & J. Shi, "Integral sliding mode in systems operating under uncertainty conditions", Proc. 35th IEEE
 Conf. Decision and Control 4591, 1996.
 """
@@ -24,7 +25,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     short="IN",
 )
 def integral(y, gains, memory):
-    s0, eq = y.de + gains.c * y.e, -gains.c * y.de  # the loop that is imposed, not what the law knows of the plant
+    s0, eq = y.de + gains.c * y.e, -gains.c * y.de  # of the nominal loop: with or without a model
     if y.surfaced != 0.0:
         s0, eq = y.s, y.eq
     if memory[2] == 0.0:

@@ -1,6 +1,6 @@
 """No control: u = 0.
 
-The baseline that shows what the plant does by itself, with or without a model; s is 0, there is no surface.
+The baseline that shows the motion of the plant by itself, with or without a model. There is no surface: s is 0.
 """
 
 from smc_mujoco.control.law import law_function

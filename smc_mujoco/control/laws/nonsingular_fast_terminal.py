@@ -1,9 +1,11 @@
 """Non-singular fast terminal: u = eq - k sgn(s) - rate s, s = e + a [e]^q + b [de]^p, 1 < p < 2, q > p.
 
-eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - eq). s = 0 in finite time for e'' = u + d,
-|d| <= D < k; from afar rate s brings it there sooner. From s = 0 on, de = -[(e + a [e]^q) / b]^(1/p) to e = 0 in finite
-time, faster from afar than without a.
-Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|, on s = 0 with the de above.
+eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - eq). s = 0 is reached in finite time for
+e'' = u + d, |d| <= D < k, and sooner from far away because of the term rate s. On s = 0, de = -[(e + a [e]^q) /
+b]^(1/p), so e reaches 0 in finite time, faster from far away than with a = 0. Without the model, e'' = f + g u + d
+contains (g - 1) eq too: the condition is k g > |f + d| + |g - 1| |eq|, with the de above on s = 0.
+Gains: k, switching gain [N]; rate, reaching rate [N/m]; a [m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q,
+exponents.
 Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J.
 Robust Nonlinear Control 21(16):1865, 2011, with k sgn(s) for k2 [s]^rho of its reaching law.
 """

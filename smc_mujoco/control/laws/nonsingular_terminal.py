@@ -1,9 +1,10 @@
 """Non-singular terminal: u = eq - k sgn(s), s = e + [de]^p / B, eq = -(B/p) [de]^(2-p), 1 < p < 2.
 
-s = 0 in finite time for e'' = u + d, |d| <= D < k, and from there e = 0 in |e|^(1-1/p) / (B^(1/p) (1-1/p)); u is finite
-everywhere. s' = (p/B) |de|^(p-1) (e'' - eq): at rest, s waits until the law has set e moving.
-Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|, where |eq| is
-(B/p) |B e|^((2-p)/p) on s = 0.
+s = 0 is reached in finite time for e'' = u + d, |d| <= D < k. From there e = 0 after |e|^(1-1/p) / (B^(1/p) (1-1/p)). u
+is finite everywhere. s' = (p/B) |de|^(p-1) (e'' - eq), so s does not move while the joint is at rest, until the law has
+accelerated it. Without the model, e'' = f + g u + d contains (g - 1) eq too: the condition is k g > |f + d| + |g - 1|
+|eq|, where |eq| is (B/p) |B e|^((2-p)/p) on s = 0.
+Gains: k, switching gain [N]; B, of the surface [m^(p-1)/s^p]; p, exponent.
 Source: Y. Feng, X. Yu & Z. Man, "Non-singular terminal sliding mode control of rigid manipulators", Automatica
 38(12):2159, 2002.
 """

@@ -1,16 +1,17 @@
 """Observer-free law with integral action: u = -lam tanh(s + ki z), z' = e, s = de + k1 e.
 
-Ours. A constant load d, |d| < lam, leaves the plain law an error, e = atanh(d / lam) / k1 for K = 0; here the only rest
-is e = de = 0, with ki z = atanh(d / lam). Bounded by lam as the plain law.
+An extension of this package. Under a constant load d, |d| < lam, the plain law has the steady error e = atanh(d / lam)
+/ k1 for K = 0. Here the only equilibrium is e = de = 0, with ki z = atanh(d / lam). |u| <= lam as for the plain law.
 
-Stability: at that rest J x'' + D x' + K x = u + d, linearised, has J p^3 + (D + m) p^2 + (K + m k1) p + m ki = 0 with
-the slope m = lam (1 - (d / lam)^2) of tanh, so it is locally stable (Routh-Hurwitz) just where
+Stability: linearised at that equilibrium, J x'' + D x' + K x = u + d gives J p^3 + (D + m) p^2 + (K + m k1) p + m ki =
+0 with the slope m = lam (1 - (d / lam)^2) of tanh. It is locally stable (Routh-Hurwitz) if and only if
 
     m > -D,    ki > 0,    (D + m) (K + m k1) > J m ki,
 
 which for ki -> 0 is the plain law's condition.
-Wind-up: z stands still where the law is at its bound, |s + ki z| > 2, or the actuator at its own, unless e brings it
-back; tanh 2 = 0.96 of lam can thus be made up for. z is integrated by the explicit Euler rule.
+Anti-windup: z stops while |s + ki z| > 2 or the actuator saturates, unless e drives it back. So loads up to lam tanh 2
+= 0.96 lam are compensated. z is integrated by the explicit Euler method.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; ki, integral gain [1/s^2].
 Source: the law of J. Gaber (observer_free) with conditional integration, K. J. Astrom & T. Hagglund, PID Controllers,
 ISA 1995, section 3.5.
 """

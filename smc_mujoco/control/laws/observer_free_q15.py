@@ -1,15 +1,17 @@
 """Observer-free law in fixed point: u = -lam tanh(s), s = de + k1 e, in 16-bit words with 32-bit sums, all saturating.
 
-For processors without floating point. A word of 16 bits holds a number in units of its range / 2^15 (Q15) and saturates
-at +-(2^15 - 1); converters and products round to the nearest. e comes in Q15 of e_range, de of de_range, s is Q15 of 8
-and u goes out in Q15 of u_range; the gains are words too, k1 e_range / 8 and de_range / 8 in units of 2^-11, lam /
-u_range of 2^-15. tanh is a table of 257 words over |s| < 8 with linear interpolation. Where the words hold the gains
-exactly, |u + lam tanh(s)| <= lam (1.6e-4 + ds) + u_range / 2^16, ds = (k1 e_range + de_range + 16) / 2^16: 1.6e-4 is
-the table, ds rounds e, de and s. What exceeds its range is held there. Stability is that of observer_free, up to a rest
-within the steps of e and de. With the nominal model, f and g are added in double precision. The trace's s is the
-word's.
-Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); Q notation:
-ARM, Application Note 33, Fixed Point Arithmetic on the ARM, 1996.
+For processors without floating point. A 16-bit word holds a number in units of range / 2^15 (Q15) and saturates at
++-(2^15 - 1). Conversions and products round to nearest. The ranges are e_range for e, de_range for de, 8 for s and
+u_range for u. The gains are words too: k1 e_range / 8 and de_range / 8 in units of 2^-11, lam / u_range in units of
+2^-15. tanh is a table of 257 words over |s| < 8 with linear interpolation. If the words hold the gains exactly, |u +
+lam tanh(s)| <= lam (1.6e-4 + ds) + u_range / 2^16, where 1.6e-4 is the error of the table and ds = (k1 e_range +
+de_range + 16) / 2^16 the rounding of e, de and s. Values beyond their range saturate. Stability is that of
+`observer_free`, up to an equilibrium within the steps of e and de. With the nominal model, f and g are added in double
+precision. The trace's s is the word's.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; e_range [m], de_range [m/s] and u_range [N], ranges of the
+words.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); Q notation: ARM,
+Application Note 33, Fixed Point Arithmetic on the ARM, 1996.
 """
 
 import math
@@ -26,21 +28,21 @@ TABLE = np.array([round(MOST * math.tanh(8.0 * i / 256)) for i in range(257)], n
 
 @njit
 def word(a, unit):
-    """a in units of unit / 2^15, to the nearest, ties away from 0, saturated."""
+    """Return a in units of unit / 2^15, rounded to nearest (ties away from 0) and saturated."""
     n = math.floor(abs(a) / unit * FULL + 0.5) if abs(a) < unit else MOST
     return int(math.copysign(min(n, MOST), a))
 
 
 @njit
 def product(a, b, bits):
-    """a b / 2^bits to the nearest, ties away from 0: a 32-bit product and a rounding shift of its magnitude."""
+    """Return a b / 2^bits, rounded to nearest (ties away from 0): a 32-bit product, its magnitude shifted."""
     n = (abs(a * b) + (1 << (bits - 1))) >> bits
     return n if (a < 0) == (b < 0) else -n
 
 
 @njit
 def saturated(n):
-    """n held to 16 bits, symmetrically."""
+    """Return n, saturated to a word."""
     return min(max(n, -MOST), MOST)
 
 

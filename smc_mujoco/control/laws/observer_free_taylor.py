@@ -1,11 +1,13 @@
-"""Observer-free law by Taylor series: u = -lam P(s), s = de + k1 e, P = the series of tanh(s / 8) doubled thrice.
+"""Observer-free law by Taylor series: u = -lam P(s), s = de + k1 e, P = the series of tanh(s / 8), doubled three times.
 
-tanh a = a - a^3/3 + 2 a^5/15 - 17 a^7/315 + 62 a^9/2835 - ..., |a| < pi/2, cut after `terms` terms; |s| is held at 8,
-so that |a| <= 1, and tanh 2a = 2 tanh a / (1 + tanh^2 a) brings it back: no exponential, three divisions. With 1 to
-5 terms |P - tanh| <= 3.3e-3, 9.1e-5, 5.5e-6, 6e-7, 2.3e-7 (measured; the last is what holding |s| at 8 leaves). Without
-the reduction the series is of no use: at s = pi/2 it ceases to converge. Stability is that of observer_free.
-Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); M. Abramowitz &
-I. Stegun, Handbook of Mathematical Functions, 1964, 4.5.64 (series) and 4.5 (double argument).
+The series tanh a = a - a^3/3 + 2 a^5/15 - 17 a^7/315 + 62 a^9/2835 - ... converges for |a| < pi/2 and is cut after
+`terms` terms. |s| is limited to 8, so |a| = |s| / 8 <= 1. The argument is then doubled three times, tanh 2a = 2 tanh a
+/ (1 + tanh^2 a). So the law needs no exponential, only three divisions. With 1 to 5 terms |P - tanh| is at most 3.3e-3,
+9.1e-5, 5.5e-6, 6e-7, 2.3e-7 (measured; the last is the effect of limiting |s| to 8). Without this reduction the series
+would diverge from s = pi/2 on. Stability is that of `observer_free`.
+Gains: lam, bound of u [N]; k1, slope of the surface [1/s]; terms, of the series, 1 to 5.
+Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", eq. 4 (the law); M. Abramowitz & I.
+Stegun, Handbook of Mathematical Functions, 1964, 4.5.64 (series) and 4.5 (double argument).
 """
 
 from smc_mujoco.control.law import command, law_function, sliding

@@ -1,9 +1,10 @@
 """Quasi-continuous, order 2: u = -a (de + b [e]^(1/2)) / (|de| + b |e|^(1/2)).
 
-Continuous but at e = de = 0, reached in finite time for e'' = g u + d, |d| <= D, if some r > b has
-a g (r - b) / (r + b) > D + r^2/2: the state comes between de = -b [e]^(1/2) and de = -r [e]^(1/2), and ends there in at
-most 2 sqrt(|e|) / b. Without d and with g = 1 the condition is on r^3 + b r^2 - 2 a r + 2 a b < 0. Sampled:
-|e| = O(dt^2), |de| = O(dt). The trace's s is e, of relative degree 2.
+u is continuous except at e = de = 0, which is reached in finite time (2-sliding). Condition for e'' = g u + d, |d| <=
+D: some r > b satisfies a g (r - b) / (r + b) > D + r^2/2. Then the state comes between de = -b [e]^(1/2) and de = -r
+[e]^(1/2), and from there to the origin in at most 2 sqrt(|e|) / b. For D = 0 and g = 1 the condition is r^3 + b r^2 - 2
+a r + 2 a b < 0. Sampled, |e| = O(dt^2) and |de| = O(dt). The trace's s is e, of relative degree 2.
+Gains: a, bound of u [N]; b, of the curve [m^1/2/s].
 Source: A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE Trans. Autom. Control 50(11):1812, 2005;
 condition: A. Levant, "Principles of 2-sliding mode design", Automatica 43(4):576, 2007.
 """
@@ -15,7 +16,7 @@ from smc_mujoco.control.units import FORCE, PARABOLA, Gain
 
 
 def brakes(gains):
-    """Whether the cubic of the docstring, least at this r, falls below 0 beyond b."""
+    """Return whether the cubic of the docstring is negative at its minimum, r, and r > b."""
     a, b = gains.a, gains.b
     r = (math.sqrt(b * b + 6.0 * a) - b) / 3.0
     return r > b and r**3 + b * r * r - 2.0 * a * r + 2.0 * a * b < 0.0

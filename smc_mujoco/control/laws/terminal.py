@@ -1,8 +1,9 @@
 """Terminal: u = eq - k sgn(s), s = de + b [e]^p, eq = -b p |e|^(p-1) de bounded by `bound`, 1/2 < p < 1.
 
-s = 0 in finite time for e'' = u + d, |d| <= D < k, and from there e = 0 in |e|^(1-p) / (b (1-p)). eq is singular at
-e = 0 off the surface, on it b^2 p |e|^(2p-1): the bound changes nothing there.
-Without the model e'' = f + g u + d leaves (g - 1) eq as well: k g > |f + d| + |g - 1| |eq|.
+s = 0 is reached in finite time for e'' = u + d, |d| <= D < k. From there e = 0 after |e|^(1-p) / (b (1-p)). eq is
+singular at e = 0 away from the surface. On the surface it is b^2 p |e|^(2p-1), where the bound changes nothing. Without
+the model, e'' = f + g u + d contains (g - 1) eq too: the condition is k g > |f + d| + |g - 1| |eq|.
+Gains: k, switching gain [N]; b, of the surface [m^(1-p)/s]; p, exponent; bound, on |eq| [N].
 Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
 Control 115(3):554, 1993 (law); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
 systems", Automatica 49(6):1715, 2013 (bound).

@@ -1,1 +1,1 @@
-"""Sliding surfaces, one per file; found by walking this package."""
+"""Sliding surfaces, one per file. Every module of this package is searched for surfaces. Notation as in laws."""

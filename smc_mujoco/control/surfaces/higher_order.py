@@ -1,11 +1,11 @@
 """Order 3: s = e'' + k2 de + k1 e, where an actuator lag makes the plant one of relative degree 3.
 
-On s = 0 the error follows e'' + k2 e' + k1 e = 0. `degree` is that of s as the law's own sliding variable: with a lag
-tau f' = u - f before e'' = f + ..., s' = e''' + ... holds u, so that s has degree 1 there, and first-order laws take
-it: `Scenario(law="classical", surface="higher_order", actuator=smc.Lag(0.05), velocity=...)`. Without a lag s holds
-u itself, degree 0, and a law that switches on it is an algebraic loop through one sample of delay. e'' is the
-estimated acceleration less r'': an estimator that gives none leaves k2 de + k1 e.
-eq is the acceleration that lies on the surface, -k2 de - k1 e: commanded through the lag, it leaves s' = -s/tau + O(1).
+On s = 0 the error follows e'' + k2 e' + k1 e = 0. With a lag tau F' = u - F before e'' = f + g F, s' contains u. So s
+has relative degree 1, and first-order laws can use it: `Scenario(law="classical", surface="higher_order",
+actuator=smc.Lag(0.05), velocity=...)`. Without a lag s itself contains u, and a law that switches on s is an algebraic
+loop through one sample of delay. e'' is the estimated acceleration minus r''. If the estimator gives none, s is k2 de +
+k1 e. eq is the acceleration on the surface, -k2 de - k1 e. Commanded through the lag, it leaves s' = -s/tau + O(1).
+Gains: k1 [1/s^2] and k2 [1/s], of the surface.
 Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", section 3, for relative degree 3.
 """
 

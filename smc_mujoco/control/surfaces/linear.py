@@ -1,5 +1,6 @@
 """Linear: s = de + c e; on s = 0 the error decays as exp(-c t).
 
+Gains: c, slope of the surface [1/s].
 Source: V. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 1.
 """
 

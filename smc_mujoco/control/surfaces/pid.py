@@ -1,8 +1,9 @@
 """PID: s = de + kp e + ki I, I' = e; on s = 0 the error follows e'' + kp e' + ki e = 0.
 
-Poles of p^2 + kp p + ki; I starts at 0, so that s(0) = de + kp e: there is a reaching phase, in which I winds up, and
-the overshoot that it costs is the price of no steady error under a law that leaves a constant s. I is integrated by
-the explicit Euler rule.
+The poles are the roots of p^2 + kp p + ki. I starts at 0, so s(0) = de + kp e and there is a reaching phase, during
+which I winds up. The overshoot this causes is the price of no steady error under a law that leaves a constant s. I is
+integrated by the explicit Euler method.
+Gains: kp [1/s] and ki [1/s^2], of the surface.
 Source: J.-J. Slotine & W. Li, Applied Nonlinear Control, Prentice Hall 1991, section 7.1.1 (s with the integral of e).
 """
 

@@ -1,7 +1,8 @@
 """Predefined time: s = de + exp(|e|^p) [e]^(1-p) / (p T), 0 < p < 1/2; on s = 0 the error ends before T from anywhere.
 
-It ends at T (1 - exp(-|e(0)|^p)): T is a gain, no function of gains. eq is singular at e = 0 off the surface, on it
-of order |e|^(1-2p); so it is bounded by `bound`, which changes nothing where it asks for less.
+It ends at T (1 - exp(-|e(0)|^p)): the bound T is itself a gain. eq is singular at e = 0 away from the surface. On the
+surface it is of order |e|^(1-2p), where `bound` changes nothing unless eq exceeds it.
+Gains: T, bound on the time of convergence [s]; p, exponent; bound, on |eq| [m/s^2].
 Source: J. Sanchez-Torres, E. Sanchez & A. Loukianov, "Predefined-time stability of dynamical systems with sliding
 modes", Proc. American Control Conf., 5842, 2015.
 """
