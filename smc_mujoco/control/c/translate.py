@@ -1,7 +1,7 @@
 """Translate a law's Python into C99, operation by operation, in the same order and with the same rounding.
 
-numba computes some powers in its own way: with a constant exponent they become products or roots. The C does the same,
-so that in double precision it gives the bits of the compiled law.
+numba turns some powers with a constant exponent into products or roots. The C does the same, so that its results in
+double precision equal those of the compiled law bit for bit.
 """
 
 import ast
@@ -25,10 +25,10 @@ from smc_mujoco.control.law import Measurement
 KINDS = ("bool", "int", "single", "real")
 WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
-# The arguments of a law, which are no numbers.
+# The arguments of a law. They are pointers, not numbers.
 ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
 
-# How tightly C's operators bind. An operand that binds less tightly is put in parentheses.
+# Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
 OPERATORS: dict[type, tuple[str, int]] = {
     ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT),
@@ -42,25 +42,25 @@ COMPARISONS: dict[type, str] = {
 MATH_NAMES = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p log10 log2 sqrt
 hypot fabs copysign fmod"""
 SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
-ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # whole numbers in Python, reals in C
+ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # integers in Python, floating-point in C
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
-# Small functions that the file defines where it needs them. They are Python's min, max and abs.
-HELPERS = {"least": "b < a ? b : a", "most": "b > a ? b : a", "size": "a < 0 ? -a : a"}
+# Python's min, max and abs: functions that the C file defines if it uses them.
+HELPERS = {"minimum": "b < a ? b : a", "maximum": "b > a ? b : a", "absolute": "a < 0 ? -a : a"}
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
-POWERS = {  # as numba multiplies them: by squares, from the lowest bit
-    "raised_2": "a * a",
-    "raised_3": f"a * {SQUARE}",
-    "raised_4": FOURTH,
-    "raised_5": f"a * {FOURTH}",
-    "raised_6": f"{SQUARE} * {FOURTH}",
-    "raised_7": f"a * {SQUARE} * {FOURTH}",
-    "raised_8": f"({FOURTH} * {FOURTH})",
+POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
+    "power_2": "a * a",
+    "power_3": f"a * {SQUARE}",
+    "power_4": FOURTH,
+    "power_5": f"a * {FOURTH}",
+    "power_6": f"{SQUARE} * {FOURTH}",
+    "power_7": f"a * {SQUARE} * {FOURTH}",
+    "power_8": f"({FOURTH} * {FOURTH})",
 }
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
-# Functions, macros and keywords of C's headers, of newer C and of compilers' own dialects.
+# Other reserved names: functions and macros of C's headers, keywords of later standards and of compilers.
 OTHERS = """_Bool _Complex _Imaginary alignas alignof asm bool constexpr false linux nullptr static_assert thread_local
 true typeof unix main abort abs exit free index labs rindex NAN INFINITY HUGE_VAL cbrt drem erf erfc exp2 exp10 fdim
 finite fma fmax fmin fpclassify frexp gamma ilogb isfinite isgreater isgreaterequal isinf isless islessequal
@@ -71,71 +71,71 @@ RESERVED = {*KEYWORDS.split(), *OTHERS.split(), *MATH, "out"}
 
 
 class Untranslatable(ScenarioError):
-    """Python that has no translation into C."""
+    """A piece of Python has no translation into C."""
 
 
 class Value(NamedTuple):
-    """An expression in C: its text, its kind, and how tightly its outermost operator binds."""
+    """An expression in C: its text, its kind, and the precedence of its outermost operator."""
 
     text: str
     kind: str
     level: int = ATOM
 
     def within(self, level: int) -> str:
-        """Return the text as an operand of an operator that binds as tightly as `level`."""
+        """Return the text as an operand of an operator of precedence `level`."""
         return self.text if self.level >= level else f"({self.text})"
 
 
 def translate(law: Component, single: bool) -> tuple[int, str]:
-    """Return how many numbers of memory a law uses, and the C of its function and of all that it calls.
+    """Return the number of memory slots of a law, and the C of its function and of all functions it calls.
 
     Args:
       single: whether smc_real is float.
 
     Raises:
-      Untranslatable: names the Python that has no translation.
+      Untranslatable: a piece of Python, which is quoted, has no translation.
     """
     program = Program(law, single)
     functions = [Function(program, law.function, list(ARGUMENTS), {}, law=True).text("smc_law")]
     for name, text in reversed(program.functions.items()):
-        if any(re.search(rf"\b{name}\(", other) for other in functions):  # else only a narrower draft called it
+        if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
     arrays = [text for name, text in program.arrays.items() if any(f"{name}[" in other for other in functions)]
     return program.slots, "\n\n".join([*arrays, *functions])
 
 
 class Program:
-    """The file that a law becomes: constant arrays, functions, and the names that they take."""
+    """The C file of a law: constant arrays, functions, and the names they use."""
 
     def __init__(self, law: Component, single: bool):
         self.gains, self.single = law.gains, single
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
-        self.made: dict[tuple, tuple[str, Function] | None] = {}  # None while a function is being translated
-        self.taken = {"smc_law", *ARGUMENTS, *RESERVED}
-        self.slots = 0  # numbers of memory that the law uses
+        self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, kinds; None while in progress
+        self.used_names = {"smc_law", *ARGUMENTS, *RESERVED}
+        self.slots = 0  # of memory
 
-    def free(self, name: str) -> str:
-        """Return a name that nothing else in the file has, and take it."""
+    def unique_name(self, name: str) -> str:
+        """Reserve and return a name that is not used yet: `name`, or `name` with a number."""
         candidates = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
-        found = next(candidate for candidate in candidates if candidate not in self.taken)
-        self.taken.add(found)
-        return found
+        unique = next(candidate for candidate in candidates if candidate not in self.used_names)
+        self.used_names.add(unique)
+        return unique
 
     def helper(self, name: str, kind: str) -> str:
-        """Return the name of a helper for numbers of a kind: least, most, size, or a power such as raised_3."""
+        """Return the C name of minimum, maximum, absolute or a power such as power_3, for numbers of a kind."""
         function = name if name in POWERS and kind == "real" else f"{name}_{kind}"
         body, of = (HELPERS | POWERS)[name], TYPES[kind]
         second = f", {of} b" if "b" in body else ""
-        self.taken.add(function)
+        self.used_names.add(function)
         self.functions.setdefault(function, f"static {of} {function}({of} a{second})\n{{\n    return {body};\n}}")
         return function
 
     def array(self, name: str, values: Any) -> Value:
-        """Return a constant array: of smc_real, or of the smallest whole numbers that hold it."""
+        """Return a constant array, of smc_real or of the smallest integer type that holds its values."""
         data, name = np.asarray(values), plain(name)
         if data.ndim != 1 or data.dtype.kind not in "if":
-            raise refuse(None, f"the constant {name}, which is no row of numbers,")
+            raise refuse(None, f"the constant {name}, which is not a one-dimensional array of numbers,")
         kind, of = "real", "smc_real"
         items = [f"{float(v)!r}{'f' * self.single}" for v in data]
         if data.dtype.kind == "i":
@@ -147,15 +147,15 @@ class Program:
         for known, text in self.arrays.items():
             if text == f"static const {of} {known}{content}":
                 return Value(known, kind)
-        name = self.free(name)
+        name = self.unique_name(name)
         self.arrays[name] = f"static const {of} {name}{content}"
         return Value(name, kind)
 
     def function(self, function: Any, values: Sequence[Value], nodes: Sequence[ast.expr]) -> tuple[list[str], str]:
-        """Return the kinds of a function's results, and the beginning of a call of it, without the last parenthesis.
+        """Return the kinds of a function's results, and a call of it without the closing parenthesis.
 
-        A function is translated once for each kind of its arguments. A literal exponent is no argument in C: there is
-        one function for each.
+        A function is translated once per combination of argument kinds. A literal exponent is not an argument in C:
+        each exponent gives a function of its own.
         """
         written, tree = parsed(function)
         names = [a.arg for a in tree.args.args]
@@ -168,26 +168,28 @@ class Program:
         }
         kinds = [v.kind for v in values]
         key = (written, tuple(kinds), tuple(constants.items()))
-        if key not in self.made:
-            self.made[key] = None
-            made = Function(self, function, kinds, constants)
-            name = self.free(plain(tree.name))
-            self.made[key] = name, made
-            self.functions[name] = made.text(name)
-        if (found := self.made[key]) is None:
+        if key not in self.translated:
+            self.translated[key] = None
+            translated = Function(self, function, kinds, constants)
+            name = self.unique_name(plain(tree.name))
+            self.translated[key] = name, translated.results
+            self.functions[name] = translated.text(name)
+        if (known := self.translated[key]) is None:
             raise refuse(None, f"{tree.name}, which calls itself,")
-        passed = [v.text for n, v in zip(names, values, strict=True) if n not in constants]
-        return found[1].results, f"{found[0]}({', '.join(passed)}"
+        name, results = known
+        arguments = [v.text for n, v in zip(names, values, strict=True) if n not in constants]
+        return results, f"{name}({', '.join(arguments)}"
 
 
 class Function:
     """One function in C.
 
-    A law's results go to out[0] and out[1]. Another function returns one result, and writes several to pointers.
+    A law writes its results to out[0] and out[1]. Another function returns a single result, or writes several to
+    pointers.
 
     Args:
       kinds: of its arguments.
-      constants: arguments that are literal numbers instead.
+      constants: arguments replaced by literal numbers.
       law: whether it is smc_law itself.
     """
 
@@ -202,32 +204,39 @@ class Function:
         if len(arguments) != len(kinds) or self.tree.args.vararg or self.tree.args.kwonlyargs or self.tree.args.kwarg:
             raise refuse(None, f"{self.tree.name} with its arguments")
         if not returns(self.tree.body):
-            raise refuse(None, f"{self.tree.name}, whose last line is no return,")
+            raise refuse(None, f"{self.tree.name}, which does not end in a return,")
         self.parameters = {n: kind for n, kind in zip(arguments, kinds, strict=True) if n not in constants}
         inside = [node for statement in self.tree.body for node in ast.walk(statement)]
         self.read = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
         self.kinds, self.results = dict(self.parameters), list[str]()
         before = None
-        while before != (self.kinds, self.results):  # translate again until no variable's kind widens
+        while before != (self.kinds, self.results):  # repeat until no variable's kind widens
             before = dict(self.kinds), list(self.results)
             self.names = {name: Value(self.c_name(name), kind) for name, kind in self.kinds.items()}
-            self.declared, self.early, self.depth = set(self.parameters), set[str](), 0
+            self.assigned = set(self.parameters)
             self.lines = list(self.block(self.tree.body))
 
     def text(self, name: str) -> str:
-        """Return the whole function under a name."""
-        early = sorted(self.early)
-        opening = [f"{TYPES[self.kinds[n]]} {self.c_name(n)} = 0;" for n in early]
-        opening += [f"(void){self.c_name(n)};" for n in (*self.parameters, *early) if n not in self.read]
-        lines, depth = [self.head(name), "{"], 1
-        for line in [*opening, *self.lines]:
+        """Return the whole function under a name.
+
+        A variable is declared by its first assignment, or at the top if that is inside a block or by a pointer.
+        """
+        types = {self.c_name(n): TYPES[kind] for n, kind in self.kinds.items() if n not in self.parameters}
+        unread = [self.c_name(n) for n in self.kinds if n not in self.read]
+        top = [f"{types.pop(n)} {n} = 0;" for n in unread if n in types]
+        top += [f"(void){n};" for n in unread]  # compilers warn of unused variables
+        lines, depth = list[str](), 1
+        for line in self.lines:
             depth -= line.startswith("}")
-            indent = "    " * depth
+            target, words = line.partition(" = ")[0], re.findall(r"\w+", line)
+            indent, declaration = "    " * depth, f"{types.pop(target)} " if depth == 1 and target in types else ""
+            top += [f"{types.pop(n)} {n} = 0;" for n in list(types) if n in words]
+            text, continued = indent + declaration + line, indent + " " * 8
             lines += textwrap.wrap(
-                indent + line, 110, subsequent_indent=indent + " " * 8, break_long_words=False, break_on_hyphens=False
+                text, 110, subsequent_indent=continued, break_long_words=False, break_on_hyphens=False
             )
             depth += line.endswith("{")
-        return "\n".join([*lines, "}"])
+        return "\n".join([self.head(name), "{", *(f"    {line}" for line in top), *lines, "}"])
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon."""
@@ -266,56 +275,49 @@ class Function:
                     yield from self.loop(node, name)
                 case ast.While(orelse=[]):
                     yield f"while ({self.truth(node.test)}) {{"
-                    yield from self.nested(self.block(node.body))
+                    yield from self.block(node.body)
                     yield "}"
                 case ast.Break() | ast.Continue():
                     yield f"{ast.unparse(node)};"
                 case ast.Return(value=ast.expr() as value):
-                    yield from self.give(value)
+                    yield from self.returned(value)
                 case _:
                     raise refuse(node, f"{type(node).__name__.lower()}")
-
-    def nested(self, lines: Iterator[str]) -> Iterator[str]:
-        """Yield lines that are translated as the inside of a block."""
-        self.depth += 1
-        yield from lines
-        self.depth -= 1
 
     def assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         """Assign to one target, or to a tuple of them."""
         if not isinstance(target, ast.Tuple | ast.List):
-            found = self.numeric(value)
-            yield f"{self.home(target, found.kind)} = {found.text};"
-            yield from self.unread([target])
+            number = self.numeric(value)
+            yield f"{self.destination(target, number.kind)} = {number.text};"
             return
         targets, values = target.elts, self.parts(value, len(target.elts))
         if values is not None and clash(targets, values):
             yield "{"
-            yield from self.nested(self.at_once(targets, values))
+            yield from self.at_once(targets, values)
             yield "}"
         elif values is not None:
             for one, part in zip(targets, values, strict=True):
                 yield from self.assign(one, part)
         elif isinstance(value, ast.IfExp):
             yield f"if ({self.truth(value.test)}) {{"
-            yield from self.nested(self.assign(target, value.body))
+            yield from self.assign(target, value.body)
             yield "} else {"
-            yield from self.nested(self.assign(target, value.orelse))
+            yield from self.assign(target, value.orelse)
             yield "}"
         elif isinstance(value, ast.Call):
             yield from self.unpack(targets, value)
         else:
-            raise refuse(value, "a tuple that is no call")
+            raise refuse(value, "a tuple from anything but a call")
 
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
-        """Assign values of which one reads an earlier target: all are computed first."""
-        found = [self.numeric(value) for value in values]
-        yield from (f"const {TYPES[v.kind]} new_{i} = {v.text};" for i, v in enumerate(found))
-        for i, (target, value) in enumerate(zip(targets, found, strict=True)):
-            yield f"{self.home(target, value.kind)} = new_{i};"
+        """Compute all values before the first assignment, because one of them reads an earlier target."""
+        new = [self.numeric(value) for value in values]
+        yield from (f"const {TYPES[v.kind]} new_{i} = {v.text};" for i, v in enumerate(new))
+        for i, (target, value) in enumerate(zip(targets, new, strict=True)):
+            yield f"{self.destination(target, value.kind)} = new_{i};"
 
     def parts(self, value: ast.expr, count: int) -> Sequence[ast.expr] | None:
-        """Return the expressions of a tuple, or the elements of memory; None where neither is given."""
+        """Return the expressions of a tuple or the elements of memory; None for another expression."""
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == count:
             return value.elts
         if isinstance(value, ast.Name) and self.kinds.get(value.id) == "memory":
@@ -328,20 +330,11 @@ class Function:
         kinds, beginning = self.program.function(self.callee(call), values, call.args)
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        homes = []
-        for target, kind in zip(targets, kinds, strict=True):
-            home = self.home(target, kind)
-            if " " in home:  # declared here
-                yield f"{home};"
-            homes.append(f"&{home.rpartition(' ')[2]}")
+        homes = [f"&{self.destination(target, kind)}" for target, kind in zip(targets, kinds, strict=True)]
         yield f"{beginning}{', ' * (not beginning.endswith('('))}{', '.join(homes)});"
-        yield from self.unread(targets)
 
-    def home(self, target: ast.expr, kind: str) -> str:
-        """Return a target that gets a value of a kind, after its type where this declares it.
-
-        A variable is declared where it first gets a value; inside a block, at the beginning of the function.
-        """
+    def destination(self, target: ast.expr, kind: str) -> str:
+        """Return a target in C, to which a value of a kind is assigned."""
         if isinstance(target, ast.Subscript) and (value := self.value(target)).kind == "real":
             return value.text
         name = target.id if isinstance(target, ast.Name) else ""
@@ -349,37 +342,27 @@ class Function:
             raise refuse(target, "an assignment to this")
         self.kinds[name] = kind = wider(self.kinds.get(name, kind), kind)
         self.names[name] = Value(self.c_name(name), kind)
-        if name not in self.declared:
-            self.declared.add(name)
-            if self.depth == 0:
-                return f"{TYPES[kind]} {self.c_name(name)}"
-            self.early.add(name)
+        self.assigned.add(name)
         return self.c_name(name)
-
-    def unread(self, targets: Sequence[ast.expr]) -> Iterator[str]:
-        """Name variables declared here that nothing reads: compilers warn of them."""
-        for target in targets if self.depth == 0 else ():
-            if isinstance(target, ast.Name) and target.id not in self.read:
-                yield f"(void){self.c_name(target.id)};"
 
     def augment(self, node: ast.AugAssign) -> str:
         """Translate target op= value."""
-        found = self.numeric(ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value))
-        target = self.home(node.target, found.kind)
-        if type(node.op) in OPERATORS and found.kind not in WHOLE_KINDS:
+        result = self.numeric(ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value))
+        target = self.destination(node.target, result.kind)
+        if type(node.op) in OPERATORS and result.kind not in WHOLE_KINDS:
             return f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
-        return f"{target} = {found.text};"
+        return f"{target} = {result.text};"
 
     def branch(self, node: ast.If, word: str = "if") -> Iterator[str]:
         """Translate if, elif and else."""
         yield f"{word} ({self.truth(node.test)}) {{"
-        yield from self.nested(self.block(node.body))
+        yield from self.block(node.body)
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
             yield from self.branch(node.orelse[0], "} else if")
             return
         if node.orelse:
             yield "} else {"
-            yield from self.nested(self.block(node.orelse))
+            yield from self.block(node.orelse)
         yield "}"
 
     def loop(self, node: ast.For, variable: str) -> Iterator[str]:
@@ -392,29 +375,29 @@ class Function:
         step = self.constant(call.args[2]) if len(call.args) == 3 else 1
         bounds = [self.numeric(a) for a in call.args[:2]]
         if any(b.kind != "int" for b in bounds) or step not in (1, -1):
-            raise refuse(call, "a range of other than whole numbers one apart")
-        if variable in self.declared:
-            raise refuse(node.target, "a loop over a variable that there is already")
+            raise refuse(call, "a range of other than integers with a step of 1 or -1")
+        if variable in self.assigned:
+            raise refuse(node.target, "a loop over a variable that exists already")
         name = self.c_name(variable)
         self.names[variable] = Value(name, "int")
         first, last = bounds if len(bounds) == 2 else (Value("0", "int"), bounds[0])
         sign, change = ("<", "++") if step == 1 else (">", "--")
         yield f"for (int32_t {name} = {first.text}; {name} {sign} {last.within(SUM)}; {name}{change}) {{"
-        yield from self.nested(self.block(node.body))
+        yield from self.block(node.body)
         yield "}"
         del self.names[variable]
 
-    def give(self, value: ast.expr) -> Iterator[str]:
+    def returned(self, value: ast.expr) -> Iterator[str]:
         """Translate return."""
-        found = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
-        self.results = self.results or [v.kind for v in found]
-        if len(found) != len(self.results) or (self.law and len(found) != 2):
+        values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        self.results = self.results or [v.kind for v in values]
+        if len(values) != len(self.results) or (self.law and len(values) != 2):
             raise refuse(value, "another number of results")
-        self.results = [wider(one, v.kind) for one, v in zip(self.results, found, strict=True)]
-        if len(found) == 1:
-            yield f"return {found[0].text};"
+        self.results = [wider(one, v.kind) for one, v in zip(self.results, values, strict=True)]
+        if len(values) == 1:
+            yield f"return {values[0].text};"
             return
-        yield from (f"{f'out[{i}]' if self.law else f'*out_{i}'} = {v.text};" for i, v in enumerate(found))
+        yield from (f"{f'out[{i}]' if self.law else f'*out_{i}'} = {v.text};" for i, v in enumerate(values))
         yield "return 0;" if self.law else "return;"
 
     # expressions
@@ -447,17 +430,17 @@ class Function:
             return node.value
         return self.constants.get(node.id) if isinstance(node, ast.Name) else None
 
-    def thing(self, node: ast.expr) -> Any:
-        """Return what a global name stands for, dotted or not; None for a variable."""
+    def resolve(self, node: ast.expr) -> Any:
+        """Return the value of a global name, dotted or not; None for a variable."""
         if isinstance(node, ast.Name):
             return None if node.id in self.names else self.globals.get(node.id, getattr(builtins, node.id, None))
-        if isinstance(node, ast.Attribute) and isinstance(home := self.thing(node.value), ModuleType):
+        if isinstance(node, ast.Attribute) and isinstance(home := self.resolve(node.value), ModuleType):
             return getattr(home, node.attr, None)
         return None
 
     def callee(self, node: ast.Call) -> Any:
         """Return the function that is called."""
-        function = self.thing(node.func)
+        function = self.resolve(node.func)
         if function is None:
             raise refuse(node, "a call")
         return function
@@ -473,7 +456,7 @@ class Function:
         return literal(self.globals[node.id], self.program.single, node)
 
     def _attribute(self, node: ast.Attribute) -> Value:
-        if (constant := self.thing(node)) is not None:
+        if (constant := self.resolve(node)) is not None:
             return literal(constant, self.program.single, node)
         home, name = self.value(node.value), node.attr
         if home.kind == "y":
@@ -485,18 +468,18 @@ class Function:
         raise refuse(node, "an attribute")
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        array, index = self.thing(node.value), self.numeric(node.slice)
+        array, index = self.resolve(node.value), self.numeric(node.slice)
         if index.kind != "int":
-            raise refuse(node, "an index that is no whole number")
+            raise refuse(node, "an index that is not an integer")
         if isinstance(array, tuple | list | np.ndarray):
-            made = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
-            return Value(f"{made.text}[{index.text}]", made.kind)
+            constants = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
+            return Value(f"{constants.text}[{index.text}]", constants.kind)
         home = self.value(node.value)
         if home.kind != "memory":
             raise refuse(node, "an element")
         place = self.constant(node.slice)
         if place is None or place < 0:
-            why = "at a place that is no constant" if place is None else "counted from its end"
+            why = "at an index that is not constant" if place is None else "at a negative index"
             raise refuse(node, f"memory {why}")
         self.program.slots = max(self.program.slots, int(place) + 1)
         return Value(f"{home.text}[{index.text}]", "real")
@@ -518,7 +501,7 @@ class Function:
         whole = left.kind in WHOLE_KINDS and right.kind in WHOLE_KINDS
         if type(node.op) in BITS:
             if not whole:
-                raise refuse(node, "an operation on bits of what is no whole number")
+                raise refuse(node, "a bit operation on real numbers")
             return Value(f"{left.within(ATOM)} {BITS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
         if type(node.op) not in OPERATORS:
             raise refuse(node, f"the operator {type(node.op).__name__}")
@@ -538,7 +521,7 @@ class Function:
             return base
         if exponent == 0.5:
             return self.math("sqrt", [base])
-        if (power := f"raised_{exponent}") in POWERS or exponent == 2:
+        if (power := f"power_{exponent}") in POWERS or exponent == 2:
             return Value(f"{self.program.helper(power.removesuffix('.0'), base.kind)}({base.text})", base.kind)
         power = self.numeric(node.right)
         if power.kind in WHOLE_KINDS:
@@ -556,8 +539,8 @@ class Function:
     def _boolop(self, node: ast.BoolOp) -> Value:
         values = [self.numeric(v) for v in node.values]
         if any(v.kind != "bool" for v in values):
-            raise refuse(node, "`and` or `or` of what is no comparison")
-        # a plain comparison needs no parentheses, a chain of them or another operator does
+            raise refuse(node, "`and` or `or` of numbers instead of comparisons")
+        # && and || of other operands need parentheses around a nested && or ||
         parts = [f"({v.text})" if "&&" in v.text or "||" in v.text else v.text for v in values]
         return Value((" && " if isinstance(node.op, ast.And) else " || ").join(parts), "bool", LOOSE)
 
@@ -578,15 +561,15 @@ class Function:
         return Value(f"{beginning})", kinds[0])
 
     def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
-        """Translate a call of a function that Python or numpy has built in; None for another function."""
+        """Translate a call of a function of Python, math or numpy; return None for another function."""
         if function in (min, max):
-            return self.extreme("least" if function is min else "most", values, node)
+            return self.extreme("minimum" if function is min else "maximum", values, node)
         if function in CASTS and len(values) == 1:
             kind = CASTS[function]
             return Value(f"({TYPES[kind]}){values[0].within(UNARY)}", kind, UNARY)
         if function in (abs, math.fabs):
             if values[0].kind in WHOLE_KINDS:
-                return Value(f"{self.program.helper('size', 'int')}({values[0].text})", "int")
+                return Value(f"{self.program.helper('absolute', 'int')}({values[0].text})", "int")
             return self.math("fabs", values)
         if function in ROUNDING:
             return Value(f"(int32_t){self.math(ROUNDING[function], values).text}", "int", UNARY)
@@ -596,11 +579,11 @@ class Function:
         """Translate min or max, from left to right."""
         if len(values) == 1:
             raise refuse(node, "min or max of one thing")
-        found = values[0]
+        result = values[0]
         for value in values[1:]:
-            kind = wider(found.kind, value.kind)
-            found = Value(f"{self.program.helper(helper, kind)}({found.text}, {value.text})", kind)
-        return found
+            kind = wider(result.kind, value.kind)
+            result = Value(f"{self.program.helper(helper, kind)}({result.text}, {value.text})", kind)
+        return result
 
     def math(self, name: str, values: Sequence[Value]) -> Value:
         """Translate a call of a function of math.h, in the precision of its arguments."""
@@ -609,20 +592,20 @@ class Function:
         return Value(f"{name}{suffix}({', '.join(v.text for v in values)})", "single" if single else "real")
 
 
-# Python as it was written
+# reading Python
 
 
 def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     """Return a Python function, compiled or not, and its syntax tree."""
     written = getattr(function, "py_func", function)
     if not isinstance(written, FunctionType):
-        raise refuse(None, f"{getattr(function, '__name__', function)}, which is no function of Python's,")
+        raise refuse(None, f"{getattr(function, '__name__', function)}, which is not a Python function,")
     try:
         (tree,) = ast.parse(textwrap.dedent(inspect.getsource(written))).body
     except (OSError, SyntaxError, ValueError):
-        raise refuse(None, f"{written.__name__}, whose source is not at hand,") from None
+        raise refuse(None, f"{written.__name__}, whose source is not available,") from None
     if not isinstance(tree, ast.FunctionDef):
-        raise refuse(tree, "what is no def")
+        raise refuse(tree, "a function without def")
     return written, tree
 
 
@@ -632,13 +615,13 @@ def names_in(nodes: Iterable[ast.AST]) -> set[str]:
 
 
 def changed(nodes: Iterable[ast.AST]) -> set[str]:
-    """Return the names of variables that some code changes, and of arrays of which it changes an element."""
+    """Return the names of variables and arrays that some code changes."""
     inside = [n for node in nodes for n in ast.walk(node) if isinstance(getattr(n, "ctx", None), ast.Store)]
     return names_in(n.value if isinstance(n, ast.Subscript) else n for n in inside)
 
 
 def returns(body: Sequence[ast.stmt]) -> bool:
-    """Return whether some code always ends in a return."""
+    """Return whether every path through some code ends in a return."""
     match body[-1]:
         case ast.If(body=yes, orelse=no):
             return bool(no) and returns(yes) and returns(no)
@@ -647,40 +630,40 @@ def returns(body: Sequence[ast.stmt]) -> bool:
 
 
 def clash(targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> bool:
-    """Return whether a value reads an earlier target, so that the assignments cannot be made one after the other."""
+    """Return whether a value reads an earlier target, which rules out assigning one after the other."""
     return any(names_in(targets[:i]) & names_in([value]) for i, value in enumerate(values))
 
 
 def known(name: str, kind: str, names: Iterable[str]) -> None:
-    """Refuse a name that is not among those that a law can read."""
+    """Refuse a name that a law cannot read."""
     if name not in names:
         raise Untranslatable(f"it reads an {unknown(kind, name, names)}")
 
 
 def refuse(node: ast.AST | None, what: str) -> Untranslatable:
-    """Return the error for a piece of Python."""
+    """Return the error for a piece of Python without translation."""
     code = f" ({shown(ast.unparse(node))[1:-1]})" if node is not None else ""
     return Untranslatable(
         f"{what}{code} has no translation into C: write it with arithmetic, if, for and math's functions"
     )
 
 
-# C as it is written
+# writing C
 
 
 def wider(one: str, other: str) -> str:
-    """Return the kind of an operation on two kinds, as C and numba agree. A whole number and a single give a real."""
+    """Return the kind of an operation on two kinds, in C and in numba. An integer and a single give a real."""
     if "single" in (one, other) and (one in WHOLE_KINDS or other in WHOLE_KINDS):
         return "real"
     return max(one, other, key=KINDS.index)
 
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:
-    """Return a number of Python's in C.
+    """Return a Python number in C.
 
     Args:
       single: whether smc_real is float.
-      node: where it stands, for an error.
+      node: the code that contains it, for errors.
     """
     kind = "single" if type(value) is np.float32 else "real"
     if isinstance(value, bool):
@@ -701,7 +684,7 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
 
 
 def plain(name: str) -> str:
-    """Return a name in letters that C99 takes everywhere: ASCII."""
+    """Return a name in ASCII letters, which every C99 compiler accepts."""
     return "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
 
 

@@ -261,8 +261,8 @@ REFUSED = {
     "u = y.e // 2.0": "the operator FloorDiv",
     "u = 'a'": "the value 'a'",
     "u = y.e if y.de else np.sign(y.e)": "sign",
-    "memory[int(y.t)] = 1.0; u = 0.0": "memory at a place that is no constant",
-    "memory[-1] = 1.0; u = 0.0": "memory counted from its end",
+    "memory[int(y.t)] = 1.0; u = 0.0": "memory at an index that is not constant",
+    "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "for u in (y.e, y.de): pass": "a loop over anything but a range",
     "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
     "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
@@ -276,7 +276,7 @@ REFUSED = {
     "y = 3.0; u = y": "an assignment to this",
     "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
     "u = gains.k * y.e": "it reads an unknown gain 'k': there are none",
-    "u = halts(y.e)": "halts, whose last line is no return,",
+    "u = halts(y.e)": "halts, which does not end in a return,",
 }
 
 
