@@ -6,11 +6,10 @@
     trace = smc.run(scenario)
     print(smc.score(trace))
 
-`__init__.pyi`, beside this file, lists the public names and where they live. A name is loaded when it is first used, so
-that importing the package costs nothing.
+`__init__.pyi` lists the public names and their modules. A name is loaded when it is first used, so that importing the
+package costs nothing.
 """
 
-import functools
 import importlib
 import re
 from pathlib import Path
@@ -21,7 +20,7 @@ from smc_mujoco.envs import registration
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text()
 _HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
-_MODULES = {  # public modules; an extra brings what three of them import
+_MODULES = {  # public modules; three of them need an extra
     "gym": "smc_mujoco.envs.gymnasium_env",
     "paper": "smc_mujoco.studies.paper.scenarios",
     "suite": "smc_mujoco.envs.dm_control_env",
@@ -33,39 +32,27 @@ __path__.append(str(Path(__file__).parent / "moved"))  # old names of modules, f
 
 
 def __getattr__(name: str) -> object:
-    if name == "__spec__":
-        return _spec()
+    if name == "__spec__":  # read by every further import, such as that of gymnasium.make("smc_mujoco:Duffing-v0")
+        if registration.register_if_imported():
+            globals()["__spec__"] = _SPEC
+        return _SPEC
     if name not in _HOMES and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = _load(name)
-    return value
-
-
-@functools.cache
-def _load(name: str) -> object:
-    """Return a public function, class or module from its home."""
     with held_back():
         if name in _MODULES:
-            return importlib.import_module(_MODULES[name])
-        value = getattr(importlib.import_module(_HOMES[name]), name)
-        return importlib.import_module("smc_mujoco.common.arguments").explained(value)
+            value = importlib.import_module(_MODULES[name])
+        else:
+            value = getattr(importlib.import_module(_HOMES[name]), name)
+            value = importlib.import_module("smc_mujoco.common.arguments").explained(value)
+    return globals().setdefault(name, value)
 
 
 def __dir__() -> list[str]:
     return sorted({*_HOMES, *_MODULES, "__doc__", "__version__"})
 
 
-def _spec() -> object:
-    """Return `__spec__`, at which Python looks in every further import of this package.
-
-    `gymnasium.make("smc_mujoco:Duffing-v0")` is such an import. If gymnasium has come since the first one, the ids are
-    registered now, and `__spec__` is put in its place.
-    """
-    if registration.register_if_imported():
-        globals()["__spec__"] = _SPEC
-    return _SPEC
-
-
+# gymnasium.make imports this package and then looks an id up. If the package was imported before gymnasium, nothing of
+# it runs again, but Python reads its __spec__: so __getattr__ supplies that until the ids are registered.
 _SPEC = __spec__
 if not registration.register_if_imported():
     del __spec__

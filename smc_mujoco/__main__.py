@@ -1,4 +1,4 @@
-"""`python -m smc_mujoco`: the command line, also where its program is not on the path."""
+"""`python -m smc_mujoco`: the command line, for a shell in which its program is not on the path."""
 
 from smc_mujoco.cli.main import main
 

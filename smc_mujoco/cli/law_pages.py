@@ -1,16 +1,16 @@
 """Laws, surfaces and velocity estimators in the terminal: a line for each, or a page about one.
 
-Everything is read from the templates and their docstrings. These have one form: `Name: formula` first, then what is
-known, then `Source:`.
+Everything comes from the templates and their docstrings. A docstring begins with `Name: formula` and ends with
+`Source: ...`; between them are sentences on what is known.
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rich.console import Console
 from rich.padding import Padding
-from rich.table import Table
+from rich.table import Column
 from rich.text import Text
 
 from smc_mujoco.cli.tables import plain, titled
@@ -24,16 +24,17 @@ SOURCE = re.compile(r"(?<![\w.])Sources?: ")
 SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
 DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled)", re.I)
 INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
-HEADINGS = {"Laws": laws, "Surfaces": surfaces, "Velocity estimators": estimators}
-WAYS = {
-    "law": "smc.law({call})",
-    "surface": "smc.Scenario(surface=smc.surface({call}), ...)",
-    "estimator": "smc.Scenario(velocity=smc.estimator({call}), ...)",
+CATALOGUES = {"Laws": laws, "Surfaces": surfaces, "Velocity estimators": estimators}
+DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
+CALLS = {
+    "law": "smc.law({})",
+    "surface": "smc.Scenario(surface=smc.surface({}), ...)",
+    "estimator": "smc.Scenario(velocity=smc.estimator({}), ...)",
 }
 
 
 class Entry(NamedTuple):
-    """A docstring taken apart: name in words, formula, sentences on discretisation, what else is known, source."""
+    """The parts of a docstring: name in words, formula, sentences on discretisation, other sentences, source."""
 
     title: str
     formula: str
@@ -44,17 +45,17 @@ class Entry(NamedTuple):
 
 def catalogue() -> dict[str, list[Template]]:
     """Return name -> the law, the surface and the velocity estimator of that name."""
-    found: dict[str, list[Template]] = {}
-    for known in (laws(), surfaces(), estimators()):
-        for name, template in known.items():
-            found.setdefault(name, []).append(template)
-    return found
+    by_name: dict[str, list[Template]] = {}
+    for templates in CATALOGUES.values():
+        for name, template in templates().items():
+            by_name.setdefault(name, []).append(template)
+    return by_name
 
 
 def entry(template: Template) -> Entry:
     """Return the parts of a template's docstring."""
-    said, *source = SOURCE.split(template.doc, maxsplit=1)
-    first, *paragraphs = (" ".join(p.split()) for p in said.strip().split("\n\n"))
+    text, *source = SOURCE.split(template.doc, maxsplit=1)
+    first, *paragraphs = (" ".join(p.split()) for p in text.strip().split("\n\n"))
     head, *more = SENTENCE.split(first, maxsplit=1)
     if head.endswith(":") and paragraphs:
         head += " " + paragraphs.pop(0)
@@ -74,7 +75,7 @@ def brief(source: str) -> str:
     """Return a source in short: its first author, or two, and its year."""
     first = INITIALS.sub("", source).partition(";")[0]
     authors, *others = re.split(r", | \(", first.partition('"')[0])
-    if authors.startswith("the law of "):  # and what follows is of others
+    if authors.startswith("the law of "):  # what follows is by others
         return authors.removeprefix("the law of ")
     if "&" not in authors and any("&" in other for other in others[:4]):
         authors += " et al."
@@ -90,47 +91,43 @@ def print_pages(name: str | None, console: Console) -> None:
     """
     if name is not None:
         for template in find("law, surface or velocity estimator", name, catalogue()):
-            page(template, console)
+            print_page(template, console)
         return
-    for heading, known in HEADINGS.items():
-        console.print(_overview(heading, known()), "")
+    for heading, templates in CATALOGUES.items():
+        known, degree = templates(), [Column("deg", justify="right", style="dim")] * (heading == "Laws")
+        columns = (
+            Column("name", no_wrap=True, style="cyan"),
+            *degree,
+            "formula",
+            Column("source", style="dim", max_width=17),
+        )
+        table = titled(f"{heading} ({len(known)})", *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
+        for _, template in sorted(known.items()):
+            parts = entry(template)
+            degrees = [str(template.relative_degree)] * len(degree)
+            table.add_row(template.name, *degrees, Text(parts.formula), Text(brief(parts.source)))
+        console.print(table, "")
     console.print("One in full: [cyan]smc-mujoco laws NAME[/]", highlight=False)
 
 
-def _overview(heading: str, templates: Mapping[str, Template]) -> Table:
-    graded = any(t.kind == "law" for t in templates.values())
-    table = titled(f"{heading} ({len(templates)})", show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-    table.add_column("name", no_wrap=True, style="cyan")
-    if graded:
-        table.add_column("deg", justify="right", style="dim")
-    table.add_column("formula")
-    table.add_column("source", style="dim", max_width=17)
-    for name, template in sorted(templates.items()):
-        said = entry(template)
-        degree = [str(template.relative_degree)] if graded else []
-        table.add_row(name, *degree, Text(said.formula), Text(brief(said.source)))
-    return table
-
-
-def page(template: Template, console: Console) -> None:
+def print_page(template: Template, console: Console) -> None:
     """Print everything about one law, surface or estimator."""
-    said = entry(template)
-    console.print(Text.assemble((template.name, "bold cyan"), f"  {said.title}", (f"  {template.kind}", "dim")))
-    console.print(Padding(Text(said.formula, style="bold"), (0, 0, 1, 2)))
-    rows: list[tuple[str, str | Sequence[str]]] = [("gains", [*_gains(template)])]
-    rows.append(("conditions", [*template.conditions] or ["none on the gains alone"]))
-    if template.kind != "estimator":
-        rows.append(("degree", _degree(template)))
-    if template.kind == "law":
-        rows.append(("plants", ", ".join(template.plants) or "every one whose joints are all driven"))
-    rows += [("discretisation", said.discretisation), ("known", said.known), ("source", said.source)]
-    gains = [f"{key}={value:g}" for key, value in list(template.defaults.items())[:2]]
-    rows.append(("use", WAYS[template.kind].format(call=", ".join([f'"{template.name}"', *gains]))))
-    table = plain(padding=(0, 2, 1, 0))
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column()
-    for label, value in rows:
-        text = value if isinstance(value, str) else "\n".join(value)
+    parts, is_law = entry(template), template.kind == "law"
+    console.print(Text.assemble((template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")))
+    console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
+    call = ", ".join([f'"{template.name}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
+    rows = {
+        "gains": "\n".join(_gains(template)),
+        "conditions": "\n".join(template.conditions) or "none on the gains alone",
+        "degree": _degree(template),
+        "plants": (", ".join(template.plants) or "every one whose joints are all driven") * is_law,
+        "discretisation": parts.discretisation,
+        "known": parts.known,
+        "source": parts.source,
+        "use": CALLS[template.kind].format(call),
+    }
+    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
+    for label, text in rows.items():
         if text:
             table.add_row(label, Text(text))
     console.print(table)
@@ -147,8 +144,8 @@ def _gains(template: Template) -> Iterable[str]:
 
 
 def _degree(template: Template) -> str:
-    """Return the relative degree in words: what a law acts on, or what a surface gives."""
-    what = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}.get(template.relative_degree, "")
-    if template.kind == "surface":
-        return f"{template.relative_degree}: for the laws of that degree"
-    return f"{template.relative_degree}: acts on {what}" if what else str(template.relative_degree)
+    """Return the relative degree in words: of what a law acts on, or a surface gives; an estimator has none."""
+    degree = template.relative_degree
+    if template.kind == "law":
+        return f"{degree}: acts on {DEGREES[degree]}" if degree in DEGREES else str(degree)
+    return f"{degree}: for the laws of that degree" if template.kind == "surface" else ""

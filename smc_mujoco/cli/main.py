@@ -8,22 +8,10 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import (
-    basin,
-    bench,
-    catalogue,
-    check_c,
-    claims,
-    export_c,
-    margins,
-    report,
-    run,
-    show,
-    tune,
-    view,
-)
+from smc_mujoco.cli.commands import analysis, c, catalogue, runs, studies
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
+from smc_mujoco.common.version import __version__
 
 app = typer.Typer(
     help="Sliding-mode controllers on MuJoCo mechanisms: run scenes, compare laws, look at traces.",
@@ -31,17 +19,34 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
+COMMANDS = {
+    "list": catalogue.list_,
+    "laws": catalogue.laws,
+    "run": runs.run,
+    "show": runs.show,
+    "tune": analysis.tune,
+    "bench": studies.bench,
+    "margins": analysis.margins,
+    "basin": analysis.basin,
+    "claims": studies.claims,
+    "report": studies.report,
+    "view": runs.view,
+    "check-c": c.check_c,
+    "export-c": c.export_c,
+}
+for name, command in COMMANDS.items():
+    app.command(name)(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; what the user can mend ends in one sentence and exit code 2."""
+    """Run the command line. An error that the user can correct ends in one sentence and exit code 2."""
     for name in ("stdin", "stdout", "stderr"):  # in this order, so that each gets the descriptor that was closed
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
     if not os.environ.get("COLUMNS", "80").strip("0"):
-        del os.environ["COLUMNS"]  # 0 is what a terminal without a width says
+        del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
     choose_gl()  # before a command imports mujoco, which fails where MUJOCO_GL names no backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
@@ -52,37 +57,16 @@ def play(scene: str) -> None:
     main(["run", scene, *sys.argv[1:]])
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
-        import smc_mujoco
-
-        print(f"smc-mujoco {smc_mujoco.__version__}")
+        print(f"smc-mujoco {__version__}")
         raise typer.Exit
 
 
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Options before a command."""
-
-
-COMMANDS = {
-    "list": catalogue.list_,
-    "laws": catalogue.laws,
-    "run": run.run,
-    "show": show.show,
-    "tune": tune.tune,
-    "bench": bench.bench,
-    "margins": margins.margins,
-    "basin": basin.basin,
-    "claims": claims.claims,
-    "report": report.report,
-    "view": view.view,
-    "check-c": check_c.check_c,
-    "export-c": export_c.export_c,
-}
-for name, command in COMMANDS.items():
-    app.command(name)(command)
+    """Define the options that stand before a command."""

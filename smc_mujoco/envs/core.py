@@ -1,9 +1,9 @@
-"""A plant with a task, ready to be simulated: the same for dm_env, gymnasium and batches.
+"""A plant with a task, ready to be simulated: the common base of dm_env, gymnasium and batched environments.
 
-The physics are those of `smc.run`. An action is the command u of a control sample, held for one control period, in
-parts of its channel's limit: in [-1, 1], beyond which it saturates. The limit is u_max or what the channel's own motor
-gives. An environment has no law, and nothing that a Scenario puts between plant and law (noise, delay, encoder); and no
-disturbances, contacts and jumps.
+The physics are those of `smc.run`. An action is the command u of each driven channel, divided by the channel's limit
+and held for one control period; it saturates outside [-1, 1]. The limit is u_max, or that of the channel's own motor.
+An environment has no law, and nothing that a Scenario puts between plant and law (noise, delay, encoder). It has no
+disturbances, contacts or jumps.
 """
 
 import math
@@ -26,7 +26,7 @@ from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.guarded import Failure, signalled
 from smc_mujoco.simulation.scenario import Scenario
 
-FIELDS = (  # of a Scenario that an environment takes
+FIELDS = (  # of a Scenario, that an environment accepts
     "duration", "control_period", "physics_step", "integrator", "u_max", "x0", "v0", "reference", "mismatch",
     "friction", "mechanism", "actuator",
 )  # fmt: skip
@@ -36,18 +36,18 @@ class Setting:
     """A plant with a task, compiled. Environments of every kind have one.
 
     Attributes:
-      task: what is asked.
-      scenario: the run that an episode is, with the law `none`.
+      task: the Task.
+      scenario: the run that equals an episode, with the law `none`.
       model: its compiled model.
       qpos, qvel: addresses of the n channels, (n,) each.
       ctrl: addresses of the driven channels' actuators.
-      rotors: channels with a rotor of their own, and its addresses in qpos and qvel, (3, m).
-      rest: qpos (nq,) and qvel (nv,) of a run's start, into which an episode's x and v are put.
-      most: the largest inputs of the model's actuators, (driven,).
-      which: the channels that the task singles out, (n,) of bool.
-      low, high: bounds of the starts, (n,) each.
-      references: r, r', r'' at every sample, (K + 1, 3); one row if the task follows none.
-      size: of an observation: positions, velocities, and for a moving task r, r', r''.
+      rotors: the m channels with a separate rotor, and the rotor's addresses in qpos and qvel, (3, m).
+      rest: qpos (nq,) and qvel (nv,) at the start of a run, before x and v of the episode are written into them.
+      ctrl_limits: the largest inputs of the model's actuators, (driven,).
+      selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
+      low, high: bounds of the initial positions, (n,) each.
+      references: r, r', r'' at every sample, (K + 1, 3); one row if the task has no reference.
+      size: number of values in an observation: positions, velocities, and r, r', r'' if the task has a reference.
       shape: of an action.
     """
 
@@ -64,19 +64,19 @@ class Setting:
           plant: a Plant or the name of one.
           task: one of `tasks(plant)`.
           changes: Scenario field -> value, of FIELDS, such as {"control_period": 0.01, "u_max": 3.0}.
-          edit: changes the mechanism before it is compiled, but not how it moves.
+          edit: changes the mechanism before it is compiled; it must not change the motion.
 
         Raises:
           ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
         """
         plant = find_plant(plant) if isinstance(plant, str) else plant
-        self.task, offered = find("task", task, TASKS), tasks(plant)
-        if task not in offered:
-            raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(offered)}")
+        self.task, known = find("task", task, TASKS), tasks(plant)
+        if task not in known:
+            raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
         if math.inf in self.scenario.limits:
-            raise ScenarioError("u_max is inf: give a finite one, so that an agent knows what it may ask")
+            raise ScenarioError("u_max is inf: give a finite one, which actions are multiplied by")
         fixed = np.array(self.scenario.x0)
         self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
         self.model = _compiled(self.scenario, edit)
@@ -84,33 +84,37 @@ class Setting:
         self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
         self.rotors = _rotors(self.model)
         self.rest = assembly.start(self.model, self.scenario)
-        self.most = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
-        self.which = self.task.which(plant)
+        self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
+        self.selected = self.task.selected(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
         self.size, self.shape = 2 * plant.n + 3 * self.task.moving, (plant.driven,)
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """Return the actuators' inputs for an action: each channel's limit times the action, saturated.
+        """Return the actuators' inputs for an action, (*copies, driven): its saturated values times the limits.
 
         Raises:
           ScenarioError: an action of another shape, or not of finite numbers.
         """
+        shape = copies + self.shape
         try:
             a = np.asarray(action, float)
         except (TypeError, ValueError):
             a = np.array(np.nan)
-        if a.shape != copies + self.shape or not math.isfinite(np.vdot(a, a)):
-            shape = copies + self.shape
-            raise ScenarioError(f"action is {_culprit(action, a, shape)}: give finite numbers, of shape {shape}")
-        return self.most * np.minimum(np.maximum(a, -1.0), 1.0)
+        if a.shape != shape or not math.isfinite(np.vdot(a, a)):
+            wrong = shown(action)
+            if a.shape == shape and copies:  # name the first copy that is not finite
+                i = int(np.argmin(np.abs(a).max(axis=-1) < MAX_CONTROL))
+                wrong = f"{shown(a[i].tolist())} for copy {i}"
+            raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
+        return self.ctrl_limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def stretches(self, ctrl: np.ndarray, command: np.ndarray, first: np.ndarray) -> Iterator[int]:
-        """Write a command into ctrl over a control period, and yield for how many physics steps each input holds.
+        """Write a command into ctrl over a control period; yield for how many physics steps each input holds.
 
         Args:
           ctrl: of one simulation, (nu,), or of several, (..., nu).
-          command: what `command` returned, (..., driven).
-          first: the output of the first of two drives, as command; it is updated.
+          command: the return value of `command`, (..., driven).
+          first: output of the first of two drives in series, (..., driven); updated in place.
         """
         tandem, steps = self.scenario.tandem, self.scenario.steps
         if tandem is None:
@@ -122,7 +126,7 @@ class Setting:
             yield 1
 
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
-        """Return a start, x and v, (n,) each: drawn from a numpy generator of either kind, or from options x0 and v0.
+        """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0.
 
         Raises:
           ScenarioError: another option, not n finite numbers, or an x0 outside a joint's range.
@@ -133,33 +137,33 @@ class Setting:
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
-            found = np.array(coerce.state(name, value, self.scenario.plant.n))
+            state = np.array(coerce.state(name, value, self.scenario.plant.n))
             if name == "x0":
-                within(self.scenario.plant.name, self.scenario.plant.ranges, found)
-            x, v = (found, v) if name == "x0" else (x, found)
+                within(self.scenario.plant.name, self.scenario.plant.ranges, state)
+            x, v = (state, v) if name == "x0" else (x, state)
         return x, v
 
     def place(self, qpos: np.ndarray, qvel: np.ndarray, x: np.ndarray, v: np.ndarray) -> None:
         """Write a start into qpos (nq,) and qvel (nv,)."""
         qpos[:], qvel[:] = self.rest
         qpos[self.qpos], qvel[self.qvel] = x, v
-        channel, at_q, at_v = self.rotors
-        qpos[at_q], qvel[at_v] = x[channel], v[channel]
+        channel, rotor_qpos, rotor_qvel = self.rotors
+        qpos[rotor_qpos], qvel[rotor_qvel] = x[channel], v[channel]
 
     def reference(self, k: Any) -> np.ndarray:
         """Return r, r', r'' at sample k, (..., 3), as a copy."""
         return np.take(self.references, k, axis=0, mode="clip")
 
     def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
-        """Return the observation at sample k: x, v, and for a moving task the reference, (..., size)."""
+        """Return the observation at sample k, (..., size): x, v, and the reference if the task has one."""
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
     def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
         """Return the reward for x, v (..., n) at sample k."""
-        return reward(*self.task.errors(x, v, self.reference(k), self.which))
+        return reward(*self.task.errors(x, v, self.reference(k), self.selected))
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
-        """Return whether x, v (..., n) are outside the finite world."""
+        """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
         return ~(np.vecdot(x, x) + np.vecdot(v, v) < MAX_STATE**2)
 
 
@@ -169,9 +173,9 @@ class Episode:
     Attributes:
       setting: the plant with its task.
       sample: control samples since the episode began.
-      first: the output of the first of two drives, (driven,).
+      first: output of the first of two drives in series, (driven,).
       x, v: positions and velocities, (n,) each.
-      over: whether the plant has left the finite world, where an episode ends without reward.
+      over: whether the plant has diverged, which ends the episode without a reward.
     """
 
     def __init__(self, setting: Setting):
@@ -179,7 +183,7 @@ class Episode:
         self.x = self.v = np.zeros(setting.scenario.plant.n)
 
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
-        """Draw a start, or take it from options x0 and v0."""
+        """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         x, v = self.setting.draw(random, options)
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.place(data.qpos, data.qvel, x, v)
@@ -187,7 +191,7 @@ class Episode:
         self.look(data)
 
     def stretches(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
-        """Give an action to the actuators, and yield for how many physics steps each of their inputs holds."""
+        """Apply an action, as `Setting.stretches` does."""
         return self.setting.stretches(data.ctrl, self.setting.command(action), self.first)
 
     def look(self, data: mujoco.MjData) -> None:
@@ -201,18 +205,8 @@ class Episode:
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:
-    """Return an observation with its values limited to the finite world: the last one of an episode that left it."""
-    return np.clip(
-        np.nan_to_num(observation, nan=MAX_STATE, posinf=MAX_STATE, neginf=-MAX_STATE), -MAX_STATE, MAX_STATE
-    )
-
-
-def _culprit(action: Any, a: np.ndarray, shape: tuple[int, ...]) -> str:
-    """Return a refused action in words; of many copies the first one that is not finite."""
-    if a.shape != shape or a.ndim < 2:
-        return shown(action)
-    i = int(np.argmin(np.abs(a).max(axis=-1) < MAX_CONTROL))
-    return f"{shown(a[i].tolist())} for copy {i}"
+    """Return the last observation of an episode that diverged, with its values limited to the observation space."""
+    return np.clip(np.nan_to_num(observation, nan=MAX_STATE), -MAX_STATE, MAX_STATE)
 
 
 def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
@@ -228,7 +222,7 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
 
 
 def _rotors(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels with a rotor of their own, and its addresses in qpos and qvel, (3, m)."""
+    """Return the channels with a separate rotor, and the rotor's addresses in qpos and qvel, (3, m)."""
     rotors = []
     for i, joint in enumerate(joint_ids(model)):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
@@ -238,7 +232,7 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _references(scenario: Scenario, samples: int) -> np.ndarray:
-    """Return r, r', r'' at the first samples, (samples, 3)."""
+    """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
     times = np.arange(samples) * scenario.control_period
     try:
         references = np.array([signalled(scenario.reference, float(t)) for t in times])
@@ -254,7 +248,7 @@ def _compiled(scenario: Scenario, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     """Return the model of a scenario, with its mechanism edited."""
     spec = assembly.spec([scenario])
     edit(spec)
-    made = ready(spec, 0)
-    made.opt.timestep = scenario.physics_step
-    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
-    return assembly.numbered(made, scenario)
+    model = ready(spec, 0)
+    model.opt.timestep = scenario.physics_step
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
+    return assembly.numbered(model, scenario)

@@ -5,9 +5,9 @@
     while not timestep.last():
         timestep = environment.step(agent(timestep))
 
-An action is the command of the driven channels, in parts of their limits. Observations are {"position": x,
-"velocity": v}, (n,) each, angles unwrapped, and for `track` "reference": r, r', r''; tasks and rewards stand in
-`tasks`. They open in dm_control's viewer: viewer.launch(environment).
+An action is the command of the driven channels, divided by their limits. Observations are {"position": x,
+"velocity": v}, (n,) each, with unwrapped angles, and for `track` also "reference": r, r', r''. The module `tasks`
+describes tasks and rewards. dm_control's viewer shows an environment: viewer.launch(environment).
 """
 
 import contextlib
@@ -32,15 +32,16 @@ with extra("dm", "smc_mujoco.envs.dm_control_env"):
     from dm_control.mujoco.wrapper import MjModel
     from dm_control.rl import control
 
-TASK_KWARGS = {"random": "random", "time_limit": "duration"}  # of dm_control's suite: what it is called here
+# Names of dm_control's suite -> names here.
+TASK_KWARGS = {"random": "random", "time_limit": "duration"}
 ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep": "control_period"}
 
 
 class PlantPhysics(Physics):
-    """dm_control's physics, where a plant that leaves the finite world raises nothing.
+    """dm_control's physics, without its exception for a plant that diverges.
 
     Attributes:
-      stretches: numbers of the coming physics steps, of `Setting.stretches`.
+      stretches: numbers of physics steps to come, from `Setting.stretches`.
     """
 
     stretches: Iterable[int] = ()
@@ -56,15 +57,15 @@ class PlantPhysics(Physics):
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
-        """Check nothing: `PlantTask.over` does it."""
+        """Check nothing, because `PlantTask.over` does."""
         yield
 
 
 class PlantTask(Episode, control.Task):
-    """A task of `tasks` for dm_control. Attributes are those of an Episode, and:
+    """A task of `tasks` for dm_control.
 
     Attributes:
-      random: the numpy generator of the starts.
+      random: the numpy generator of the starts; the others are those of an Episode.
     """
 
     def __init__(self, setting: Setting, random: Any):
@@ -76,7 +77,7 @@ class PlantTask(Episode, control.Task):
         self.begin(physics.data.ptr, self.random)
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Give the command to the actuators."""
+        """Apply the action."""
         physics.stretches = self.stretches(physics.data.ptr, action)
 
     def after_step(self, physics: Physics) -> None:
@@ -85,23 +86,23 @@ class PlantTask(Episode, control.Task):
         self.look(physics.data.ptr)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the spec of commands of the driven channels, in parts of their limits."""
+        """Return the spec of an action: commands of the driven channels, divided by their limits."""
         return specs.BoundedArray(self.setting.shape, float, minimum=-1.0, maximum=1.0, name="u")
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return positions and velocities, and for a moving task the reference."""
+        """Return positions and velocities, and the reference if the task has one."""
         x, v = (bounded(self.x), bounded(self.v)) if self.over else (self.x, self.v)
-        found = OrderedDict(position=x, velocity=v)
+        observation = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
-            found["reference"] = self.setting.reference(self.sample)
-        return found
+            observation["reference"] = self.setting.reference(self.sample)
+        return observation
 
     def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the reward of the state."""
         return self.reward()
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the discount 0 where the plant has left the finite world, which ends the episode."""
+        """Return the discount 0, which ends the episode, if the plant has diverged."""
         return 0.0 if self.over else None
 
 
@@ -120,34 +121,38 @@ def load(
     Args:
       domain: a Plant or the name of one.
       task: one of `smc_mujoco.envs.tasks.tasks(domain)`.
-      task_kwargs: of dm_control's suite: random, and time_limit, in s, which is the field duration.
-      environment_kwargs: of dm_control's suite: flat_observation, and control_timestep, in s, which is the field
-        control_period. Both hold over the arguments below.
-      random: a seed or a numpy generator, of the starts; None for another start every time.
+      task_kwargs: arguments of dm_control's suite: random, and time_limit in s, which is the field duration.
+      environment_kwargs: arguments of dm_control's suite: flat_observation, and control_timestep in s, which is the
+        field control_period. Both take precedence over the arguments below.
+      random: a seed or a numpy generator for the starts; None for different starts every time.
       changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max": 3.0}.
-      flat_observation: whether an observation is one array, {"observations": ...}, as dm_control's suite offers.
+      flat_observation: whether an observation is one array, {"observations": ...}, as in dm_control's suite.
 
     Raises:
-      ScenarioError: a plant, task or field that there is not, a task that is not for the plant, a value out of range.
+      ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
       MissingPackageError: dm_control does not fit the MuJoCo that is installed.
     """
-    named = _named("task_kwargs", task_kwargs, TASK_KWARGS)
-    named |= _named("environment_kwargs", environment_kwargs, ENVIRONMENT_KWARGS)
-    random = named.pop("random", random)
-    flat_observation = named.pop("flat_observation", flat_observation)
-    if named and isinstance(changes, Mapping | None):
-        changes = {**(changes or {}), **named}
-    found = Setting(domain, task, changes)
+    values = _renamed("task_kwargs", task_kwargs, TASK_KWARGS)
+    values |= _renamed("environment_kwargs", environment_kwargs, ENVIRONMENT_KWARGS)
+    random = values.pop("random", random)
+    flat_observation = values.pop("flat_observation", flat_observation)
+    if values and isinstance(changes, Mapping | None):
+        changes = {**(changes or {}), **values}
+    setting = Setting(domain, task, changes)
     if not isinstance(random, np.random.RandomState | np.random.Generator):
-        random = _generator(random)
-    scenario = found.scenario
+        try:
+            random = np.random.default_rng(random)
+        except (TypeError, ValueError):
+            choices = "a seed, a whole number from 0, or a generator"
+            raise ScenarioError(f"random is {shown(random)}: give {choices}") from None
+    scenario = setting.scenario
     return control.Environment(
-        _physics(found.model),
-        PlantTask(found, random),
+        _physics(setting.model),
+        PlantTask(setting, random),
         time_limit=(scenario.samples - 0.5) * scenario.control_period,  # half a sample less: sums of floats miss it
         n_sub_steps=scenario.steps,
         flat_observation=flat_observation,
-        legacy_step=False,  # x and v are the state's own, and need no second look at it
+        legacy_step=False,  # observations need positions and velocities only, which are already current
     )
 
 
@@ -157,22 +162,22 @@ def _all_tasks() -> tuple[tuple[str, str], ...]:
 
 
 def __getattr__(name: str) -> object:
-    """Return ALL_TASKS, every plant with each of its tasks. It loads the plants' models, so it is made on demand."""
+    """Return ALL_TASKS, pairs of every plant and each of its tasks. It is made on demand, since it loads all models."""
     if name == "ALL_TASKS":
         return _all_tasks()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def _named(what: str, given: object, known: Mapping[str, str]) -> dict[str, Any]:
-    """Return arguments named as in dm_control's suite under our names."""
-    if given is None:
+def _renamed(what: str, values: object, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return values with the names of dm_control's suite replaced by the names here."""
+    if values is None:
         return {}
-    if not isinstance(given, Mapping):
-        raise ScenarioError(f"{what} is {shown(given)}: give a mapping of {', '.join(known)}")
-    for name in given:
-        if name not in known:
-            raise unknown(f"name in {what}", name, known)
-    return {known[name]: value for name, value in given.items()}
+    if not isinstance(values, Mapping):
+        raise ScenarioError(f"{what} is {shown(values)}: give a mapping of {', '.join(names)}")
+    for name in values:
+        if name not in names:
+            raise unknown(f"name in {what}", name, names)
+    return {names[name]: value for name, value in values.items()}
 
 
 def _physics(model: mujoco.MjModel) -> PlantPhysics:
@@ -181,10 +186,3 @@ def _physics(model: mujoco.MjModel) -> PlantPhysics:
     except AttributeError as error:  # dm_control looks for every field that it knows
         here = f"dm_control {version('dm-control')} does not know MuJoCo {mujoco.__version__}"
         raise MissingPackageError(f"{here} ({error}): {cure('dm')}, which brings two that fit") from error
-
-
-def _generator(seed: object) -> np.random.Generator:
-    try:
-        return np.random.default_rng(seed)  # pyright: ignore[reportArgumentType, reportCallIssue]
-    except (TypeError, ValueError):
-        raise ScenarioError(f"random is {shown(seed)}: give a seed, a whole number from 0, or a generator") from None

@@ -2,10 +2,10 @@
 
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
-An observation is positions and velocities, and for `track` r, r', r'', one after another. An action is the command of
-the driven channels, in parts of their limits, in float32. An episode is truncated at the scenario's duration, which is
-also the max_episode_steps of its spec, and terminated where the plant leaves the finite world. Tasks and rewards are in
-`tasks`, many copies in one batch in `vector_env`.
+An observation is one array of positions and velocities, and for `track` also r, r', r''. An action is the command of
+the driven channels, divided by their limits, in float32. An episode is truncated at the scenario's duration, which is
+also the max_episode_steps of its spec, and terminated if the plant diverges. The module `tasks` describes tasks and
+rewards; `vector_env` has many copies of a plant in one batch.
 """
 
 import copy
@@ -28,24 +28,24 @@ with extra("rl", "smc_mujoco.envs.gymnasium_env"):
     from gymnasium import spaces
     from gymnasium.envs.registration import EnvSpec
 
-registration.register()  # for who imports this module alone
+registration.register()  # also if only this module is imported
 
 
-def action_space(found: Setting) -> spaces.Box:
-    """Return the space of commands of the driven channels, in parts of their limits."""
-    return spaces.Box(-1.0, 1.0, found.shape, np.float32)
+def action_space(setting: Setting) -> spaces.Box:
+    """Return the space of actions: commands of the driven channels, divided by their limits."""
+    return spaces.Box(-1.0, 1.0, setting.shape, np.float32)
 
 
-def observation_space(found: Setting) -> spaces.Box:
-    """Return the space of observations: the finite world, for r, r', r'' as much more as they take."""
-    high = np.full(found.size, MAX_STATE)
-    if found.task.moving:
-        high[-3:] = np.maximum(MAX_STATE, np.abs(found.references).max(axis=0))
+def observation_space(setting: Setting) -> spaces.Box:
+    """Return the space of observations: the largest state of a run, and for r, r', r'' as much more as they need."""
+    high = np.full(setting.size, MAX_STATE)
+    if setting.task.moving:
+        high[-3:] = np.maximum(MAX_STATE, np.abs(setting.references).max(axis=0))
     return spaces.Box(-high, high, dtype=np.float64)
 
 
 class Timed:
-    """An environment whose spec, which `gymnasium.make` sets, has its own length as max_episode_steps.
+    """An environment that writes the length of its episodes to its spec, which `gymnasium.make` sets.
 
     Attributes:
       last: the sample at which an episode is truncated.
@@ -61,14 +61,14 @@ class Timed:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        """Take a spec over, with the episode's own length."""
+        """Copy a spec, with the length of the episode as its max_episode_steps."""
         self._spec = copy.copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.last
 
 
 class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """One plant with a task. Attributes are those of an Episode, and:
+    """One plant with a task. It has the attributes of an Episode too.
 
     Attributes:
       data: the simulation's state.
@@ -84,7 +84,7 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Arguments as of `core.Setting`; `reset` takes options x0 and v0.
+        """Arguments are those of `core.Setting`. The options of `reset` are x0 and v0.
 
         Raises:
           ScenarioError: what `core.Setting` raises, or another render_mode.
@@ -101,7 +101,7 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Draw a start, or take it from options x0 and v0. Return the observation and an empty info."""
+        """Draw a start, unless the options x0 and v0 set it. Return the observation and an empty info."""
         super().reset(seed=seed)
         self.begin(self.data, self.np_random, options)
         return self.setting.observe(self.x, self.v, 0), {}
@@ -113,11 +113,12 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
         self.sample += 1
         self.look(self.data)
         observation = self.setting.observe(self.x, self.v, self.sample)
-        seen = bounded(observation) if self.over else observation
-        return seen, self.reward(), self.over, self.sample >= self.last, {}
+        if self.over:
+            observation = bounded(observation)
+        return observation, self.reward(), self.over, self.sample >= self.last, {}
 
     def render(self) -> np.ndarray | None:
-        """Return what the plant's own camera sees, (height, width, 3), with render_mode "rgb_array", else None.
+        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None.
 
         Raises:
           ScenarioError: there is nothing to render with.

@@ -1,9 +1,9 @@
 """Ids of the plants in gymnasium: "smc/CartPole-v0", and "Duffing-v0" where gymnasium has no environment of that name.
 
 gymnasium has no plugins: `gymnasium.make("smc_mujoco:Duffing-v0")` imports this package and then looks the id up. So
-an import of this package registers the ids. It must not import gymnasium, which is optional and takes time; before
-gymnasium is imported there is nothing to register with, and a later import of this package does it.
-This module stays light: it knows plants by the names of their files.
+importing this package registers the ids, if gymnasium has been imported; if not, the next import of the package does
+(see `smc_mujoco.__init__`). The package does not import gymnasium itself, which is optional and slow to import.
+This module is light: it reads the names of the plants from their files.
 """
 
 import pkgutil
@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 LIBRARY = "gymnasium"
-SPACE = "smc"  # the namespace that every plant is in
+SPACE = "smc"  # namespace of all plants
 
 
 def register_if_imported() -> bool:
     """Register the ids if gymnasium has been imported; return whether it has."""
-    if getattr(sys.modules.get(LIBRARY), "envs", None) is None:  # bound once gymnasium's own ids are registered
+    if getattr(sys.modules.get(LIBRARY), "envs", None) is None:  # set once gymnasium has registered its own ids
         return False
     register()
     return True

@@ -1,18 +1,18 @@
-"""Tasks for agents: what a plant is asked to do, where episodes start, and what is rewarded.
+"""Tasks for agents: the goal, the initial states of episodes, and the reward.
 
     reward = T(rms(e)) (4 + T(rms(w) / 5)) / 5,    T(a) = 10^(-a^2)
 
-in [0, 1], rms over the channels. T is dm_control's tolerance about 0 with margin 1 (Tassa et al., DeepMind Control
-Suite, 2018), and the form is that of its cart-pole. The margins, 1 (rad or m) for e and 5 (per second) for w, are
-chosen.
+in [0, 1], where rms is taken over the channels. T is dm_control's tolerance about 0 with margin 1 (Tassa et al.,
+DeepMind Control Suite, 2018), and the form is that of its cart-pole. The margins, 1 (rad or m) for e and 5 (per second)
+for w, are chosen.
 
     task          e                                          w                  an episode starts with |x| up to
     regulate      x                                          x'                 the plant's x0
     track         x - r in driven channels, x in others      x' - r', x'        the plant's x0
-    swing_up      1 - cos x of toppling hinges, x of others  x'                 hanging within 0.1 rad, 0 in others
-    synchronise   x - the channels' mean                     x' - its mean      the largest of the plant's x0
+    swing_up      1 - cos x of toppling hinges, x of others  x'                 within 0.1 rad of hanging, others at 0
+    synchronise   x - mean of the channels                   x' - its mean      the largest of the plant's x0
 
-In a model of yours whose joints have ranges, starts also lie within these.
+If the joints of your own model have ranges, starts also lie within these.
 """
 
 import functools
@@ -30,18 +30,20 @@ from smc_mujoco.simulation.signals import Sine
 
 LN10 = math.log(10.0)
 RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
-SWING_UP_SPREAD = 0.1  # rad, how far from hanging a swing-up starts: chosen
-SWING_UP_TORQUE = 0.5  # u_max of a swing-up, in torques that hold the pendulum level: chosen, one push is not enough
-TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, what `track` follows unless told otherwise: chosen
+SWING_UP_SPREAD = 0.1  # rad, largest distance from hanging at the start of a swing-up: chosen
+SWING_UP_TORQUE = (
+    0.5  # u_max of a swing-up, over the torque that holds the pendulum level: chosen, too weak for one push
+)
+TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `track`: chosen
 
 Pair = tuple[np.ndarray, np.ndarray]
 
 
 class Task:
-    """What an agent is to do. This one, `regulate`, brings every channel to 0; the others differ from it.
+    """The goal of an agent. This class is `regulate`, which brings every channel to 0; the others derive from it.
 
     Attributes:
-      moving: whether the task follows a reference, which is then part of the observation.
+      moving: whether there is a moving reference, which is then part of the observation.
     """
 
     moving = False
@@ -51,19 +53,19 @@ class Task:
         return True
 
     def fields(self, plant: Plant) -> dict[str, Any]:
-        """Return the Scenario fields that the task sets unless told otherwise."""
+        """Return the Scenario fields for which the task has its own default."""
         return {}
 
-    def which(self, plant: Plant) -> np.ndarray:
-        """Return which channels the task singles out, (n,) of bool."""
+    def selected(self, plant: Plant) -> np.ndarray:
+        """Return the channels that `errors` treats differently from the rest, (n,) of bool."""
         return np.ones(plant.n, bool)
 
     def spread(self, plant: Plant) -> Pair:
-        """Return the lowest and the highest start of the channels, (n,) each, whatever their ranges."""
+        """Return the lowest and the highest start of the channels, (n,) each, ignoring the ranges of joints."""
         most = np.abs(plant.x0)
         return -most, most
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
         """Return e and w for x and v, (..., n) each; r is the reference with its derivatives, (..., 3)."""
         return x, v
 
@@ -74,30 +76,27 @@ class Track(Task):
     moving = True
 
     def fields(self, plant: Plant) -> dict[str, Any]:
-        """Return the reference."""
         return {"reference": TRACK_REFERENCE}
 
-    def which(self, plant: Plant) -> np.ndarray:
-        """Return which channels have an actuator."""
+    def selected(self, plant: Plant) -> np.ndarray:
         return np.arange(plant.n) < plant.driven
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-        """Return how far the driven channels are from the reference."""
-        return x - r[..., :1] * which, v - r[..., 1:2] * which
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+        return x - r[..., :1] * selected, v - r[..., 1:2] * selected
 
 
 class SwingUp(Task):
     """Bring hanging pendulums and poles upright."""
 
     def fits(self, plant: Plant) -> bool:
-        """Return whether something can hang and be swung up with a weak drive. One u_max has one unit."""
+        """Return whether all that topples can hang, and u_max has one unit."""
         down, (least, most) = toppling(plant), _ranges(plant)
         hangs = (least[down] <= math.pi) & (most[down] >= math.pi)
         one = plant.free or {"rad"}.issuperset(plant.units)
         return bool(down.any() and hangs.all() and one)
 
     def fields(self, plant: Plant) -> dict[str, Any]:
-        """Return a torque too weak to push the heaviest pendulum up at once. A cart keeps its force."""
+        """Return a torque too weak to push the heaviest pendulum up at once; a cart keeps its own limit."""
         if plant.free:
             return {}
         down, p = toppling(plant), Values(**plant.parameters)
@@ -105,34 +104,28 @@ class SwingUp(Task):
         pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
         return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}
 
-    def which(self, plant: Plant) -> np.ndarray:
-        """Return which channels topple."""
+    def selected(self, plant: Plant) -> np.ndarray:
         return toppling(plant)
 
     def spread(self, plant: Plant) -> Pair:
-        """Return starts about hanging."""
         down = toppling(plant)
         return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-        """Return how far the toppling channels are from upright."""
-        return np.where(which, 1.0 - np.cos(x), x), v
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+        return np.where(selected, 1.0 - np.cos(x), x), v
 
 
 class Synchronise(Task):
     """Bring the channels of a network together."""
 
     def fits(self, plant: Plant) -> bool:
-        """Return whether the plant is a network."""
         return plant.network
 
     def spread(self, plant: Plant) -> Pair:
-        """Return the same range for every channel."""
         most = np.full(plant.n, max(np.abs(plant.x0)))
         return -most, most
 
-    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, which: np.ndarray) -> Pair:
-        """Return how far the channels are from their mean."""
+    def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
         return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
 
 
@@ -147,10 +140,10 @@ def reward(e: np.ndarray, w: np.ndarray) -> Any:
 
 def tasks(plant: Plant | str) -> list[str]:
     """Return the names of the tasks that a plant has."""
-    kind = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(kind, Plant):
+    machine = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(machine, Plant):
         raise ScenarioError(f"plant is {shown(plant)}: give smc.plant(...) or one of the names smc.plants() lists")
-    return [name for name, task in TASKS.items() if task.fits(kind)]
+    return [name for name, task in TASKS.items() if task.fits(machine)]
 
 
 def starts(task: Task, plant: Plant) -> Pair:
@@ -162,13 +155,13 @@ def starts(task: Task, plant: Plant) -> Pair:
 
 def _ranges(plant: Plant) -> Pair:
     """Return the least and the largest positions of the joints, (n,) each."""
-    found = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
-    return found[:, 0], found[:, 1]
+    ranges = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
+    return ranges[:, 0], ranges[:, 1]
 
 
 @functools.lru_cache(maxsize=64)
 def toppling(plant: Plant) -> np.ndarray:
-    """Return which channels fall further when they lean, (n,) of bool: hinges for which x = 0 is unstable."""
+    """Return the channels that fall when they lean, (n,) of bool: hinges for which x = 0 is unstable."""
     model = plant.load()
     hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
     lean = 0.1 * hinged

@@ -2,9 +2,9 @@
 
     environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
 
-Copy i moves as the single environment with seed + i does, to 1e-12. A copy whose episode is over starts anew as
-gymnasium's own vectors do: in the next step, whose action it ignores (AutoresetMode.NEXT_STEP, the default), in the
-same one, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
+Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy begins the next
+one as gymnasium's own vectors do: in the next step, which ignores the action (AutoresetMode.NEXT_STEP, the default), in
+the same step, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
 """
 
 import math
@@ -23,24 +23,24 @@ from smc_mujoco.simulation import callback
 from smc_mujoco.simulation.run import cores
 
 # isort: split
-from gymnasium.utils import seeding  # by now imported by gym
+from gymnasium.utils import seeding  # already imported by gymnasium_env
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from mujoco.batch import Batch, SimulationError  # by now imported by callback
+from mujoco.batch import Batch, SimulationError  # already imported by callback
 
 MAX_COPIES = 1_000_000  # a larger number is a mistake
 SEEDS = 2**64
 
 
 class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Copies of one plant with one task; they are not drawn.
+    """Copies of one plant with one task; they are not rendered.
 
     Attributes:
       setting: the plant with its task.
       batch: the simulations.
-      first: the output of the first of two drives, (num_envs, driven).
+      first: output of the first of two drives in series, (num_envs, driven).
       samples: control samples since the episode began, (num_envs,).
-      over: whose episode has ended, (num_envs,) of bool.
+      over: the copies for which the episode has ended, (num_envs,) of bool.
       last: the sample at which an episode is truncated.
     """
 
@@ -57,27 +57,29 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         max_episode_steps: int | None = None,
         render_mode: None = None,
     ):
-        """Arguments as of `core.Setting`.
+        """Plant, task and changes are those of `core.Setting`.
 
         Args:
           threads: None for one per available core.
-          autoreset_mode: when a copy whose episode is over starts anew.
+          autoreset_mode: when a copy begins a new episode after the end of one.
           max_episode_steps: control samples after which an episode is truncated, if the duration has not come first.
-          render_mode: None: copies are not drawn.
+          render_mode: None, because copies are not rendered.
 
         Raises:
-          ScenarioError: what `core.Setting` raises, or a value of these that there is not.
+          ScenarioError: as of `core.Setting`, or another value of these.
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
-        self.num_envs, self.setting = (
-            whole("num_envs", num_envs, 1, MAX_COPIES),
-            Setting(plant, task, changes, edit=strip),
-        )
+        try:
+            self.metadata = self.metadata | {"autoreset_mode": AutoresetMode(autoreset_mode)}
+        except ValueError:
+            modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
+            raise ScenarioError(f"autoreset_mode is {shown(autoreset_mode)}: choose from {modes}") from None
+        self.num_envs = whole("num_envs", num_envs, 1, MAX_COPIES)
+        self.setting = Setting(plant, task, changes, edit=strip)
         relieve(self.setting.model)
-        self.metadata = self.metadata | {"autoreset_mode": _mode(autoreset_mode)}
-        most = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
-        self.last = min(self.setting.scenario.samples, most)
+        steps = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
+        self.last = min(self.setting.scenario.samples, steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -91,24 +93,24 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start all copies, from seed, seed + 1, ... or from one seed each. Options x0 and v0 hold for all of them.
+        """Begin new episodes, from seed, seed + 1, ... or from a list of seeds. Options x0 and v0 hold for all copies.
 
-        The option reset_mask, (num_envs,) of bool, says which are to start; the others stay as they are.
+        The option reset_mask, (num_envs,) of bool, selects the copies; the others continue.
         """
-        which, options = self._which(options)
-        held = self.randoms or [None] * self.num_envs
+        mask, options = self._mask(options)
+        generators = self.randoms or [None] * self.num_envs
         self.randoms = [
-            seeding.np_random(own)[0] if random is None or (anew and own is not None) else random
-            for random, own, anew in zip(held, self._seeds(seed), which, strict=True)
+            seeding.np_random(own)[0] if random is None or (new and own is not None) else random
+            for random, own, new in zip(generators, self._seeds(seed), mask, strict=True)
         ]
-        self.begin(which, options)
+        self.begin(mask, options)
         return self.observe(), {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Move every copy on by one control period, and start those anew whose episode is over.
+        """Take one control period in every copy; copies at the end of an episode begin the next one.
 
         Returns:
-          Observations, rewards, terminated, truncated and infos, as gymnasium has them.
+          Observations, rewards, terminated, truncated and infos, as in gymnasium.
         """
         if not self.randoms:
             raise ScenarioError("these environments have not begun: call reset first")
@@ -133,42 +135,45 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             observations = self.observe()
         return observations, rewards, terminated, truncated, infos
 
-    def begin(self, which: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
-        """Begin new episodes of the copies where `which`, (num_envs,) of bool, is true."""
-        ids = np.flatnonzero(which)
+    def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
+        """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
+        ids = np.flatnonzero(mask)
         with callback.uninstalled():
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
-        self.samples[which], self.over[which], self.first[which] = 0, False, 0.0
+        self.samples[mask], self.over[mask], self.first[mask] = 0, False, 0.0
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
-        """Step copies, None for all. Return in which of them MuJoCo gave up, (num_envs,) of bool."""
-        gone = np.zeros(self.num_envs, bool)
+        """Step copies, None for all. Return the copies in which MuJoCo gave up, (num_envs,) of bool."""
+        failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.stretches(self.ctrl, commands, self.first):
             try:
-                with callback.uninstalled():  # a Batch refuses Python callbacks, and other threads' runs may have one
+                with (
+                    callback.uninstalled()
+                ):  # a Batch refuses Python callbacks, and runs of other threads may have set one
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
-                gone[list(error.ids)] = True
+                failed[list(error.ids)] = True
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
-        return gone
+        return failed
 
     def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, size). `lost`: who has left the world, if known."""
+        """Return the observations of all copies, (num_envs, size). `lost` marks those that diverged, if known."""
         x, v = self.state()
-        out: np.ndarray = self.setting.lost(x, v) if lost is None else lost
+        if lost is None:
+            lost = np.asarray(self.setting.lost(x, v))
         observations = self.setting.observe(x, v, self.samples)
-        if out.any():
-            observations[out] = bounded(observations[out])
+        if lost.any():
+            observations[lost] = bounded(observations[lost])
         return observations
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of all copies, (num_envs, n) each."""
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
 
-    def _which(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
-        """Return the copies that a reset is for, and its other options."""
+    def _mask(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
+        """Return the copies to be reset, (num_envs,) of bool, and the other options."""
         if not isinstance(options, Mapping) or "reset_mask" not in options:
             return np.ones(self.num_envs, bool), options
         mask = options["reset_mask"]
@@ -191,29 +196,21 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return range(first, first + self.num_envs)
 
 
-def _mode(mode: object) -> AutoresetMode:
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        known = ", ".join(repr(known.value) for known in AutoresetMode)
-        raise ScenarioError(f"autoreset_mode is {shown(mode)}: choose from {known}") from None
-
-
 def strip(spec: mujoco.MjSpec) -> None:
-    """Delete what is only drawn: moving it along takes a third of MuJoCo's time.
+    """Delete parts that are only rendered, because updating their poses takes a third of MuJoCo's time.
 
-    Models of users lose their sensors alone: a fixed part may be a floor, or hold a tendon.
+    Users' own models keep them, since a fixed part may be a floor, or hold a tendon. Sensors are disabled in any model.
     """
     if not any(text.name == DIRECTLY for text in spec.texts):
-        for thing in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
-            spec.delete(thing)
+        for element in (*spec.cameras, *spec.lights, *spec.skins, *filter(_scenery, spec.geoms)):
+            spec.delete(element)
         spec.compiler.fusestatic = True
-    # nobody reads sensors here: an observation is taken from the state
+    # observations come from the state, not from sensors
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 
 
 def relieve(model: mujoco.MjModel) -> None:
-    """Let MuJoCo skip the search for constraints where there are none: a tenth of its time."""
+    """Disable constraints in a model that has none, which saves a tenth of MuJoCo's time."""
     if smooth(model) and not model.nflex:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
 

@@ -12,8 +12,8 @@ import smc_mujoco as smc
 from smc_mujoco.analysis import margin_kinds
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.commands.margins import QUICK
-from smc_mujoco.cli.commands.margins import margins as command
+from smc_mujoco.cli.commands.analysis import QUICK
+from smc_mujoco.cli.commands.analysis import margins as command
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.studies.paper import scenarios
 

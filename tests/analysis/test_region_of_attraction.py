@@ -11,7 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
-from smc_mujoco.cli.commands.basin import basin as command
+from smc_mujoco.cli.commands.analysis import basin as command
 from smc_mujoco.draw import region
 
 maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")  # smc.basin is the function

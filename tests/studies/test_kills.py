@@ -101,7 +101,7 @@ print(json.dumps({"ends": ends, "wrote": wrote, "undisturbed": undisturbed, "sam
 """
 FULL = """
 import resource
-from smc_mujoco.cli.commands.bench import bench
+from smc_mujoco.cli.commands.studies import bench
 
 def filling(self, rows, add=store.Store.add, parts=[]):
     parts.append(rows)

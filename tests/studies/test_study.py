@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli.commands.bench import bench
+from smc_mujoco.cli.commands.studies import bench
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.model import check_starts

@@ -12,56 +12,60 @@ import typer
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.plant import Plant
-    from smc_mujoco.simulation.conditions import Condition
+    from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")]
-LawName = Annotated[str, typer.Argument(metavar="LAW", help="One that `laws` shows.")]
-Gains = Annotated[str, typer.Option(help="Whose gains: tuned, study, tracking or default.")]
-Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 Conditions = Annotated[
     list[str] | None,
     typer.Option(
         "--condition",
         metavar="TEXT|FILE",
-        help='One of your own, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file of such'
-        " lines; may be repeated.",
+        help='A condition of your own, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file'
+        " with one on each line; may be repeated.",
     ),
 ]
-During = Annotated[
+Condition = Annotated[
     str,
     typer.Option(
         "--condition",
         metavar="NAME|TEXT",
-        help='What holds besides, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
+        help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
-Middle = Annotated[
-    float | None, typer.Option("--x0", help="Where runs begin, rad or m; default the plant's own start.")
+Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
+Json = Annotated[Path | None, typer.Option(help="Also write the result to a .json file.")]
+LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law that `laws` shows.")]
+PlantName = Annotated[
+    str,
+    typer.Argument(metavar="PLANT", help="A plant that `list` shows, or FILE.xml:joint+joint for a model of yours."),
 ]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")]
 Spread = Annotated[
-    float | None, typer.Option("--spread", help="By how much of x0 seeds move the start to either side; default 0.2.")
+    float | None, typer.Option("--spread", help="Share of x0 by which seeds move the start either way; default 0.2.")
 ]
-SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma that is in no brackets
-OWN_GAINS = "With gains of its own: pid(kp=50, ki=1), or the .json file that tune wrote."
+Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
+X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
+
+SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
+OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or the .json file that tune wrote."
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
-    """Return the names in a,b, or the default if no text is given."""
+    """Return the names in a,b, or the default if there is no text."""
     return default if text is None else [name.strip() for name in SEPARATOR.split(text) if name.strip()]
 
 
 def law(text: str) -> "str | Law":
     """Return a law by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
 
-    Before a colon it may have a name of its own, as "slow: classical(k=2)". The text is parsed and never evaluated.
+    A label may stand before it, as in "slow: classical(k=2)". The text is parsed and never evaluated.
 
     Raises:
-      ScenarioError: another text, an unknown law or gain, or a file that is no tuning.
+      ScenarioError: any other text, an unknown law or gain, or a file that is not a tuning.
     """
     name, colon, rest = text.partition(":")
-    if colon and "(" not in name and not isinstance(found := law(rest.strip()), str):
-        return found.named(name.strip())
+    if colon and "(" not in name and not isinstance(labelled := law(rest.strip()), str):
+        return labelled.named(name.strip())
     if text.endswith(".json"):
         from smc_mujoco.analysis.tuning.result import load
 
@@ -81,9 +85,9 @@ def law(text: str) -> "str | Law":
     return find("law", ast.unparse(call.func), catalogue())(**gains)
 
 
-def origin(chosen: "Sequence[str | Law]", gains: str) -> str:
-    """Return where the gains of laws are from, in words: the set, unless every law has gains of its own."""
-    return f"gains {gains!r}" if any(isinstance(one, str) for one in chosen) else "gains as given"
+def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
+    """Return in words where the gains of laws are from: a set, unless every law has gains of its own."""
+    return f"gains {gains!r}" if any(isinstance(one, str) for one in laws) else "gains as given"
 
 
 def plant(text: str) -> "str | Plant":
@@ -103,7 +107,7 @@ def plant(text: str) -> "str | Plant":
     return plant_from(path, chosen)
 
 
-def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Condition]":
+def conditions(known: Sequence[str], own: Sequence[str] | None) -> "list[named.Condition]":
     """Return conditions by name, then those of the option --condition.
 
     Raises:
@@ -112,17 +116,18 @@ def conditions(named: Sequence[str], own: Sequence[str] | None) -> "list[Conditi
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
-    found = [find_condition(name) for name in named]
+    chosen = [find_condition(name) for name in known]
     for text in own or ():
         if ":" not in text and (os.sep in text or Path(text).suffix) and not os.path.exists(text):
             raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
-        found += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
-    return found
+        chosen += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
+    return chosen
 
 
 def starts(x0: float | None, spread: float | None) -> "Starts | None":
-    """Return where runs begin; None where neither is given."""
-    from smc_mujoco.simulation.initial_states import SPREAD
-    from smc_mujoco.simulation.initial_states import starts as made
+    """Return the initial states of runs, or None if neither option is set."""
+    from smc_mujoco.simulation import initial_states
 
-    return None if x0 is None and spread is None else made(x0, SPREAD if spread is None else spread)
+    if x0 is None and spread is None:
+        return None
+    return initial_states.starts(x0, initial_states.SPREAD if spread is None else spread)

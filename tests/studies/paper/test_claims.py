@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import lam_range
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.commands.claims import claims as command
+from smc_mujoco.cli.commands.studies import claims as command
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics

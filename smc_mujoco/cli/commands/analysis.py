@@ -1,0 +1,197 @@
+"""smc-mujoco tune, margins, basin: one question about a law, answered by many runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.interrupts import held_back
+
+QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturbance"]}  # of `margins --quick`
+
+
+@errors_as_sentences()
+def tune(
+    plant: options.PlantName,
+    law: options.LawName,
+    objective: Annotated[
+        str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
+    ] = "balanced",
+    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try.")] = 96,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
+    front: Annotated[
+        Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
+    ] = None,
+    conditions: Annotated[
+        str | None, typer.Option(help="Conditions, as a,b, in place of the seven of the objective (see the end).")
+    ] = None,
+    condition: options.Conditions = None,
+    x0: options.X0 = None,
+    spread: options.Spread = None,
+    threads: options.Threads = None,
+) -> None:
+    """Find a law's gains on a plant by a rule that is the same for every law.
+
+    Every law has the same bound on u, the same objective, the same number of gains tried, and the same width of search
+    about the scale that each gain has by its dimension. The objective is error times time, plus variation of u, in runs
+    of 5 s: nominal, noisy, delayed, disturbed by a sine and by a constant, and with 30 % more and less mass. The same
+    seed gives the same gains.
+
+    Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
+    """
+    with held_back():
+        from smc_mujoco.analysis.tuning import result, search
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import writable
+
+    for file in (out, front):
+        if file:
+            writable(file)
+    path, terminal = out and result.checked(out), Terminal()
+    tuned = search.tune(
+        options.plant(plant),
+        law,
+        budget,
+        seed,
+        objective,
+        threads,
+        progress=True,
+        conditions=options.conditions(options.names(conditions), condition) or None,
+        starts=options.starts(x0, spread),
+    )
+    terminal.print(tables.tuning(tuned))
+    terminal.note(tuned.definition)
+    terminal.note(
+        f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; "
+        f"{len(tuned.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
+    )
+    if tuned.objective > tuned.before:
+        terminal.print("no set of gains tried is better than the default ones: give a larger --budget")
+    if path:
+        terminal.wrote(tuned.save(path))
+    if front:
+        from smc_mujoco.draw.pareto import pareto
+
+        terminal.wrote(*pareto([tuned], front))
+
+
+@errors_as_sentences()
+def margins(
+    plants: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PLANT]...",
+            help="Plants that `list` shows, or FILE.xml:joint+joint; by default the paper's.",
+            show_default=False,
+        ),
+    ] = None,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {options.OWN_GAINS}")
+    ] = None,
+    kinds: Annotated[
+        str | None, typer.Option(help="Any of delay,disturbance,friction,mass,noise, as a,b; default all.")
+    ] = None,
+    gains: options.Gains = "tuned",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Shorter runs, coarser; by default 2 plants, 4 laws, delay and disturbance.")
+    ] = False,
+    condition: options.Condition = "nominal",
+    x0: options.X0 = None,
+    json: options.Json = None,
+    threads: options.Threads = None,
+) -> None:
+    """Find how much a law tolerates: the largest level at which the error still ends below 5 % of its start.
+
+    A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one, noise is the
+    standard deviation of the position (that of the velocity is 5/s times as large), and the delay of the command is in
+    s. The column theory is the limit of the loop linearised at rest, for laws that have one: the delay at which rest
+    turns unstable, for example. A law may tolerate more, in a small steady oscillation. The module
+    smc_mujoco.analysis.margins describes the search and its limits.
+
+    Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
+    """
+    with held_back():
+        from smc_mujoco.analysis.margins import KINDS, save
+        from smc_mujoco.analysis.margins import margins as search
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.control import gain_sets
+        from smc_mujoco.studies.paper import scenarios
+
+    terminal = Terminal()
+    if json:
+        writable(ended(json, ".json"))
+    machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else scenarios.PLANTS)]
+    chosen = [options.law(text) for text in options.names(laws, scenarios.LAWS if quick else gain_sets.LAWS)]
+    kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
+    with bar("margins") as drawn:
+        start = options.starts(x0, None)
+        found = search(machines, chosen, kind, gains, quick, threads, drawn.reached, condition, start)
+    for name in kind:
+        terminal.print(tables.margins(name, [margin for margin in found if margin.kind == name]))
+    count = f"{len(found)} margin{'s' * (len(found) != 1)}"
+    terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
+    if json:
+        terminal.wrote(save(found, json))
+
+
+@errors_as_sentences()
+def basin(
+    plant: options.PlantName,
+    law: Annotated[str, typer.Option(help=f"A law that `laws` shows. {options.OWN_GAINS}")] = "observer_free",
+    points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
+    gains: options.Gains = "tuned",
+    duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
+    out: Annotated[Path | None, typer.Option(help="Also draw the map, to a .png or .svg file.")] = None,
+    json: options.Json = None,
+    condition: options.Condition = "nominal",
+    threads: options.Threads = None,
+) -> None:
+    """Map a region of attraction: run a grid of initial positions and velocities, and tell which come to rest at 0.
+
+    Positions reach half a turn either way, or on a rail twice the study's start. Velocities reach three times that, per
+    second. All channels of a network have the same start. A run ends as soon as it is decided, by the rule in
+    smc_mujoco.analysis.region_of_attraction.
+
+    Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
+    """
+    with held_back():
+        from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
+        from smc_mujoco.analysis.region_of_attraction import basin as search
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.draw import region
+
+    terminal = Terminal()
+    if out:
+        region.checked(out)
+        writable(out)
+    if json:
+        writable(ended(json, ".json"))
+    chosen = options.law(law)
+    with bar(f"{law} on {plant}") as drawn:
+        found = search(
+            options.plant(plant),
+            chosen,
+            (points, points),
+            gains=gains,
+            duration=duration,
+            threads=threads,
+            report=drawn.reached,
+            condition=condition,
+        )
+    terminal.note(f"{found.law} on {found.plant}: {100 * found.share:.3g} % of the states converge")
+    yes, no, undecided = (int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED))
+    terminal.note(
+        f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s; "
+        f"{options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s",
+        "dim",
+    )
+    if json:
+        terminal.wrote(found.save(json))
+    if out:
+        terminal.wrote(*region.draw([found], out))

@@ -1,0 +1,147 @@
+"""smc-mujoco run, show, view: the runs of a scene, and one of them."""
+
+import itertools
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
+from smc_mujoco.common.interrupts import held_back
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+
+@errors_as_sentences()
+def run(
+    name: options.SceneName,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,
+    video: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
+    threads: options.Threads = None,
+    export: Annotated[
+        str | None,
+        typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat or parquet, beside its .npz."),
+    ] = None,
+    timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
+) -> None:
+    """Run a scene: print its scores; write its traces, figures and film.
+
+    Exported traces have every number to the last bit, and its unit: csv in the first line ("t [s],x [m],..."), mat in
+    the struct `units`, parquet in the metadata of each column, under "unit".
+
+    Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
+    """
+    clock = Clock()
+    with clock("loading"), held_back():
+        from smc_mujoco.cli.scene import perform
+        from smc_mujoco.simulation.trace import formats
+        from smc_mujoco.studies import scene as scenes
+
+    endings = () if export is None else formats(export)
+    path = scenes.find(name)
+    scene = scenes.read(path)
+    if seed is not None:
+        scene = scene.seeded(seed)
+    terminal = Terminal()
+    perform(scene, out or Path("videos") / path.stem, video, threads, clock, terminal, endings)
+    if timing:
+        terminal.note(str(clock), "dim")
+
+
+@errors_as_sentences()
+def show(
+    trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file that `run` or Trace.save wrote.")],
+    figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
+    export: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT,...|FILE",
+            help="Also write its columns, with units, as csv, mat or parquet beside TRACE, or to the FILE.",
+        ),
+    ] = None,
+) -> None:
+    """Show a trace: what was run, how it went, and its scores."""
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.simulation.trace import formats, load
+
+    files = [] if export is None else [Path(export)]
+    if export is not None and "." not in export and Path(export).name == export:
+        files = [trace.with_suffix(f".{ending}") for ending in formats(export)]
+    loaded, terminal = load(trace), Terminal()
+    written = [loaded.export(file) for file in files]
+    if figure:
+        from smc_mujoco.draw.figure import figure as draw
+
+        written += draw([loaded], figure)
+    s = loaded.scenario
+    terminal.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
+    _print_curves(loaded, terminal)
+    if loaded.failure:
+        terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
+    else:
+        for table in tables.trace_summary(loaded):
+            terminal.print(table)
+    terminal.wrote(*written)
+
+
+def _print_curves(trace: "Trace", terminal: Terminal) -> None:
+    """Print the columns of a trace as curves of block characters; of a large group only the first channel."""
+    from smc_mujoco.cli import tables
+
+    plant = trace.scenario.plant
+    for group, heading in tables.headings(plant).items():
+        if heading:
+            terminal.note(f"{heading}:")
+        channels = list(group.channels if len(group.channels) <= tables.MAX_NAMED_JOINTS else group.channels[:1])
+        names = ["x", "v", *("u", "s") * group.driven, *["reaction"] * bool(trace.reaction[:, channels].any())]
+        for name, i in itertools.product(names, channels):
+            column = getattr(trace, name)[:, i]
+            label = f"{name}{i}" if plant.n > 1 else name  # the name of the exported column
+            terminal.note(f"{label} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}")
+
+
+@errors_as_sentences()
+def view(
+    name: options.SceneName,
+    condition: Annotated[
+        str | None, typer.Option(help="Which of the scene's conditions; default the one that is filmed.")
+    ] = None,
+    label: Annotated[str | None, typer.Option(help="Label of the run in that condition; default the first.")] = None,
+) -> None:
+    """Watch one run of a scene in MuJoCo's viewer, in real time, and change the gains of its law.
+
+    - Pause and continue: the space bar.
+    - Change a gain: its slider gain:NAME in the panel "Control" at the right. It reaches from a tenth of the scene's
+      value to ten times that value. Changed gains are printed, as code that makes the law.
+    - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
+    - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
+
+    The run is the one that `run` simulates, as a single simulation in Python. All other sliders and settings of the
+    viewer change only the picture.
+
+    Example: smc-mujoco view inverted_pendulum --label super_twisting
+    """
+    from smc_mujoco.common.errors import ScenarioError, find
+    from smc_mujoco.draw import display
+
+    no_window = display.missing()
+    if sys.platform == "linux" and not no_window:
+        os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
+    with held_back():
+        from smc_mujoco.draw import viewer
+        from smc_mujoco.studies import scene as scenes
+
+    scene = scenes.read(scenes.find(name))
+    runs = scene.conditions[scene.film]
+    if condition is not None:
+        runs = find(f"condition of {name}", condition, scene.conditions)
+    scenario = next(iter(runs.values())) if label is None else find(f"label in {name}", label, runs)
+    if no_window:
+        raise ScenarioError(no_window)
+    viewer.watch(scenario)

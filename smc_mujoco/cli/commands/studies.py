@@ -1,0 +1,165 @@
+"""smc-mujoco bench, claims, report: many questions, answered by a study."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.errors import printable
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def bench(
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="A small study: 3 plants, 3 conditions, 16 seeds, 3 s a run; half a minute on 2 cores."
+        ),
+    ] = False,
+    plants: Annotated[
+        str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
+    ] = None,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b, or all; default the report's short list. {options.OWN_GAINS}")
+    ] = None,
+    conditions: Annotated[
+        str | None,
+        typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants, or none beside --condition."),
+    ] = None,
+    condition: options.Conditions = None,
+    x0: options.X0 = None,
+    spread: options.Spread = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of starts and noises; default 20. Fewer than 16 cannot name a winner."),
+    ] = None,
+    gains: options.Gains = "tuned",
+    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
+    executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
+    traces: Annotated[
+        str, typer.Option(help="Traces to save: none, all, or the worst by plant and condition.")
+    ] = "none",
+    fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that the folder holds.")] = False,
+    threads: options.Threads = None,
+) -> None:
+    """Compare laws on plants in conditions: run every combination from every seed, to OUT/results.parquet.
+
+    Finished runs are kept. Stop the command whenever you like; started again with the same options, it goes on. The
+    table is that of the last command only, so give each study an --out of its own. `smc-mujoco list` shows laws and
+    conditions. --laws all ranks every general law whose gains on these plants are in the set; the set `default` has
+    them for all laws. The leaderboard names the winner under each condition, and what holds under all of them.
+
+    Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 16 --out duffing
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.control.gain_sets import general_laws
+        from smc_mujoco.mechanisms.plant import plant as find_plant
+        from smc_mujoco.simulation.conditions import suiting
+        from smc_mujoco.simulation.grid import grid
+        from smc_mujoco.studies.leaderboard import leaderboard
+        from smc_mujoco.studies.study import FULL, QUICK, study
+
+    terminal, size = Terminal(), QUICK if quick else FULL
+    machines = [options.plant(text) for text in options.names(plants, size.plants)]
+    length = size.duration if duration is None else duration
+    found = [find_plant(plant) if isinstance(plant, str) else plant for plant in machines]
+    usual = () if condition else suiting(size.conditions, found, length)
+    chosen = options.names(laws, size.laws)
+    chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
+    scenarios = grid(
+        machines,
+        chosen,
+        options.conditions(options.names(conditions, usual), condition),
+        seeds or size.seeds,
+        gains,
+        length,
+        options.starts(x0, spread),
+    )
+    table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
+    terminal.print(tables.leaderboard(leaderboard(table)))
+    failed = len(table) - table.data["failure"].null_count
+    runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
+    terminal.note(f"{runs}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s")
+    terminal.wrote(out / "results.parquet")
+
+
+@errors_as_sentences()
+def claims(
+    ids: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="ID", help="Numbers of claims, as 3 18; by default all.", show_default=False),
+    ] = None,
+    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default study,tuned,tracking.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarser grids, no network above 50 pendulums, tuned gains only.")
+    ] = False,
+    table: Annotated[
+        Path | None, typer.Option(help="results.parquet of a bench, whose runs are then not repeated.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
+    threads: options.Threads = None,
+) -> None:
+    """Audit the paper's claims: measure each against the threshold that was fixed for it before any run.
+
+    Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
+    otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
+    claim. Claims that you name are shown in full, with every check. All of them take minutes.
+
+    Example: smc-mujoco claims 3 18 --gains tuned
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import replacing, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.studies.paper.claims.audit import claims as audit
+        from smc_mujoco.studies.paper.claims.audit import document, evaluations
+        from smc_mujoco.studies.table import Table
+
+    terminal = Terminal()
+    sets = None if gains is None else options.names(gains)
+    known = None if table is None else Table.read(table)
+    if out:
+        writable(out)
+    with bar("claims", evaluations(ids or None, sets, quick), counted=True) as drawn:
+        found = audit(known, ids or None, sets, quick, threads=threads, report=drawn.advance)
+    text = document(found)
+    if out:
+        with replacing(out) as file:
+            file.write_text(text + "\n")
+    if json:
+        print(text)
+        return
+    tables.print_claims(found, terminal, full=bool(ids))
+    notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
+    notes.append(f"wrote {printable(str(out))}" if out else "")
+    terminal.note("; ".join(filter(None, notes)), "dim")
+
+
+@errors_as_sentences()
+def report(
+    quick: Annotated[bool, typer.Option("--quick", help="A small report in two minutes: less of everything.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 cannot name a winner.")
+    ] = None,
+    threads: options.Threads = None,
+) -> None:
+    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
+
+    It has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; films.
+    The file OUT/report.html needs no network and no other file; the data are beside it. If you stop the command and
+    start it again, it goes on from there.
+
+    Example: smc-mujoco report --quick --out look
+    """
+    with held_back():
+        from smc_mujoco.studies.report import report as make
+
+    path = make(out, quick, seeds, threads, progress=True)
+    print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
