@@ -76,12 +76,15 @@ class Track(Task):
     moving = True
 
     def fields(self, plant: Plant) -> dict[str, Any]:
+        """Return the reference."""
         return {"reference": TRACK_REFERENCE}
 
     def selected(self, plant: Plant) -> np.ndarray:
+        """Return the channels with an actuator."""
         return np.arange(plant.n) < plant.driven
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+        """Return the distance of the driven channels from the reference, and the state of the others."""
         return x - r[..., :1] * selected, v - r[..., 1:2] * selected
 
 
@@ -105,13 +108,16 @@ class SwingUp(Task):
         return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}
 
     def selected(self, plant: Plant) -> np.ndarray:
+        """Return the channels that topple."""
         return toppling(plant)
 
     def spread(self, plant: Plant) -> Pair:
+        """Return starts about hanging."""
         down = toppling(plant)
         return (math.pi - SWING_UP_SPREAD) * down, (math.pi + SWING_UP_SPREAD) * down
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+        """Return the distance of the toppling channels from upright, and the state of the others."""
         return np.where(selected, 1.0 - np.cos(x), x), v
 
 
@@ -119,13 +125,16 @@ class Synchronise(Task):
     """Bring the channels of a network together."""
 
     def fits(self, plant: Plant) -> bool:
+        """Return whether the plant is a network."""
         return plant.network
 
     def spread(self, plant: Plant) -> Pair:
+        """Return the same range for every channel."""
         most = np.full(plant.n, max(np.abs(plant.x0)))
         return -most, most
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
+        """Return the distance of the channels from their mean."""
         return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
 
 
