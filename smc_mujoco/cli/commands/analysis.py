@@ -63,7 +63,7 @@ def tune(
         starts=options.starts(x0, spread),
     )
     terminal.print(tables.tuning(tuned))
-    terminal.note(tuned.definition)
+    terminal.note(str(tuned.definition))
     terminal.note(
         f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; "
         f"{len(tuned.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
@@ -194,4 +194,4 @@ def basin(
     if json:
         terminal.wrote(found.save(json))
     if out:
-        terminal.wrote(*region.draw([found], out))
+        terminal.wrote(region.draw([found], out))
