@@ -1,4 +1,4 @@
-"""Pictures of traces: figures (figure, panels), films (video: stage, camera, arrows, charts, caption), one style."""
+"""Pictures of traces: figures, films, the viewer, one style."""
 
 from pathlib import Path
 

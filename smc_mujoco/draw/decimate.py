@@ -1,8 +1,8 @@
-"""A dense signal on paper: its range in few windows of time, and one line.
+"""Reduce a dense signal for paper: its range in few windows of time, and one line.
 
-A chattering control drawn sample by sample is a solid block. Its range says how hard it switches, its mean is what the
+A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches. Its mean is what the
 plant feels: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is that mean while
-the signal chatters, and the signal itself while it does not.
+the signal chatters, and the signal itself elsewhere.
 """
 
 import dataclasses
@@ -13,14 +13,14 @@ import numpy as np
 
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
-WINDOW = 0.01, 40  # what a mean is taken over: so much of the run, at least so many samples; chosen, see `window`
-STILL = 2e-3  # of the largest value: a smaller step from sample to sample is no move of a chattering signal
-REVERSALS = 6  # this many in a row are chattering, if they follow each other within a quarter of a window
-POINTS = 250  # of a line: its least and largest value in each is kept
+WINDOW = 0.01, 40  # of a mean: share of the run, and fewest samples; chosen, see `window`
+STILL = 2e-3  # of the largest value: smaller steps from sample to sample do not count as moves
+REVERSALS = 6  # in a row are chattering, if they follow each other within a quarter of a window
+POINTS = 250  # of a line: the least and the largest value of each is kept
 
 
 class Envelope(NamedTuple):
-    """Windows (t[i], t[i+1]) of a signal: low, mean and high, each (windows, n)."""
+    """Range and mean of a signal in windows of time: low, mean and high, each (windows, n)."""
 
     t: np.ndarray  # middles, (windows,)
     low: np.ndarray
@@ -29,7 +29,7 @@ class Envelope(NamedTuple):
 
 
 def finite(trace: Trace) -> Trace:
-    """The trace up to its last finite sample. Of one that failed at once: where it started, and NaN for the rest."""
+    """Return the trace up to its last finite sample; if there is none, one sample: the start, and NaN for the rest."""
     bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
     if not bad.any():
         return trace
@@ -41,12 +41,12 @@ def finite(trace: Trace) -> Trace:
 
 
 def end(traces: Sequence[Trace]) -> float:
-    """When the longest run was to end, s."""
+    """Return the longest duration of the runs, s."""
     return max(trace.scenario.samples * trace.scenario.control_period for trace in traces)
 
 
 def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
-    """Range and mean of y (K+1, n), held from sample to sample, between consecutive edges (s, ascending).
+    """Return range and mean of y (K+1, n), held from sample to sample, between consecutive edges (s, ascending).
 
     A window has the samples in it and the one held at its left edge.
     """
@@ -58,9 +58,9 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
 
 
 def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
-    """Range and mean of y in at most `most` windows of equally many samples.
+    """Return range and mean of y in at most `most` windows of equally many samples.
 
-    The number is even, so that a control which switches at every sample has the mean that it should.
+    That number is even, so that a control which switches at every sample has the correct mean.
     """
     count = len(t) - 1
     if count <= most:
@@ -70,20 +70,20 @@ def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
 
 
 def window(trace: Trace) -> int:
-    """How many samples a mean is taken over: a multiple of 4.
+    """Return the number of samples that a mean is taken over: a multiple of 4.
 
-    Of a control that switches irregularly between +-1, the mean over w samples is uncertain by some 2 / w. So a window
-    of a column's width on paper shows teeth that are not there; w is chosen so that they are thinner than a line.
+    Of a control that switches irregularly between +-1, the mean over w samples is uncertain by about 2 / w, and the
+    line gets teeth. The window is chosen so wide that they are thinner than a line.
     """
     share, least = WINDOW
     return 4 * round(max(share * trace.scenario.samples, least) / 4)
 
 
 def stretches(y: np.ndarray, width: int) -> list[slice]:
-    """Where y (K+1,) chatters; elsewhere, as under saturation on the way to a surface, it is its own line.
+    """Return where y (K+1,) chatters.
 
-    A move is a step from one sample to the next of more than STILL of the largest |y|, a reversal two moves in a row of
-    opposite signs. Reversals follow each other within n samples if neither the value held in one nor the way to the
+    A move is a step from one sample to the next of more than STILL of the largest |y|. A reversal is two moves in a row
+    of opposite signs. Reversals follow each other within n samples if neither the value held in one nor the way to the
     next takes longer. Chattering is REVERSALS of them within a quarter of the width, with all that follow each other
     within the width before and after: from the first of their moves to the last, and to an end of y that is as near.
     The rule is the same read backwards.
@@ -92,29 +92,28 @@ def stretches(y: np.ndarray, width: int) -> list[slice]:
     moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
     turns = np.flatnonzero(np.diff(np.sign(step[moves])))
     first, last = moves[turns], moves[turns + 1]
-    seeds = [part for part in _following(first, last, width // 4) if len(part) >= REVERSALS]
-    starts = np.array([first[part[0]] for part in seeds])
-    found = []
-    for part in _following(first, last, width):
+
+    def sequences(near: int) -> list[np.ndarray]:
+        """Return the indices of reversals that follow each other within `near` samples."""
+        brief = np.flatnonzero(last - first <= near)
+        parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
+        return [part for part in parts if len(part)]
+
+    seeds = np.array([first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= REVERSALS])
+    result = []
+    for part in sequences(width):
         a, b = first[part[0]] + 1, last[part[-1]] + 1
-        if ((starts + 1 >= a) & (starts < b)).any():
-            found.append(slice(a if a > width else 0, b if b < len(y) - width else len(y)))
-    return found
-
-
-def _following(first: np.ndarray, last: np.ndarray, near: int) -> list[np.ndarray]:
-    """The reversals, from move `first` to move `last`, by number: those together that follow each other."""
-    brief = np.flatnonzero(last - first <= near)
-    parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
-    return [part for part in parts if len(part)]
+        if ((seeds >= a) & (seeds <= b)).any():
+            result.append(slice(a if a > width else 0, b if b < len(y) - width else len(y)))
+    return result
 
 
 def smooth(y: np.ndarray, width: int) -> np.ndarray:
-    """y (K+1,), replaced where it chatters by its mean over `width` samples, the nearer ones weighing more.
+    """Return y (K+1,), where it chatters replaced by its mean over `width` samples, the nearer ones weighing more.
 
     It is the mean of means over half the width each: a triangle, which leaves far less of a periodic signal than one
-    mean does. Within half a width of a stretch's ends it is that of the nearest whole triangle; in a stretch shorter
-    than the width, one triangle as long as the stretch.
+    mean does. Within half a width of the ends of a stretch it is that of the nearest whole triangle. In a stretch
+    shorter than the width, one triangle as long as the stretch.
     """
     line = y.astype(float)
     for part in stretches(y, width):
@@ -124,13 +123,13 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
 
 
 def running(y: np.ndarray, width: int) -> np.ndarray:
-    """Mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
+    """Return the mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
     total = np.concatenate([[0.0], np.cumsum(y)])
     return (total[width:] - total[:-width]) / width
 
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """A curve for y (K+1,): smoothed where it chatters, in few points that keep every extreme."""
+    """Return a curve for y (K+1,): smoothed where it chatters, in few points that keep every extreme."""
     y, size = smooth(y, width), -(-len(t) // POINTS)
     starts = np.arange(0, len(t), size)
     padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)

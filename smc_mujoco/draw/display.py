@@ -1,4 +1,4 @@
-"""Whether a window can be opened here: asked before MuJoCo's viewer, which without one ends the whole process."""
+"""Check that a window can be opened, before MuJoCo's viewer, which ends the whole process if it cannot."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ if not glfw.create_window(64, 64, "", None, None):
 
 
 def missing() -> str | None:
-    """None when the viewer can open, else why not and what to do; opens a hidden window, in a process of its own."""
+    """Return None if the viewer can open, else why not and what to do. Opens a hidden window in another process."""
     if sys.platform == "darwin" and getattr(sys.modules.get("mujoco.viewer"), "_MJPYTHON", None) is None:
         return "no view: on macOS the viewer runs under MuJoCo's own interpreter: mjpython $(which smc-mujoco) view ..."
     cure = "run it where there is a screen, or film the scene with smc-mujoco run"
@@ -29,7 +29,7 @@ def missing() -> str | None:
 
 
 def probe() -> str | None:
-    """None when a window with OpenGL opens, else how it failed."""
+    """Return None if a window with OpenGL opens, else how it failed."""
     code = [sys.executable, "-W", "ignore", "-c", PROBE]
     try:
         done = subprocess.run(code, capture_output=True, text=True, timeout=60, check=False)

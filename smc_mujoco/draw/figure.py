@@ -1,15 +1,14 @@
-"""Figures: x, u and s of several runs on one time axis with their phase portrait, and u alone under several conditions.
+"""Figures: x, u and s of several runs over time with their phase portrait; u alone under several conditions.
 
-Written as SVG and PNG; the same traces give the same files.
+They are written as SVG and PNG. The same traces give the same files.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -18,7 +17,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end, finite
-from smc_mujoco.draw.rows import REALISM, Row, axis, rows_of, titles
+from smc_mujoco.draw.panels import Panel
 from smc_mujoco.draw.states import HOLD
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.channel_groups import Group, cut
@@ -26,8 +25,8 @@ from smc_mujoco.simulation.trace import Trace
 
 WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
 DPI = 150
-HEAD = 1.2  # inches: above and below the panels
-LETTERS = 11  # points, of the legend
+HEAD = 1.2  # inches, above and below the panels
+LETTERS = 11  # points, in the legend
 
 
 def figure(
@@ -38,15 +37,15 @@ def figure(
 ) -> list[Path]:
     """Draw traces of one plant: x, u and s over time, the phase portrait, the last samples of u.
 
-    Of a network: the mean of the channels, single channels light, and the spread max x - min x. Joints that no actuator
-    drives, and channels in another unit, have panels of their own. Of realistic mechanisms also what an actuator
-    delivers, what friction and contacts exert, and where friction holds it. A run that failed is drawn to its end,
-    which is marked; the instant at which a plant changes is marked too.
+    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Joints
+    without an actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of what
+    the actuator delivers and of what friction and contacts exert; diamonds show where friction holds them. The end of
+    a failed run and the instant at which a plant changes are marked.
 
     Args:
       traces: several, or a single one.
-      path: without an ending, or with .svg or .png, which give way to both.
-      labels: one a trace, shown as it is; default: the laws' names.
+      path: without an ending, or with .svg or .png: both are written.
+      labels: one a trace; default: the laws' labels.
       title: default: the plant's name.
 
     Returns:
@@ -57,27 +56,36 @@ def figure(
     """
     base = _base(path)
     traces = style.same_plant(traces)
-    names, colours = style.labels(traces, labels), style.colours(traces)
+    names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
-    rows, held = rows_of(traces), [panels.rests(trace) for trace in traces]
+    overview, rests = panels.overview(traces), [panels.rests(trace) for trace in traces]
     with style.page():
-        extra = sum(row.name in REALISM for row in rows)
-        page = _page(7.2 + 1.3 * (extra + max(0, len(rows) - extra - 4)))
+        realism = sum(panel.quantity in panels.REALISM for panel in overview)
+        page = _page(7.2 + 1.3 * (realism + max(0, len(overview) - realism - 4)))
         left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
-        _overview(page, left, rows, style.jumps(traces, names), colours)
-        places = [row for row in rows if row.name == "x"]
+        column, axes = left.subgridspec(len(overview), 1), []
+        words = panels.titles(overview, 72 * (page.get_figheight() - HEAD) / len(overview))
+        for i, panel in enumerate(overview):
+            ax = page.add_subplot(column[i], sharex=axes[0] if axes else None, ylabel=words[i])
+            axes.append(ax)
+            if panel.quantity == "x":
+                panels.target(ax, panel.traces)
+            panels.over_time(ax, panel, colours)
+            panels.jumps(ax, style.jumps(traces, names), named=i == 0)
+            ax.tick_params(labelbottom=i == len(overview) - 1)
+        axes[-1].set(xlabel="time (s)", xlim=(0.0, end(traces)))
+        page.align_ylabels(axes)
+        places = [panel for panel in overview if panel.quantity == "x"]
         column = right.subgridspec(len(places) + 1, 1, height_ratios=(*[1.5] * len(places), 1.0))
-        for i, row in enumerate(places):
-            portrait = page.add_subplot(column[i])
-            panels.phase(portrait, row.traces, colours, held)
-            portrait.set_xlabel(axis(row, "x"))
-            portrait.set_ylabel(axis(row, "v"))
-        first, close = next(row for row in rows if row.name == "u"), page.add_subplot(column[len(places)])
+        for i, panel in enumerate(places):
+            portrait = page.add_subplot(column[i], xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
+            panels.phase(portrait, panel.traces, colours, rests)
+        first = next(panel for panel in overview if panel.quantity == "u")
+        channel = ", channel 0" if traces[0].scenario.plant.driven > 1 else ""
+        name = f"control u ({style.units(first.group)['u']}){channel}"
+        close = page.add_subplot(column[-1, 0], xlabel="time before the end (ms)", ylabel=name)
         panels.last_samples(close, first.traces, colours)
-        close.set_xlabel("time before the end (ms)")
-        several = traces[0].scenario.plant.driven > 1
-        close.set_ylabel(f"control u ({style.units(first.group)['u']})" + (", channel 0" if several else ""))
-        _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours, rows))
+        _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours, overview, any(rests)))
         return _write(page, base)
 
 
@@ -92,13 +100,17 @@ def signals(
     Args:
       labels: the condition of each trace; traces under the same condition share it.
 
-    Returns, raises: as `figure`; also ScenarioError for two traces of one law under one condition, or u in two units.
+    Returns:
+      The two files.
+
+    Raises:
+      ScenarioError: as `figure`; also two traces of one law under one condition, or u in two units.
     """
     base = _base(path)
     traces = style.same_plant(traces)
-    given = style.labels(traces, labels)
+    columns = style.labels(traces, labels)
     traces = [finite(trace) for trace in traces]
-    cells = {(trace.scenario.law.name, label): trace for trace, label in zip(traces, given, strict=True)}
+    cells = {(trace.scenario.law.name, column): trace for trace, column in zip(traces, columns, strict=True)}
     if len(cells) < len(traces):
         raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
     group, *others = [group for group in style.split(traces) if group.driven]
@@ -112,11 +124,12 @@ def signals(
         room = 72 * WIDTH / len(conditions)  # points, a column's width
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
-            panels.over_time(ax, [cut(trace, group)], [colours[law]], "u", group)
+            panels.over_time(ax, Panel("u", group, [cut(trace, group)]), [colours[law]])
             panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
             ax.set_title(_variation(trace, group), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
+        control = Panel("u", group, style.split(traces)[group])
         for law, ax in zip(laws, axes[:, 0], strict=True):
-            ax.set_ylabel(axis(Row("u", group, traces), "u").replace("control ", ""))
+            ax.set_ylabel(control.label.replace("control ", ""))
             words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
             ax.set_title(words, color=colours[law], parse_math=False)
         for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
@@ -124,42 +137,20 @@ def signals(
             place = (0.5, 1.0), (0, 22), "axes fraction", "offset points"
             top.annotate(words, *place, ha="center", fontsize=13, parse_math=False)
             bottom.set_xlabel("time (s)")
-        parts = style.split(traces)[group]
-        axes[0, 0].set_ylim(panels.limits(parts, "u"))
-        axes[0, 0].set_xlim(0.0, end(traces))
+        axes[0, 0].set(xlim=(0.0, end(traces)), ylim=panels.limits(control.traces, "u"))
         note = Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %")
-        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning([parts], "u"), note])
+        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning([control]), note])
         return _write(page, base)
 
 
-def _overview(
-    page: Figure, place: SubplotSpec, rows: Sequence[Row], changes: Mapping[float, str], colours: Sequence[str]
-) -> None:
-    """The quantities over time, one below the other."""
-    column, axes = place.subgridspec(len(rows), 1), []
-    pitch = 72 * (page.get_figheight() - HEAD) / len(rows)
-    for i, (row, words) in enumerate(zip(rows, titles(rows, pitch), strict=True)):
-        ax = page.add_subplot(column[i], sharex=axes[0] if axes else None)
-        axes.append(ax)
-        if row.name == "x":
-            panels.target(ax, row.traces)
-        panels.over_time(ax, row.traces, colours, row.name, row.group)
-        panels.jumps(ax, changes, named=ax is axes[0])
-        ax.set_ylabel(words)
-        ax.tick_params(labelbottom=row is rows[-1])
-    axes[-1].set_xlabel("time (s)")
-    axes[-1].set_xlim(0.0, end(rows[0].traces))
-    page.align_ylabels(axes)
-
-
 def _page(height: float) -> Figure:
-    """An empty page, its height in inches."""
+    """Return an empty page; height in inches."""
     layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.07, wspace=0.02, hspace=0.02)
     return Figure(figsize=(WIDTH, height), layout=layout)
 
 
 def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
-    """The title, with the legend under it: in one row where it fits."""
+    """Draw the title with the legend below it: in as few rows as fit."""
     size, room = LETTERS, 72 * WIDTH - 16  # points
     words = [style.cropped(str(handle.get_label()), 0.45 * room, size) for handle in handles]
     widths = [style.width(text, size) + 4.4 * size for text in words]  # with the sample, and the gap to the next
@@ -183,42 +174,35 @@ def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
 
 
 def _key(
-    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], rows: Sequence[Row]
+    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], overview: Sequence[Panel], rests: bool
 ) -> list[Line2D | Patch]:
-    """What the legend shows: the traces, the reference with its band, what lines and bands are."""
+    """Return the entries of a legend: the traces, the reference with its band, the meaning of lines and bands."""
     handles: list[Line2D | Patch] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
         how = style.ending(trace)
         words = style.cropped(name, 0.3 * 72 * WIDTH, LETTERS) + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=3, label=words))
-    there = [row.name for row in rows]
-    banded = ["u", *("delivered" if name == "force" else name for name in REALISM if name in there), "s"]
-    if any(panels.rests(trace) for trace in traces):
+    if rests:
         diamond = {"marker": "D", "ms": 5, "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
-    driven = [row.traces for row in rows if row.name == "u"]
-    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(driven, ", ".join(banded))]
+    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(overview)]
 
 
-def _meaning(driven: Sequence[Sequence[Trace]], names: str) -> list[Line2D | Patch]:
-    """What the bands and the lines of the named quantities are, where they need words."""
-    n = max(traces[0].x.shape[1] for traces in driven)
-    over = max(filter(None, map(panels.mean_window, driven)), default=None)
-    handles: list[Line2D | Patch] = []
-    if over or n > 1:
-        handles.append(Patch(color=style.MUTED, alpha=0.3, label=f"band: range of {names}"))
-    if over:
-        words = f"line: mean over {1e3 * over:.3g} ms where it chatters"
-        handles.append(Line2D([], [], color=style.MUTED, lw=1.5, label=words))
-    if n > 1:
-        shown = len(panels.light(n))
-        which = "single channels" if shown == n else f"{shown} of {n} channels"
-        handles.append(Line2D([], [], color=style.MUTED, alpha=0.5, lw=0.8, label=f"light: {which}"))
-    return handles
+def _meaning(overview: Sequence[Panel]) -> list[Line2D | Patch]:
+    """Return the entries of a legend that say what bands and lines are."""
+    looks = {
+        "band": Patch(color=style.MUTED, alpha=0.3),
+        "line": Line2D([], [], color=style.MUTED, lw=1.5),
+        "light": Line2D([], [], color=style.MUTED, alpha=0.5, lw=0.8),
+    }
+    words = panels.meaning(overview)
+    for name, look in looks.items():
+        look.set_label(f"{name}: {words.get(name)}")
+    return [look for name, look in looks.items() if name in words]
 
 
 def _variation(trace: Trace, group: Group) -> str:
-    """How much u moves in the last part of a run."""
+    """Return the total variation of u per second in the last part of a run, or how the run failed."""
     if trace.diverged_at is not None:
         return style.ending(trace)
     rate = catalogue.tv_rate(trace)
@@ -226,7 +210,7 @@ def _variation(trace: Trace, group: Group) -> str:
 
 
 def _base(path: str | os.PathLike) -> Path:
-    """The path without .svg or .png. What follows a point in "lam_0.5" or "a.b c" is no ending."""
+    """Return the path without .svg or .png; the 5 in "lam_0.5" and the "b c" in "a.b c" are no endings."""
     base = Path(path)
     if not base.name:
         raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")

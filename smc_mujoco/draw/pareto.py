@@ -1,9 +1,9 @@
-"""Pareto fronts of tunings: tracking error against variation of the command, a staircase a law.
+"""Pareto fronts of tunings: tracking error against variation of the command, one staircase for each law.
 
     pareto([tune("duffing", law) for law in ("observer_free", "classical")], "fronts.svg")
 
-Down and to the left is better. Of the gains that a search tried, a front has those that none beats in both; nothing
-that it tried lies below the staircase. The chosen gains are where the objective is least, see `objective`.
+Down and to the left is better. A front consists of the gains that no others of the search beat in both. Nothing that
+was tried lies below the staircase. The chosen gains have the least objective, see `objective`.
 """
 
 import itertools
@@ -18,13 +18,13 @@ from smc_mujoco.analysis.tuning.result import Tuned, compare
 from smc_mujoco.draw import figure, style
 
 HEIGHT = 6.4  # inches
-REST = 1e-6  # 1/s: less variation than that, or none, has no place on a logarithmic axis
-MARKS = "osD^vPX"  # a law's, so that it is told without colours too
+MIN_VARIATION = 1e-6  # 1/s: none has no place on a logarithmic axis
+MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 CHOSEN = {"ms": 11, "mew": 2.0, "mfc": "none", "lw": 0}
 
 
 def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None = None) -> list[Path]:
-    """Draw the fronts of tunings of one plant, made by the same rule with the same means.
+    """Draw the fronts of tunings of one plant that have the same objective, budget and seed.
 
     Args:
       path: as of `figure`.
@@ -58,19 +58,19 @@ def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None 
 
 
 def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
-    """Draw a law's front with its chosen gains; what the legend says of it."""
+    """Draw a law's front with its chosen gains, and return its entry in the legend."""
     words = style.law_name(tuned.law.name)
     if not tuned.front:
         return Line2D([], [], color=colour, lw=3, label=f"{words}: every run failed")
     x = [one.tracking for one in tuned.front]
-    y = [max(one.variation, REST) for one in tuned.front]
+    y = [max(one.variation, MIN_VARIATION) for one in tuned.front]
     ax.step(x, y, where="post", color=colour, marker=mark, ms=4.5, mec="none", alpha=0.9)
     chosen = min(tuned.finals, key=lambda one: one.objective)
-    ax.plot([chosen.tracking], [max(chosen.variation, REST)], color=colour, marker=mark, zorder=3, **CHOSEN)
+    ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **CHOSEN)
     label = f"{words}: J = {tuned.objective:.3g} s²"
     return Line2D([], [], color=colour, lw=3, marker=mark, ms=7, mec="none", label=label)
 
 
 def _most(tuned: Tuned) -> float:
-    """The variation of a command that goes from bound to bound at every sample of every condition, 1/s."""
+    """Return the variation of a command that goes from bound to bound at every sample of every condition, 1/s."""
     return 2 / tuned.definition.control_period * len(tuned.definition.conditions)

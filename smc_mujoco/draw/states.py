@@ -1,9 +1,9 @@
-"""What holds or hits a machine, moment by moment: whether it sticks or slides, touches, and how it lies in its play.
+"""States of a machine over time: whether it sticks or slides, touches something, and where it lies in its backlash.
 
-A film shows no more than a state every HOLD seconds: a blow of 5 ms is told for HOLD, and a rest is told if it lasts as
-long. Rest is that of `measure.at_rest`. Touch is geometry: the scenario's own model, posed at each sample, and MuJoCo's
-collisions. Where a backlash has the joint to itself the flank that pushes is read off the reaction; beside friction
-and contacts, whose forces mix with its own, off what the actuator delivers, and that it is in play cannot be told.
+States are shown for HOLD seconds at least: a blow of 5 ms for HOLD, and a rest only if it lasts that long. Rest is that
+of `metrics.conventions.at_rest`. Contact is geometry: MuJoCo's collisions of the scenario's own model, posed at each
+sample. A backlash alone at a joint is read off the reaction: its sign is the flank that pushes. Beside friction and
+contacts, whose forces mix with it, it is read off the actuator's force, which does not show when it is in play.
 """
 
 import itertools
@@ -22,12 +22,13 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HOLD = 0.15  # s, chosen: nine pictures of a film at 60 fps, and long enough to read a word
-CALM, HELD, STRUCK = range(3)  # moods
+HOLD = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
+CALM, STUCK, STRUCK = range(3)  # moods
+SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
 class State(NamedTuple):
-    """What is told of a machine, and how loudly."""
+    """Words for what a machine does, and their mood, which sets their colour."""
 
     words: str
     mood: int
@@ -41,73 +42,78 @@ class Shape(NamedTuple):
 
 
 def shapes(scenario: Scenario) -> list[Shape]:
-    """The mechanism as the run starts, and after its jump."""
+    """Return the mechanism at the start of a run, and after its jump."""
     steps = [0] if scenario.jump is None else [0, scenario.jump_step]
     compiled = assembly.model([scenario])
     return [Shape(step * scenario.physics_step, assembly.numbered(compiled, scenario, step)) for step in steps]
 
 
-def told(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | None]:
-    """What is told at each time; None where there is nothing to tell, and once the run has failed."""
-    dry, gap = rubs(trace.scenario), play(trace.scenario)
-    touch = np.any(np.stack([held(on, trace.t, hold) for on in touching(trace).T]), axis=0)
-    sliding = np.array([held(first_too(~on, trace.t, hold), trace.t, hold) for on in resting(trace).T])
-    lies = [lying(flank, trace.t, hold) for flank in flanks(trace).T] if gap else []
-    found: list[State | None] = []
+def timeline(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | None]:
+    """Return the state at each time, s; None for a machine without states, and once its run has failed."""
+    dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
+    contact = np.any(np.stack([held(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
+    sliding = np.array([held(on_at_start(~on, trace.t, hold), trace.t, hold) for on in at_rest(trace).T])
+    sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T]) if gap else None
+    states: list[State | None] = []
     for time in times.tolist():
         k = int(np.searchsorted(trace.t, time + 1e-9)) - 1
-        words = ([stick_words(~sliding[:, k])] if dry else []) + ([play_words([lie[k] for lie in lies])] if gap else [])
+        words = [stick_words(~sliding[:, k])] if dry else []
+        words += [backlash_words(sides[:, k])] if sides is not None else []
         if trace.diverged_at is not None and time >= trace.diverged_at:
-            found.append(None)
-        elif touch[k]:
-            found.append(State("contact", STRUCK))
+            states.append(None)
+        elif contact[k]:
+            states.append(State("contact", STRUCK))
         else:
-            holds = dry and not sliding[:, k].all()
-            found.append(State(", ".join(words), HELD if holds else CALM) if words else None)
-    return steady(found, times, hold)
+            sticks = dry and not sliding[:, k].all()
+            states.append(State(", ".join(words), STUCK if sticks else CALM) if words else None)
+    return debounced(states, times, hold)
 
 
-def resting(trace: Trace) -> np.ndarray:
-    """Where each channel is at rest beside those of its group, (K + 1, n)."""
+def at_rest(trace: Trace) -> np.ndarray:
+    """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1, n)."""
     rest = np.empty(trace.x.shape, bool)
     for group, part in conventions.parts(trace).items():
         rest[:, group.channels] = conventions.at_rest(part)
     return rest
 
 
-def steady(found: Sequence[State | None], times: np.ndarray, hold: float) -> list[State | None]:
-    """The states without the words that pass before they can be read: the ones before stay instead. Blows are kept."""
-    runs = [list(run) for _, run in itertools.groupby(range(len(found)), key=lambda frame: found[frame])]
-    shown = list(found)
+def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) -> list[State | None]:
+    """Return the states, with those shorter than `hold` s replaced by the ones before. Contacts are kept."""
+    runs = [list(run) for _, run in itertools.groupby(range(len(states)), key=lambda frame: states[frame])]
+    result = list(states)
     for run, after in itertools.pairwise(runs):
-        state, stays = found[run[0]], shown[run[0] - 1] if run[0] else found[after[0]]
+        state, before = states[run[0]], result[run[0] - 1] if run[0] else states[after[0]]
         brief = times[after[0]] - times[run[0]] < hold - 1e-9
-        if brief and state and stays and state.mood != STRUCK and (run[0] or stays.mood != STRUCK):
-            shown[run[0] : after[0]] = [stays] * len(run)
-    return shown
+        if brief and state and before and state.mood != STRUCK and (run[0] or before.mood != STRUCK):
+            result[run[0] : after[0]] = [before] * len(run)
+    return result
 
 
-def rubs(scenario: Scenario) -> bool:
-    """Whether something rubs that can hold the machine: dry friction in its joints, or of what it lies on."""
-    joints = any((isinstance(f, Coulomb) and f.level > 0.0) or isinstance(f, LuGre) for f in scenario.friction)
-    return joints or (scenario.contact.kind != "none" and bool(_rubbing(shapes(scenario)[0].model)))
+def has_dry_friction(scenario: Scenario) -> bool:
+    """Return whether dry friction can hold the machine: in its joints, or of what it lies on."""
+    if any((isinstance(f, Coulomb) and f.level > 0.0) or isinstance(f, LuGre) for f in scenario.friction):
+        return True
+    if scenario.contact.kind == "none":
+        return False
+    model = shapes(scenario)[0].model
+    return any(model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0 for i in range(model.npair))
 
 
-def touches(scenario: Scenario) -> bool:
-    """Whether there is something to run into."""
+def has_contact(scenario: Scenario) -> bool:
+    """Return whether the machine can hit something."""
     return scenario.contact.kind != "none" and bool(_channels(shapes(scenario)[0].model)[0])
 
 
-def play(scenario: Scenario) -> float:
-    """The gap of the scenario's backlash, 0 without one."""
+def backlash_gap(scenario: Scenario) -> float:
+    """Return the gap of the scenario's backlash in rad or m, 0 without one."""
     return next((part.gap for part in scenario.actuator if isinstance(part, Backlash)), 0.0)
 
 
-def touching(trace: Trace) -> np.ndarray:
-    """Where each channel is in contact with an obstacle or another channel, (K + 1, n)."""
-    touch = np.zeros(trace.x.shape, bool)
+def in_contact(trace: Trace) -> np.ndarray:
+    """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
+    contact = np.zeros(trace.x.shape, bool)
     if trace.scenario.contact.kind == "none":
-        return touch
+        return contact
     parts = shapes(trace.scenario)
     data = [mujoco.MjData(shape.model) for shape in parts]
     tables = [_channels(shape.model) for shape in parts]
@@ -117,17 +123,17 @@ def touching(trace: Trace) -> np.ndarray:
         posed.qpos[model.jnt_qposadr[joint_ids(model)]] = trace.x[k]
         mujoco.mj_kinematics(model, posed)
         mujoco.mj_collision(model, posed)
-        for contact in posed.contact:
-            if contact.dist <= 0.0 and frozenset(contact.geom.tolist()) in hits:
-                mine = [owner[body] for body in model.geom_bodyid[contact.geom] if owner[body] >= 0]
-                touch[k, mine] = True
-    return touch
+        for touch in posed.contact:
+            if touch.dist <= 0.0 and frozenset(touch.geom.tolist()) in hits:
+                channels = owner[model.geom_bodyid[touch.geom]]
+                contact[k, channels[channels >= 0]] = True
+    return contact
 
 
 def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
-    """The pairs of geoms that hit each other, and each body's channel, -1 for one that no channel moves."""
-    pairs = range(model.npair)
-    hits = {_geoms(model, i) for i in pairs if model.pair(i).name.startswith(HIT)}
+    """Return the pairs of geoms that hit each other, and the channel that moves each body, -1 if none does."""
+    geoms = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
+    hits = {frozenset(pair) for i, pair in enumerate(geoms) if model.pair(i).name.startswith(HIT)}
     owner = np.full(model.nbody, -1)
     bodies = model.jnt_bodyid[joint_ids(model)].tolist()
     for body in range(1, model.nbody):
@@ -135,24 +141,14 @@ def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
     return hits, owner
 
 
-def _geoms(model: mujoco.MjModel, pair: int) -> frozenset[int]:
-    return frozenset({int(model.pair_geom1[pair]), int(model.pair_geom2[pair])})
-
-
-def _rubbing(model: mujoco.MjModel) -> list[int]:
-    """The pairs that slide on each other, with friction."""
-    pairs = [i for i in range(model.npair) if model.pair(i).name.startswith(RUB)]
-    return [i for i in pairs if model.pair_friction[i, 0] > 0.0]
-
-
 def flanks(trace: Trace) -> np.ndarray:
-    """The side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes towards larger x."""
+    """Return the side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes towards larger x."""
     alone = not trace.scenario.friction and trace.scenario.contact.kind == "none"
     return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
 
 
 def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """A signal (K + 1,), each time it is on, for `hold` s more, and without gaps shorter than that."""
+    """Return a signal (K + 1,) that stays on for `hold` s more each time, and has no shorter gaps."""
     last = np.maximum.accumulate(np.where(on, t, -np.inf))
     on = t - last < hold - 1e-9
     edges = np.flatnonzero(np.diff(on.astype(int), prepend=0))  # on, off, on, ...
@@ -161,35 +157,32 @@ def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     return on
 
 
-def first_too(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """The signal, on from the start if it soon will be: a machine let go at rest is not told to stick."""
-    on = on.copy()
-    on[: np.searchsorted(t, t[0] + hold)] |= on[t < t[0] + hold].any()
-    return on
+def on_at_start(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+    """Return the signal, on from the start if it is so within `hold` s: a machine let go at rest does not stick."""
+    early = t < t[0] + hold
+    return on | (early & on[early].any())
 
 
-def lying(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """-1 or 1: on that flank; 0: in play; 2: it goes to and fro faster than can be told, (K + 1,)."""
+def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+    """Return -1 or 1 on that flank, 0 in play, 2 where it crosses more often than can be shown, (K + 1,)."""
     touched = np.flatnonzero(flank)
     crossed = touched[1:][np.diff(flank[touched]) != 0]
-    twice = crossed[1:][np.diff(t[crossed]) < hold]
     rattles = np.zeros(len(t), bool)
-    rattles[twice] = True
+    rattles[crossed[1:][np.diff(t[crossed]) < hold]] = True
     latest = np.maximum.accumulate(np.where(flank != 0, np.arange(len(t)), 0))
-    lies = np.where(held(flank != 0, t, hold), flank[latest], 0.0)
-    return np.where(held(rattles, t, hold), 2, lies).astype(int)
+    sides = np.where(held(flank != 0, t, hold), flank[latest], 0.0)
+    return np.where(held(rattles, t, hold), 2, sides).astype(int)
 
 
 def stick_words(sticks: np.ndarray) -> str:
-    """What is told of channels (n,) that stick or slide."""
+    """Return words for channels (n,) that stick or slide."""
     if sticks.all() or not sticks.any():
         return "sticks" if sticks.all() else "slides"
     return f"{sticks.sum()} of {len(sticks)} stick"
 
 
-def play_words(lies: Sequence[int]) -> str:
-    """What is told of channels in their play."""
-    names = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
-    if len(set(lies)) == 1:
-        return names[int(lies[0])]
-    return f"{sum(lie == 0 for lie in lies)} of {len(lies)} in play"
+def backlash_words(sides: Sequence[int] | np.ndarray) -> str:
+    """Return words for channels in their backlash."""
+    if len(set(sides)) == 1:
+        return SIDES[int(sides[0])]
+    return f"{sum(side == 0 for side in sides)} of {len(sides)} in play"

@@ -1,8 +1,7 @@
-"""How laws, units and pages look, in figures and films alike.
+"""Style of figures and films: colours, labels, units and fonts.
 
-Laws and plants say their labels and colours themselves, in their files. The laws' colours are those of Okabe and Ito
-(Color Universal Design, 2008), which colour-blind readers can tell apart. A law keeps its colour everywhere. The fonts
-ship with matplotlib.
+Laws and plants state their labels and colours in their own files. The laws' colours are those of Okabe and Ito (Color
+Universal Design, 2008), which colour-blind readers can tell apart. A law has the same colour everywhere.
 """
 
 import colorsys
@@ -20,14 +19,14 @@ from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import Trace
 
-# Colours of laws that say none themselves. Of a grid of colours those farthest in CIEDE2000 from those that laws say,
-# from each other and from what else is drawn, as seen by most eyes (18 and more) and with any colour blindness (7.5;
-# red or green 9). A just noticeable difference is about 1, and the closest two that laws say are at 16 and 6.
+# Colours of laws that state none. Chosen from a grid as the farthest in CIEDE2000 from the stated ones, from each other
+# and from whatever else is drawn: 18 and more with normal vision, 9 without red or green cones, 7.5 without blue ones.
+# A just noticeable difference is about 1. The closest two stated ones are at 16 and 6.
 OTHERS = ("#005A3C", "#960000", "#96B469", "#78784B", "#B42D69", "#7887FF")
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
-# Friction and contact: of a grid of colours one of the farthest in CIELAB from the laws', the disturbance's and
-# paper, as seen with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
+# Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
+# and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
 
 RC = {
@@ -70,27 +69,19 @@ def page():
 
 def law_colour(law: Component | str) -> str:
     """Return the colour of a law, "#RRGGBB": its own, or always the same one of OTHERS."""
-    template, name = _known(law)
+    template, name = _template(law)
     return (template and template.colour) or OTHERS[zlib.crc32(name.encode()) % len(OTHERS)]
 
 
-def colours(traces: Sequence[Trace]) -> list[str]:
-    """Return one colour a trace: its law's, or another where an earlier trace has taken that."""
-    return law_colours([trace.scenario.law for trace in traces])
-
-
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
-    """Return one colour a law for one picture: its own, or another where an earlier law has taken that."""
+    """Return one colour a law for one picture: its own, or another if an earlier law has that."""
     wanted = [law_colour(law) for law in laws]
     free = (colour for colour in _palette() if colour not in wanted)
-    given: list[str] = []
-    for colour in wanted:
-        given.append(next(free) if colour in given else colour)
-    return given
+    return [next(free) if colour in wanted[:i] else colour for i, colour in enumerate(wanted)]
 
 
 def _palette() -> Iterator[str]:
-    """Yield OTHERS, then the colours that laws of the library say, then colours without end that differ in hue."""
+    """Yield OTHERS, then the colours of the library's laws, then colours without end that differ in hue."""
     yield from OTHERS
     yield from dict.fromkeys(template.colour for template in catalogue().values() if template.colour)
     for k in itertools.count():
@@ -99,19 +90,19 @@ def _palette() -> Iterator[str]:
 
 
 def law_name(law: Component | str) -> str:
-    """Return a law's label: its own, or its name in words; a law of a user's is called as the user calls it."""
-    template, name = _known(law)
+    """Return a law's label: its own, or its name in words. A user's law keeps the user's name."""
+    template, name = _template(law)
     return (template and template.label) or (in_words(name) if name in catalogue() else name)
 
 
 def law_initials(law: str) -> str:
-    """Return a law's name in two or three letters, for where there is room for no more."""
-    template, name = _known(law)
+    """Return a law's name in two or three letters, for narrow places."""
+    template, name = _template(law)
     return (template and template.short) or "".join(word[:1] for word in name.split("_")).upper()[:3] or "?"
 
 
-def _known(law: Component | str) -> tuple[Template | None, str]:
-    """Return what the author of a law said of it, where that is at hand, and its name."""
+def _template(law: Component | str) -> tuple[Template | None, str]:
+    """Return the template of a law, if there is one, and the law's name."""
     if isinstance(law, str):
         return catalogue().get(law), law
     return law.template or catalogue().get(law.name), law.name
@@ -123,10 +114,10 @@ def in_words(name: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """Return one label a trace: the given ones, else the laws' names, numbered where a law comes again.
+    """Return one label a trace: the given ones, else the laws' labels, numbered if a law occurs more than once.
 
     Raises:
-      ScenarioError: not as many labels as traces.
+      ScenarioError: the number of labels is not that of the traces.
     """
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
@@ -137,7 +128,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 
 
 def ending(trace: Trace) -> str:
-    """Return how a run ended before its time, "" if it did not: "diverged at 0.4 s" only where the plant diverged."""
+    """Return how a run failed: "diverged at 0.4 s" (the plant) or "failed at 0.4 s" (its law); "" if it did not."""
     if trace.diverged_at is None:
         return ""
     off = trace.failure is None or trace.failure.startswith(reference.LEFT_THE_WORLD)
@@ -145,7 +136,7 @@ def ending(trace: Trace) -> str:
 
 
 def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
-    """Return when plants change, s -> how, as "mass × 2"; with the labels in front where only some of them do."""
+    """Return the changes of plants, time in s -> "mass × 2"; begins with the runs' labels if only some change."""
     found: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
         if jump := trace.scenario.jump:
@@ -159,7 +150,7 @@ def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
 
 @functools.cache
 def font(size: float, bold: bool = False):
-    """Return DejaVu Sans, which comes with matplotlib, as a font of Pillow; letters `size` high."""
+    """Return DejaVu Sans, which matplotlib ships, as a font of Pillow; letters `size` high."""
     import matplotlib
     from PIL import ImageFont
 
@@ -168,12 +159,12 @@ def font(size: float, bold: bool = False):
 
 
 def width(text: str, size: float, bold: bool = False) -> float:
-    """Return the width of a text, in the unit of the letters' size."""
+    """Return the width of a text, in the unit of `size`, the height of its letters."""
     return font(10 * size, bold).getlength(text) / 10  # Pillow rounds small letters to pixels
 
 
 def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
-    """Return the text on one line, cut with an ellipsis where it is wider than the room."""
+    """Return the text on one line, with an ellipsis at its end if it is wider than the room."""
     text = cut = " ".join(text.split())
     while cut and width(cut if cut == text else f"{cut}…", size, bold) > room:
         cut = cut[:-1]
@@ -181,10 +172,10 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
-    """Return the traces as a list, if they can share axes.
+    """Return the traces as a list.
 
     Raises:
-      ScenarioError: none, or of several plants.
+      ScenarioError: no traces, or traces that cannot share axes.
     """
     traces = [traces] if isinstance(traces, Trace) else taken("traces", traces)
     if not traces:
@@ -200,7 +191,7 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
 
 
 def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
-    """Return the traces of each group of channels, for traces of one plant: each group shares a pair of axes."""
+    """Return the traces of each group of channels, which share a pair of axes. All traces are of one plant."""
     kinds = zip(*(groups(trace.scenario.plant) for trace in traces), strict=True)
     return {kind[0]: [cut(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
 
@@ -211,18 +202,8 @@ def units(group: Group) -> dict[str, str]:
     return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
 
 
-def quantity(group: Group) -> str:
-    """Return what x is: "angle" or "position", and "free angle" where no actuator drives it."""
-    return ("" if group.driven else "free ") + {"rad": "angle", "m": "position"}[group.unit]
-
-
-def letter(group: Group) -> str:
-    """Return the letter of x: q where no actuator drives it, as in a law's y.q."""
-    return "x" if group.driven else "q"
-
-
 def plant_name(trace: Trace) -> str:
-    """Return the plant's label: its own, or its name in words; a model of the user's is called as the user calls it."""
+    """Return the plant's label: its own, or its name in words. A user's model keeps the user's name."""
     plant = trace.scenario.plant
     return plant.label or (plant.name if plant.direct else in_words(plant.name))
 
@@ -233,11 +214,11 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 
 def letters_on(colour: str) -> str:
-    """Return white or ink, whichever is easier to read on a colour (luma of ITU-R BT.601)."""
+    """Return the colour of letters that are easier to read on a colour, white or ink (luma of ITU-R BT.601)."""
     red, green, blue = rgb(colour)
     return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 140 else PAPER
 
 
 def short(value: float, digits: int = 2) -> str:
-    """Return a number in few digits, without an exponent where it has fewer than seven: 0.25, 6, 280."""
+    """Return a number in few digits, as 0.25, 6, 280; with an exponent only from 1e6 on."""
     return f"{float(f'{value:.{digits}g}'):g}"

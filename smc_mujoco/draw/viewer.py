@@ -1,8 +1,8 @@
-"""A run in MuJoCo's viewer at real time: the reference loop's control, with a slider for each gain of its law.
+"""A run in MuJoCo's viewer in real time, controlled by the reference loop, with a slider for each gain of its law.
 
-What is shown is a model of its own, which has the sliders and takes positions from the run. So the run is that of
-`smc.run`, whatever the viewer's panels do to what is shown. Three things go the other way: the gains, what the mouse
-pushes with, and the viewer's reset, which begins the run anew.
+The viewer shows a model of its own, which has the sliders and takes positions from the run. So the run is that of
+`smc.run`, whatever the viewer's panels do to the model on screen. Three things act on the run: the gains, the mouse's
+push, and the viewer's reset, which restarts it.
 """
 
 import contextlib
@@ -24,15 +24,15 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.reference import Loop
 from smc_mujoco.simulation.scenario import Scenario
 
-GAIN = "gain:"  # what names of sliders begin with
-SPACE = 32  # GLFW's code of the key
+GAIN = "gain:"  # prefix of the sliders' names
+SPACE = 32  # code of the key in GLFW
 FRAME = 1.0 / 60.0  # s, of most screens
-MOST = 0.1  # s that a frame simulates, or takes to: what is slower than real time still answers the mouse
-REST = 30  # frames without a change after which gains are printed: half a second
+MAX_FRAME = 0.1  # s that a frame simulates, and takes: runs slower than real time still answer the mouse
+SETTLED = 30  # frames without a change after which gains are printed: half a second
 
 
 def watch(scenario: Scenario) -> None:
-    """Show a run in MuJoCo's viewer until its window is closed; it begins anew when its duration is over."""
+    """Show a run in MuJoCo's viewer until its window is closed; it restarts when its duration is over."""
     import mujoco.viewer
 
     live, others = Live(scenario), set(threading.enumerate())
@@ -42,9 +42,9 @@ def watch(scenario: Scenario) -> None:
                 aim(live.model, live.data, window.cam)
             play(live, window)
     finally:
-        for thread in set(threading.enumerate()) - others:  # a process that ends while it draws crashes
+        for thread in set(threading.enumerate()) - others:  # or the process crashes if it ends while it draws
             thread.join(timeout=10.0)
-        print(called(live.law))
+        print(as_code(live.law))
 
 
 def play(live: "Live", window: Any) -> None:
@@ -52,14 +52,14 @@ def play(live: "Live", window: Any) -> None:
     before = time.perf_counter()
     while window.is_running():
         now = time.perf_counter()
-        with contextlib.suppress(mujoco.UnexpectedError):  # what it says when closed in mid-frame
+        with contextlib.suppress(mujoco.UnexpectedError):  # raised if the window is closed during a frame
             live.frame(window, now - before)
         before = now
         time.sleep(max(0.0, now + FRAME - time.perf_counter()))
 
 
 def aim(model: mujoco.MjModel, data: mujoco.MjData, cam: mujoco.MjvCamera) -> None:
-    """Let the viewer's camera, which the mouse moves, begin where the plant's own `look` stands, if it has one."""
+    """Put the viewer's camera, which the mouse moves, at the plant's camera `look`, if it has one."""
     look = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, "look")
     if look < 0:
         return
@@ -73,46 +73,47 @@ class Live:
     """A run that a viewer shows, frame by frame.
 
     Attributes:
-      loop: the run; of its duration `step` physics steps are over.
-      model, data: what the viewer shows.
-      paused: whether time stands still.
+      loop: the run.
+      step: number of its physics steps that are over.
+      model, data: those on screen.
+      paused: whether the run is paused.
     """
 
     def __init__(self, scenario: Scenario, say: Callable[[str], None] = print):
-        self.model = slidden(scenario)
+        self.model = model_with_sliders(scenario)
         self.data = mujoco.MjData(self.model)
-        ids = [self.model.actuator(GAIN + name).id for name in turned(scenario.law)]
+        ids = [self.model.actuator(GAIN + name).id for name in slider_gains(scenario.law)]
         self.sliders = self.model.actuator_ctrladr[ids] if ids else np.zeros(0, int)
-        self.limits = self.model.actuator_ctrlrange[self.sliders].T  # a row a control: some actuators take none
-        self.paused, self.say, self.told, self.rested = False, say, scenario.law, 0
+        self.limits = self.model.actuator_ctrlrange[self.sliders].T  # one row a control: some actuators have none
+        self.paused, self.say, self.printed, self.unchanged = False, say, scenario.law, 0
         self.begin(scenario)
         self.show()
 
     @property
     def law(self) -> Law:
-        """The law with its gains of now."""
+        """The law with its present gains."""
         return self.loop.scenario.law
 
     def begin(self, scenario: Scenario) -> None:
-        """Begin anew."""
+        """Start the run again."""
         with installed():
             self.loop = Pushed(scenario)
         self.step, self.due, self.late = 0, 0.0, False
         self.build(0)
 
     def build(self, step: int) -> None:
-        """Show the mechanism with the true parameters that hold from a physics step on."""
+        """Give the model on screen the true parameters that hold from a physics step on."""
         for name, value in assembly.numbers(self.loop.compiled, self.loop.scenario, step).items():
             array(self.model, name)[: len(value)] = value  # sliders are the last actuators
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def key(self, code: int) -> None:
-        """The viewer's key callback: space stops time, and lets it go on."""
+        """Pause or resume on the space bar: the viewer's key callback."""
         if code == SPACE:
             self.paused = not self.paused
 
     def frame(self, viewer: Any, seconds: float) -> None:
-        """One frame: what the user did, that many seconds of the run, and how it then looks."""
+        """Make one frame: read the user's input, advance the run by `seconds`, show it."""
         self.listen()
         if not self.paused:
             self.advance(seconds)
@@ -122,28 +123,28 @@ class Live:
         viewer.sync()
 
     def listen(self) -> None:
-        """Take from the viewer the gains, what the mouse pushes with, and a reset."""
-        if self.data.time == 0.0 and self.step:  # a reset, which puts the sliders to 0, too
+        """Read the gains, the mouse's push and a reset from the viewer."""
+        if self.data.time == 0.0 and self.step:  # a reset, which also puts the sliders to 0
             self.begin(self.loop.scenario)
             return
         self.loop.push[:] = self.data.xfrc_applied
         values = np.clip(self.data.ctrl[self.sliders], *self.limits).tolist()
-        gains = dict(self.law.gains) | dict(zip(turned(self.law), values, strict=True))
-        self.rested += 1
+        gains = dict(self.law.gains) | dict(zip(slider_gains(self.law), values, strict=True))
+        self.unchanged += 1
         if gains != dict(self.law.gains):
             law = dataclasses.replace(self.law, gains=gains)
-            self.loop.scenario, self.rested = dataclasses.replace(self.loop.scenario, law=law), 0
-        elif self.rested >= REST and self.told != self.law:
-            self.told = self.law
-            self.say(called(self.law))
+            self.loop.scenario, self.unchanged = dataclasses.replace(self.loop.scenario, law=law), 0
+        elif self.unchanged >= SETTLED and self.printed != self.law:
+            self.printed = self.law
+            self.say(as_code(self.law))
 
     def advance(self, seconds: float) -> None:
-        """Simulate what is due, at most MOST; a run that is over begins anew, one that fails is paused."""
+        """Simulate the time that is due, at most MAX_FRAME. A run that is over restarts, a failed one is paused."""
         if self.loop.failure or self.step > self.loop.total:
             self.begin(self.loop.scenario)
         loop, h = self.loop, self.loop.scenario.physics_step
-        self.due += min(seconds, MOST)
-        until, self.late = time.perf_counter() + MOST, seconds > MOST
+        self.due += min(seconds, MAX_FRAME)
+        until, self.late = time.perf_counter() + MAX_FRAME, seconds > MAX_FRAME
         with installed(loop.control), np.errstate(all="ignore"):
             while self.due >= h and self.step <= loop.total and not loop.failure:
                 loop.step(self.step)
@@ -154,60 +155,60 @@ class Live:
             self.build(loop.scenario.jump_step)
         if loop.failure:
             self.paused = True
-            self.say(f"{loop.failure}, at t = {loop.failed_step * h:.6g} s: space begins anew")
+            self.say(f"{loop.failure}, at t = {loop.failed_step * h:.6g} s: space starts again")
 
     def show(self) -> None:
-        """Put the run's state and gains into what the viewer shows; of a run that failed the last one before."""
+        """Copy the run's state and gains to the model on screen; of a failed run the last state before."""
         seen, run = self.data, self.loop.data
         if not self.loop.failure:
             seen.time, seen.qpos[:], seen.qvel[:], seen.act[:] = run.time, run.qpos, run.qvel, run.act
             seen.ctrl[: len(run.ctrl)] = run.ctrl
-        seen.ctrl[self.sliders] = list(turned(self.law).values())
+        seen.ctrl[self.sliders] = list(slider_gains(self.law).values())
         seen.xfrc_applied[:] = 0.0
         mujoco.mj_forward(self.model, seen)
 
 
 class Pushed(Loop):
-    """The reference loop with a force and a torque on every body besides, (nbody, 6), as xfrc_applied has them."""
+    """The reference loop with an additional force and torque on every body, (nbody, 6), as in xfrc_applied."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
         self.push = np.zeros_like(self.data.xfrc_applied)
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
-        """The disturbances alone; the push is added to them on the bodies."""
+        """Return the disturbances alone, and apply them and the push to the bodies."""
         data.xfrc_applied[:] = 0.0
         d = super().disturb(data, t)
         data.xfrc_applied += self.push
         return d
 
 
-def slidden(scenario: Scenario) -> mujoco.MjModel:
-    """The mechanism with a slider a gain among the viewer's controls: an actuator of gear 0, which moves nothing."""
+def model_with_sliders(scenario: Scenario) -> mujoco.MjModel:
+    """Return the mechanism with a slider for each gain: an actuator of gear 0, which moves nothing."""
     spec = assembly.spec([scenario])
     joint = driven(spec)[0].name
-    for name, gain in turned(scenario.law).items():
+    for name, gain in slider_gains(scenario.law).items():
         spec.add_actuator(
             name=GAIN + name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
             target=joint,
             gear=[0.0] * 6,
             ctrllimited=True,
-            ctrlrange=reach(gain),
+            ctrlrange=slider_range(gain),
         )
     return ready(spec, 0)
 
 
-def turned(law: Law) -> dict[str, float]:
-    """The gains that have sliders: all that are finite."""
+def slider_gains(law: Law) -> dict[str, float]:
+    """Return the gains that have sliders: all finite ones."""
     return {name: gain for name, gain in law.gains.items() if math.isfinite(gain)}
 
 
-def reach(gain: float) -> list[float]:
-    """A slider's range: a decade either side of its gain; 0 to 1 of a gain of 0, which may have to be positive."""
+def slider_range(gain: float) -> list[float]:
+    """Return a slider's range: a tenth to ten times its gain; 0 to 1 for a gain of 0, which may not be negative."""
     return sorted((gain / 10.0, gain * 10.0)) if gain else [0.0, 1.0]
 
 
-def called(law: Law) -> str:
-    """A law as code that makes it."""
+def as_code(law: Law) -> str:
+    """Return a law as the code that makes it."""
     return f"smc.{law!r}" if law.name in catalogue() else str(law)

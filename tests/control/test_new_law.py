@@ -60,7 +60,7 @@ for name in ("brand_new", "plain_one"):
         "label": style.labels([trace], None)[0],
         "report": words.law(name),
         "short": words.short(name),
-        "colour": style.colours([trace])[0],
+        "colour": style.law_colours([trace.scenario.law])[0],
         "colours": style.law_colours([*smc.laws()]),
         "linear": linearisation.local(smc.law(name)),
     }

@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.draw import decimate, panels, rows, style
+from smc_mujoco.draw import decimate, panels, style
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.figure import figure, signals
-from smc_mujoco.draw.film import charts
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
@@ -137,20 +136,20 @@ def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
 
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
     trace = cart_and_pole()
-    shown = rows.rows_of([trace])
+    shown = panels.overview([trace])
     widths = []
     for row in shown[:2]:
         ax = Figure().subplots()
         panels.target(ax, row.traces)
         (band,) = ax.collections
         widths.append(band.get_datalim(ax.transData).height)
-    assert [row.name for row in shown] == ["x", "x", "u", "s"]
+    assert [row.quantity for row in shown] == ["x", "x", "u", "s"]
     assert widths == pytest.approx([2 * 0.02, 2 * 0.02 * 0.3])  # the cart starts at 0: 1 m; the pole at 0.3 rad
 
 
 def test_a_film_has_a_chart_of_each_joint():
     trace = cart_and_pole()
-    parts = charts.shown([trace])
+    parts = panels.strip([trace])
     assert [(name, group.unit) for name, group, _ in parts] == [("x", "m"), ("x", "rad"), ("u", "m")]
     np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
 
@@ -183,8 +182,8 @@ def test_refuses_what_shares_no_axes(pair, tmp_path):
 
 
 def test_laws_keep_their_colours_and_traces_never_share_one(pair):
-    assert style.colours(pair) == [style.law_colour(law) for law in LAWS]
-    assert len(set(style.colours(pair * 4))) == 8
+    assert style.law_colours([trace.scenario.law for trace in pair]) == [style.law_colour(law) for law in LAWS]
+    assert len(set(style.law_colours([trace.scenario.law for trace in pair * 4]))) == 8
     assert style.law_colour("my_own") == style.law_colour("my_own") in style.OTHERS
 
 

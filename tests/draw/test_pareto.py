@@ -13,7 +13,7 @@ from smc_mujoco.analysis.tuning.objective import FAILED, Objective
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.draw import figure
-from smc_mujoco.draw.pareto import REST, pareto
+from smc_mujoco.draw.pareto import MIN_VARIATION, pareto
 
 LEAN = Objective(conditions=("nominal",), duration=0.5)
 
@@ -62,7 +62,7 @@ def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_ar
         corners = [(float(x), float(y)) for x, y in zip(*stair.get_data(), strict=True)]
         for one in tuned.finals:
             reached = [y for x, y in corners if x <= one.tracking]  # the stair's height above what was tried
-            assert one.failed or min(reached) <= max(one.variation, REST)
+            assert one.failed or min(reached) <= max(one.variation, MIN_VARIATION)
         (place,) = zip(*ring.get_data(), strict=True)
         assert place in corners
         assert place[0] + 1e-3 * place[1] == pytest.approx(tuned.objective)
@@ -77,7 +77,7 @@ def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_dr
     both = [dataclasses.replace(first, finals=tuple(failed)), dataclasses.replace(pair[1], finals=tuple(resting))]
     svg, _ = pareto(both, tmp_path / "fronts")
     assert "Observer-free: every run failed" in svg.read_text()
-    assert page[0].axes[0].lines[0].get_ydata()[0] == REST
+    assert page[0].axes[0].lines[0].get_ydata()[0] == MIN_VARIATION
 
 
 def test_unfair_comparisons_and_no_tunings_are_refused(pair, tmp_path):

@@ -182,7 +182,7 @@ def test_there_is_a_slider_for_each_gain_a_decade_either_side(shown):
 
 @pytest.mark.parametrize(("gain", "ends"), [(2.0, [0.2, 20.0]), (-2.0, [-20.0, -0.2]), (0.0, [0.0, 1.0])])
 def test_a_slider_keeps_the_sign_of_its_gain(gain, ends):
-    assert live.reach(gain) == pytest.approx(ends)
+    assert live.slider_range(gain) == pytest.approx(ends)
 
 
 def test_a_law_without_gains_has_no_sliders(shown):
@@ -231,7 +231,7 @@ def test_a_law_of_ones_own_is_printed_by_its_name():
     def mine(y, gains, memory):
         return -gains.k * y.e, y.e
 
-    assert live.called(mine()) == "mine(k=3)"
+    assert live.as_code(mine()) == "mine(k=3)"
 
 
 # the mouse, reset, failures
@@ -285,7 +285,7 @@ def test_a_law_that_fails_is_told_and_paused_and_space_begins_anew(shown, said):
 def test_a_slow_machine_is_told_of_and_never_simulates_much_in_a_frame(shown):
     view, viewer = shown()
     view.frame(viewer, 10.0)
-    assert view.step <= round(live.MOST / DUFFING.physics_step) + 1
+    assert view.step <= round(live.MAX_FRAME / DUFFING.physics_step) + 1
     assert "slower than real time" in viewer.texts[-1]
 
 

@@ -1,8 +1,8 @@
-"""Arrows in the scene: what the control, the disturbance, and friction and contact do to each moving body.
+"""Arrows in the scene: control, disturbance, and friction with contact, at each driven joint.
 
-The arrow is the mean over the time of a frame; a bar behind the control's is its range, so that a control which
-switches faster than the film still shows how far it swings. Arrows lie along a pendulum's arc, beyond the bob, and
-along the rail, above the cart, and before it where it carries something. Driven joints alone have arrows.
+An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
+swings that switches faster than the film. Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above
+the cart, or before it if it carries something.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,15 +18,15 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HINGE, SLIDE = 0.425, 0.08  # length of the longest: of the pendulum's, of the rail's
-RAIL = 0.035  # m, thickness of the rail's
-OWN, THIN = 0.25, 0.012  # length and thickness of those along an own model's slides, of its extent
-CHAIN = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
-LEAST = 0.05  # of the longest: shorter ones are not drawn
-SLENDER = 0.2  # thickest shaft of a short one, of its length
-LEVER = 1e-6  # m: a body centred on its hinge has no arc to lay an arrow along
-DRAWN = 0.5  # of the length that it is given, MuJoCo draws an arrow (not a capsule): measured, 3.17.0
-BAR = 0.1  # of the longest: the least range that gets a bar
+HINGE, SLIDE = 0.425, 0.08  # length of the longest arrow: of the pendulum's, of the rail's
+THICKNESS = 0.035  # m, at a slide
+OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent
+NETWORK = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
+MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
+SLENDER = 0.2  # thickest shaft of a short arrow, of its length
+MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
+DRAWN = 0.5  # MuJoCo draws an arrow, but not a capsule, in this part of the length between its points: measured, 3.17.0
+MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
 class Arrow(NamedTuple):
@@ -35,19 +35,19 @@ class Arrow(NamedTuple):
     low: float
     high: float
     rgba: tuple[float, ...]  # red, green, blue, opacity, 0 .. 1
-    layer: int = 0  # further from the body
+    layer: int = 0  # distance from the body, in arrows
     size: float = 1.0
     head: bool = True
 
 
-class Grip(NamedTuple):
-    """Where and how large arrows are drawn at a joint.
+class Mount(NamedTuple):
+    """Place and size of the arrows at a joint.
 
     Attributes:
       joint: of the film's scene.
-      unit: at a slide the length of the longest, m; at a hinge how much longer than HINGE of the pendulum it is.
-      thick: their thickness at a slide, m.
-      front: the direction to the camera, (3,), where they lie before what slides: it carries what would hide them.
+      unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE of the pendulum's.
+      thick: thickness at a slide, m.
+      front: direction to the camera, (3,), of arrows before a slide that carries something; None for those above it.
     """
 
     joint: int
@@ -56,36 +56,36 @@ class Grip(NamedTuple):
     front: np.ndarray | None
 
 
-def grips(
+def mounts(
     scenario: Scenario, joints: Sequence[int], slides: Sequence[bool], rail: float, front: np.ndarray
-) -> list[Grip]:
-    """A Grip for each joint of a machine on a `rail`, m, inf without one; under a camera in front of it."""
+) -> list[Mount]:
+    """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
     plant = scenario.plant
     extent = float(assembly.model([scenario]).stat.extent) if plant.direct else 0.0
-    length, thick = (OWN * extent, THIN * extent) if plant.direct else (SLIDE * rail, RAIL)
-    turning = CHAIN if plant.n > 1 and not plant.direct else 1.0
+    length, thick = (OWN_LENGTH * extent, OWN_THICKNESS * extent) if plant.direct else (SLIDE * rail, THICKNESS)
+    turning = NETWORK if plant.n > 1 and not plant.direct else 1.0
     before = front if plant.direct or plant.free else None
-    return [Grip(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
+    return [Mount(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
 
 
-class Acts(NamedTuple):
-    """What acts on one machine, frame by frame: as it is commanded, as the world does, and as what it touches does."""
+class Loads(NamedTuple):
+    """Forces and torques on a machine, frame by frame."""
 
     control: Envelope
     disturbance: Envelope
     reaction: Envelope
 
 
-def acts(trace: Trace, times: np.ndarray, gap: float) -> Acts:
-    """Ranges and means over the `gap` seconds before each time."""
+def loads(trace: Trace, times: np.ndarray, gap: float) -> Loads:
+    """Return ranges and means over the `gap` seconds before each time."""
     edges = np.concatenate([[times[0] - gap], times])
-    return Acts(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction)))
+    return Loads(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction)))
 
 
-class Longest(NamedTuple):
-    """What the longest arrows stand for, N or N m: the largest control and disturbance of the runs that lasted.
+class Scale(NamedTuple):
+    """Values of the longest arrows, N or N m: the largest of the runs that lasted.
 
-    A blow is far larger than what drives the machine: the reaction's arrow is as long for all that exceeds the control.
+    Blows are far larger than what drives the machine, so the reaction's longest arrow is at most the control's.
     """
 
     control: float
@@ -94,64 +94,62 @@ class Longest(NamedTuple):
     blows: bool = False  # whether a reaction is larger than its longest arrow
 
 
-def longest(traces: Sequence[Trace]) -> dict[Group, Longest]:
-    """The scale of the arrows of these traces, for each group of driven channels."""
-    return {group: _longest(parts) for group, parts in style.split(traces).items() if group.driven}
+def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
+    """Return the scale of the arrows for each group of driven channels."""
+    found = {}
+    for group, parts in style.split(traces).items():
+        control, disturbance, reaction = (max(map(abs, panels.span(parts, y))) for y in ("applied", "d", "reaction"))
+        longest = min(reaction, control) if control else reaction
+        if group.driven:
+            found[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest)
+    return found
 
 
-def _longest(traces: Sequence[Trace]) -> Longest:
-    control, disturbance, reaction = (max(map(abs, panels.span(traces, y))) for y in ("applied", "d", "reaction"))
-    shown = min(reaction, control) if control else reaction
-    return Longest(control, disturbance, shown, reaction > 1.01 * shown)
-
-
-def scales(trace: Trace, longest: Mapping[Group, Longest]) -> list[Longest]:
-    """The scale of the arrows of each of a trace's driven channels."""
+def by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
+    """Return the scale of the arrows of each of a trace's driven channels."""
     driven = [group for group in groups(trace.scenario.plant) if group.driven]
-    found = {i: each for group, each in zip(driven, longest.values(), strict=True) for i in group.channels}
-    return [found[i] for i in sorted(found)]
+    of_channel = {i: scale for group, scale in zip(driven, scales.values(), strict=True) for i in group.channels}
+    return [of_channel[i] for i in sorted(of_channel)]
 
 
-def arrows(acts: Acts, frame: int, channel: int, scale: Longest, colour: str) -> list[Arrow]:
-    """The arrows of one channel in one frame."""
-    law, grey, violet = (
-        tuple(c / 255 for c in style.rgb(name)) for name in (colour, style.DISTURBANCE, style.REACTION)
-    )
+def arrows(loads: Loads, frame: int, channel: int, scale: Scale, colour: str) -> list[Arrow]:
+    """Return the arrows of one channel in one frame."""
+    law, grey, violet = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION))
     drawn = []
     if scale.control:
-        low, mean, high = (float(part[frame, channel]) / scale.control for part in acts.control[1:])
+        low, mean, high = (float(part[frame, channel]) / scale.control for part in loads.control[1:])
         drawn.append(Arrow(0.0, mean, (*law, 1.0)))
-        if high - low > BAR:
+        if high - low > MIN_BAR:
             drawn.append(Arrow(low, high, (*law, 0.4), head=False))
     if scale.disturbance:
-        mean = float(acts.disturbance.mean[frame, channel]) / scale.disturbance
+        mean = float(loads.disturbance.mean[frame, channel]) / scale.disturbance
         drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=1, size=0.65))
     if scale.reaction:
-        mean = float(acts.reaction.mean[frame, channel]) / scale.reaction
+        mean = float(loads.reaction.mean[frame, channel]) / scale.reaction
         drawn.append(Arrow(0.0, mean, (*violet, 1.0), layer=2 if scale.disturbance else 1, size=0.8))
-    return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > LEAST]
+    return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 
-def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, grip: Grip, arrow: Arrow) -> None:
-    """Add an arrow to a scene that holds the machines already."""
-    if scene.ngeom >= scene.maxgeom:
-        return
-    body = handle(model, model.jnt_bodyid[grip.joint])
-    if body < 0:
+def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow) -> None:
+    """Add an arrow to a scene that already has the machines."""
+    body = handle(model, model.jnt_bodyid[mount.joint])
+    if body < 0 or scene.ngeom >= scene.maxgeom:
         return
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
-    if model.jnt_type[grip.joint] == mujoco.mjtJoint.mjJNT_HINGE:
-        arm = place - data.xanchor[grip.joint]
+    if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
+        arm = place - data.xanchor[mount.joint]
         length = np.linalg.norm(arm)
-        if length < LEVER:
+        if length < MIN_LEVER:
             return
-        reach, width, out = grip.unit * HINGE * length, 0.16 * radius + 0.012 * grip.unit, arm / length
-        along, start = np.cross(data.xaxis[grip.joint], out), radius + 1.6 * width
+        reach, width, out = mount.unit * HINGE * length, 0.16 * radius + 0.012 * mount.unit, arm / length
+        along, start = np.cross(data.xaxis[mount.joint], out), radius + 1.6 * width
     else:
-        reach, width, along, out = grip.unit, grip.thick, data.xaxis[grip.joint], np.array([0.0, 0.0, 1.0])
-        if grip.front is not None:
-            out = aside(along, grip.front)
-            place = place + (half(model, data, body, grip.front) + width) * grip.front
+        reach, width, along, out = mount.unit, mount.thick, data.xaxis[mount.joint], np.array([0.0, 0.0, 1.0])
+        if mount.front is not None:
+            across = np.cross(mount.front, along)
+            if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
+                out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
+            place = place + (half(model, data, body, mount.front) + width) * mount.front
         start = half(model, data, body, out) + 2.2 * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
@@ -165,22 +163,14 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, gri
     scene.ngeom += 1
 
 
-def aside(along: np.ndarray, front: np.ndarray) -> np.ndarray:
-    """The direction across a slide in the picture, (3,): up, where it can be."""
-    across = np.cross(front, along)
-    if np.linalg.norm(across) < 0.1:  # it slides to the camera
-        return np.array([0.0, 0.0, 1.0])
-    return across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-
-
 def half(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
-    """How far a geom's box reaches from its middle in a direction, m."""
+    """Return how far a geom's box reaches from its middle in a direction, m."""
     turned = direction @ data.geom_xmat[geom].reshape(3, 3)
     return float(model.geom_aabb[geom, :3] @ turned + model.geom_aabb[geom, 3:] @ np.abs(turned))
 
 
 def handle(model: mujoco.MjModel, body: int) -> int:
-    """The geom of a moving body that carries its arrows: the first in the accent's material, the first, or -1."""
+    """Return the geom of a body that carries its arrows: the first in the accent's material, else the first, or -1."""
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
     named = (g for g in geoms if model.geom_matid[g] >= 0)
     first = geoms[0] if geoms else -1

@@ -1,6 +1,6 @@
-"""Where a camera must stand to see given points, and where in its picture they are. Plain geometry.
+"""Geometry of a camera: the place from which it sees given points, and where they are in its picture.
 
-A turn is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
+A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
 """
 
 from typing import NamedTuple
@@ -20,7 +20,7 @@ class Room(NamedTuple):
 
 
 def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
-    """The nearest place, (3,) m, from which points (m, 3) are all seen within the room of a picture of `size` px.
+    """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a picture of `size` px.
 
     With p and z a point's place across and along the view, a camera at c across and at distance D sees it between
     the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's
@@ -37,11 +37,11 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
 
 
 def project(points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Points (m, 3) in the picture of a camera at `place`, (m, 2) px from the top left."""
+    """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top left."""
     seen = (points - place) @ turn
     return np.array(size) / 2 + seen[:, :2] / -seen[:, 2:] / _pixel(size) * (1, -1)
 
 
 def _pixel(size: tuple[int, int]) -> float:
-    """Tangent of one px at the picture's middle."""
+    """Return the tangent of one px at the picture's middle."""
     return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))

@@ -1,8 +1,7 @@
 """Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
 
-stage.py has the scene, arrows.py what acts on it, state.py what holds or hits it, caption.py the words, charts.py the
-charts. Pictures are made and
-written one by one: a film's length costs time but no memory.
+scene.py composes the model, stage.py poses and renders it, arrows.py shows forces, caption.py has the text, charts.py
+the charts. Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
@@ -26,12 +25,12 @@ from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
 FPS = 30.0
-MOST = 8  # machines: more are too small to tell apart
-LEAST, LARGEST = (320, 180), (1920, 1080)  # px
-FULL = 1280  # px, the width for which sizes of letters are stated
-CHARTS = 0.36  # of the height
-SEEN = 1e-3  # rad, m, or of the longest arrow: less than half a pixel, and not worth a new picture
-REST = 1200  # ms for which a clip's last picture stays before it starts again
+MAX_MACHINES = 8  # more are too small to tell apart
+MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
+FULL_WIDTH = 1280  # px, for which sizes of letters are stated
+CHARTS = 0.36  # height of the charts, of the film's
+VISIBLE = 1e-3  # rad, m, or of the longest arrow: smaller motion is less than half a pixel, and not rendered
+PAUSE = 1200  # ms for which a clip's last picture stays before it repeats
 CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
 Report = Callable[[int], None]
 
@@ -49,13 +48,13 @@ def film(
 
     Args:
       traces: several, or a single one.
-      labels: one a trace; default: the laws' names.
+      labels: one a trace; default: the laws' labels.
       title: default: the plant's name.
       size: width and height in px, even.
       report: called with the number of frames written since its last call.
 
     Raises:
-      ScenarioError: nothing to show, a size that cannot be, or no OpenGL to render with.
+      ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
     """
     path = Path(path)
     if path.suffix != ".mp4":
@@ -74,15 +73,15 @@ def film(
 
 
 def missing() -> str | None:
-    """None when a film can be written, else one sentence that says why not and what to do."""
+    """Return None if a film can be written, else one sentence that says why not and what to do."""
     return gl.missing() or extras.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
 
 
 @contextlib.contextmanager
 def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[np.ndarray], None]]:
-    """A function that adds a picture (height, width, 3) to the film at `path`.
+    """Yield a function that adds a picture (height, width, 3) to the film at `path`.
 
-    Ctrl-C comes out as KeyboardInterrupt: the terminal sends it to ffmpeg too, which must not end first.
+    Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end first.
 
     Raises:
       MissingPackageError: there is no ffmpeg.
@@ -96,19 +95,19 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable
     options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
     writer = mediapy.VideoWriter(path, shape, **options, ffmpeg_args="-movflags +faststart")
     try:
-        with deaf():
+        with sigint_blocked():
             writer.__enter__()
         with contextlib.closing(writer):
             yield writer.add_image
     except (OSError, RuntimeError) as error:
-        if isinstance(error.__context__, KeyboardInterrupt):  # what ffmpeg says of half a picture
+        if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
             raise KeyboardInterrupt from None
         raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
 
 
 @contextlib.contextmanager
-def deaf() -> Iterator[None]:
-    """Blocks SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
+def sigint_blocked() -> Iterator[None]:
+    """Block SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
@@ -129,7 +128,7 @@ def clip(
     fps: float = 20.0,
     report: Report = lambda frames: None,
 ) -> Path:
-    """Write an animated .webp of the time `span`, s: small, and shown as an image by web pages. Else as `film`."""
+    """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
     path = Path(path)
     if path.suffix != ".webp":
         raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
@@ -143,7 +142,7 @@ def clip(
     for picture in frames(traces, times, labels, title, size):
         pictures.append(Image.fromarray(picture))
         report(1)
-    ends = [round(1000 / fps)] * (len(times) - 1) + [REST]
+    ends = [round(1000 / fps)] * (len(times) - 1) + [PAUSE]
     with replacing(path) as part:
         pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
     return path
@@ -157,7 +156,7 @@ def still(
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
 ) -> Path:
-    """Write the frame at `time` in s as a .png. Else as `film`."""
+    """Write the frame at `time` in s as a .png. Other arguments: as `film`."""
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
@@ -168,7 +167,7 @@ def still(
 
 
 def clock(traces: Trace | Sequence[Trace], fps: float) -> np.ndarray:
-    """The times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
+    """Return the times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
     traces = style.same_plant(traces)
     fps = number("fps", fps)
     if not 1.0 <= fps <= 120.0:
@@ -183,55 +182,55 @@ def frames(
     title: str | None,
     size: tuple[int, int],
 ) -> Generator[np.ndarray]:
-    """The film's pictures at the given times, each (height, width, 3) uint8."""
+    """Yield the film's pictures at the given times, each (height, width, 3) uint8."""
     traces = style.same_plant(traces)
-    names, colours = style.labels(traces, labels), style.colours(traces)
-    if len(traces) > MOST:
-        raise ScenarioError(f"{len(traces)} machines in one film: show at most {MOST}")
-    if any(side % 2 or not low <= side <= high for side, low, high in zip(size, LEAST, LARGEST, strict=True)):
-        raise ScenarioError(f"a film of {size} px: give two even numbers from {LEAST} to {LARGEST}")
+    names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
+    if len(traces) > MAX_MACHINES:
+        raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
+    if any(side % 2 or not low <= side <= high for side, low, high in zip(size, MIN_SIZE, MAX_SIZE, strict=True)):
+        raise ScenarioError(f"a film of {size} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}")
     if why := gl.missing():
         raise ScenarioError(why)
-    scale = (size[0] / FULL) ** 0.6  # letters shrink less than pictures
+    scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
     below = 2 * round(CHARTS * size[1] / 2)
     above = size[0], size[1] - below
     gap = times[1] - times[0] if len(times) > 1 else 1 / 30
     traces = [finite(trace) for trace in traces]
-    longest = arrows.longest(traces)
-    scales = [arrows.scales(trace, longest) for trace in traces]
-    acts = [arrows.acts(trace, times, gap) for trace in traces]
-    told = [states.told(trace, times, max(states.HOLD, gap)) for trace in traces]
-    caption = Caption(traces, names, colours, title, above, scale, longest, told)
+    scales = arrows.scales(traces)
+    by_channel = [arrows.by_channel(trace, scales) for trace in traces]
+    loads = [arrows.loads(trace, times, gap) for trace in traces]
+    timelines = [states.timeline(trace, times, max(states.HOLD, gap)) for trace in traces]
+    caption = Caption(traces, names, colours, title, above, scale, scales, timelines)
     charts = Charts(traces, names, colours, (size[0], below), scale)
     with Stage(traces, colours, above, caption.room) as stage:
-        caption.put(stage.boxes)
+        caption.place(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, times, gap)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        shown, picture = np.empty(0), np.empty(0)
+        rendered, picture = np.empty(0), np.empty(0)
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
             for k, colour in enumerate(colours):
-                stage.dress(k, time)
+                stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame])
-                stage.paint(k, style.FAILED if failed[k] else colour)
-                for i, most in enumerate([] if failed[k] else scales[k][: stage.shown[k]]):
-                    drawn += [(k, i, arrow) for arrow in arrows.arrows(acts[k], frame, i, most, colour)]
+                stage.set_colour(k, style.FAILED if failed[k] else colour)
+                for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):
+                    drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
             ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
             moved = [part[frame] for part in (*places, *ahead)]
-            now = np.concatenate([*moved, failed, stage.dressed, ends])
-            if len(now) != len(shown) or np.abs(now - shown).max() > SEEN:
-                shown, picture = now, stage.render(drawn)
-            words = tuple(each[frame] for each in told)
+            now = np.concatenate([*moved, failed, stage.shape, ends])
+            if len(now) != len(rendered) or np.abs(now - rendered).max() > VISIBLE:
+                rendered, picture = now, stage.render(drawn)
+            words = tuple(each[frame] for each in timelines)
             yield np.concatenate([caption.over(picture, time, failed, words), charts.at(time)])
 
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
-    """x at the times, (times, n), between samples on a straight line; after a failure the last finite one."""
+    """Return x at the times, (times, n), linear between samples; after a failure the last finite one."""
     return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)
 
 
 def rotors(trace: Trace, times: np.ndarray, gap: float) -> np.ndarray:
-    """How far the rotors are ahead of their joints, (times, n): on the flank that pushes, on the mean over a frame."""
+    """Return the lead of the rotors over their joints, (times, n): on the flank that pushes, in the mean of a frame."""
     edges = np.concatenate([[times[0] - gap], times])
-    return 0.5 * states.play(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean
+    return 0.5 * states.backlash_gap(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean

@@ -66,7 +66,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda frames: No
             path, SIZE, fps=FPS, codec="libvpx-vp9", output_params=VP9, macro_block_size=2, ffmpeg_log_level="error"
         )
         try:
-            with video.deaf():
+            with video.sigint_blocked():
                 writer.send(None)
             for k, picture in enumerate(video.frames(traces, times, None, title, SIZE)):
                 if k == min(round(POSTER * FPS), len(times) - 1):

@@ -15,8 +15,8 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, film, stage
-from smc_mujoco.draw.film.arrows import Arrow, Longest, acts, arrows, longest
+from smc_mujoco.draw.film import camera, film, scene
+from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
@@ -108,8 +108,8 @@ def test_a_large_control_draws_an_arrow():
 def test_arrows_are_to_scale_and_a_bar_shows_switching():
     (trace,) = runs("van_der_pol", "sine", LAWS[:1])
     u = np.where(np.arange(301) % 2, 6.0, -3.0)[:, None]
-    acting = acts(dataclasses.replace(trace, applied=u), np.array([0.1, 0.2]), gap=0.1)
-    arrow, bar, push = arrows(acting, 1, 0, Longest(6.0, 0.2), "#0072B2")
+    acting = loads(dataclasses.replace(trace, applied=u), np.array([0.1, 0.2]), gap=0.1)
+    arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
     assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
@@ -173,7 +173,7 @@ def test_a_jump_changes_the_machine_and_is_told():
     with Stage([trace], ["#0072B2"], (480, 170), room) as stage:
         lengths = []
         for time in (0.1, 0.3, 0.1):
-            stage.dress(0, time)
+            stage.set_shape(0, time)
             lengths.append(float(stage.model.geom("m0/bob").pos[2]))
     assert lengths == pytest.approx([0.5, 0.75, 0.5])
     before, after = pictures([trace], [0.1, 0.3])
@@ -185,8 +185,8 @@ def test_a_jump_changes_the_machine_and_is_told():
 def test_long_words_stay_in_the_picture(plant):
     bad = [broken(trace, 150) for trace in runs(plant)]
     names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
-    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, {driven(bad): Longest(6.0, 0.2)})
-    caption.put(np.array([[300.0 * k, 80.0 * k, 300.0 * k + 290, 80.0 * k + 200] for k in range(4)]))
+    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, {driven(bad): Scale(6.0, 0.2)})
+    caption.place(np.array([[300.0 * k, 80.0 * k, 300.0 * k + 290, 80.0 * k + 200] for k in range(4)]))
     assert (caption.pills[:, :2] >= 0).all()
     assert (caption.pills[:, 2:] <= size).all()
     assert (caption.pills[:, 2] - caption.pills[:, 0] >= [caption.width(text) for text in caption.texts()]).all()
@@ -295,7 +295,7 @@ def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> sm
 
 def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
     """What a film tells of a trace, and for how many frames."""
-    told = states.told(trace, film.clock([trace], fps))
+    told = states.timeline(trace, film.clock([trace], fps))
     return [(now.words if now else None, len(list(run))) for now, run in itertools.groupby(told)]
 
 
@@ -313,7 +313,7 @@ def stuck() -> smc.Trace:
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
     scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
-    model = stage.compose([scenario] * 2, SIZE)
+    model = scene.compose([scenario] * 2, SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = [geom.name for geom in assembly.spec([scenario]).geoms if geom.name not in ("", "floor")]
     assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
@@ -323,9 +323,9 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_machines_side_by_side_keep_apart(plant, field, name):
     scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
-    corners = stage.still(assembly.model([scenario]))[..., :2]
+    corners = scene.fixed_boxes(assembly.model([scenario]))[..., :2]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    step = stage.lane([scenario] * 3)[:2]
+    step = scene.lane([scenario] * 3)[:2]
     for by in (step, 2 * step):
         apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(axis=2)
         assert apart.min() >= 0.0
@@ -333,10 +333,10 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
 
 def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
     (trace,) = runs(laws=LAWS[:1])
-    assert np.linalg.norm(stage.lane([trace.scenario])) == pytest.approx(np.linalg.norm(trace.scenario.plant.lane))
+    assert np.linalg.norm(scene.lane([trace.scenario])) == pytest.approx(np.linalg.norm(trace.scenario.plant.lane))
     assert moods(trace) == [(None, 10)]
-    assert longest([trace])[driven([trace])].reaction == 0.0
-    assert not any("violet" in words for words in key([trace], longest([trace])))
+    assert scales([trace])[driven([trace])].reaction == 0.0
+    assert not any("violet" in words for words in key([trace], scales([trace])))
 
 
 def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
@@ -349,8 +349,8 @@ def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
 def test_a_cart_rests_beside_the_speed_of_carts_and_not_of_its_pole():
     trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=0.0, duration=0.01))
     fast = dataclasses.replace(trace, v=np.column_stack([np.full(11, 0.05), np.linspace(100.0, 0.0, 11)]))
-    assert not states.resting(fast)[:, 0].any()
-    assert states.resting(fast)[:, 1].tolist() == [False] * 10 + [True]
+    assert not states.at_rest(fast)[:, 0].any()
+    assert states.at_rest(fast)[:, 1].tolist() == [False] * 10 + [True]
 
 
 def test_only_dry_friction_sticks():
@@ -361,18 +361,18 @@ def test_only_dry_friction_sticks():
 
 
 def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
-    touching = hit.t[states.touching(hit)[:, 0]]
+    touching = hit.t[states.in_contact(hit)[:, 0]]
     assert 0.0 < np.ptp(touching) < 0.05
     (before, _), (blow, frames), (after, _) = moods(hit)
     assert (before, blow, after) == (None, "contact", None)
     assert frames / 30 >= states.HOLD
-    words = [now.words if now else None for now in states.told(hit, film.clock([hit], 30.0))]
+    words = [now.words if now else None for now in states.timeline(hit, film.clock([hit], 30.0))]
     assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
 
 
 def test_touch_is_where_the_stop_pushes_and_there_only(hit):
     pushed = np.abs(hit.reaction[:, 0]) > 1e-6
-    touch = states.touching(hit)[:, 0]
+    touch = states.in_contact(hit)[:, 0]
     assert touch.any()
     # the reaction is that of the step before, and a dashpot lets go before the buffers part
     assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
@@ -382,14 +382,14 @@ def test_flanks_are_told_by_where_they_push():
     slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.15), duration=1.0)
     names = {-1: "left flank", 1: "right flank", 0: "in play"}
     flank = np.sign(slack.reaction[:, 0]).astype(int)
-    told = states.told(slack, slack.t)
+    told = states.timeline(slack, slack.t)
     for now, k in zip(told, range(len(slack.t)), strict=True):
         near = slice(max(k - 300, 0), k + 300)
         assert now is not None
         assert now.words == "rattles" or now.words in {names[f] for f in flank[near].tolist()}
     rattling = np.where(np.arange(1001) // 20 % 2, 1.0, -1.0)
-    assert (states.lying(rattling, slack.t, states.HOLD)[200:] == 2).all()
-    assert (states.lying(np.ones(1001), slack.t, states.HOLD) == 1).all()
+    assert (states.backlash_side(rattling, slack.t, states.HOLD)[200:] == 2).all()
+    assert (states.backlash_side(np.ones(1001), slack.t, states.HOLD) == 1).all()
 
 
 def test_what_is_held_lasts_and_has_no_short_gaps():
@@ -403,9 +403,9 @@ def test_what_is_held_lasts_and_has_no_short_gaps():
 
 def test_words_never_flicker():
     rng, times = np.random.default_rng(0), np.arange(300) / 30
-    names = [states.State("a", states.CALM), states.State("b", states.HELD), states.State("hit", states.STRUCK)]
+    names = [states.State("a", states.CALM), states.State("b", states.STUCK), states.State("hit", states.STRUCK)]
     found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
-    shown = states.steady(found, times, states.HOLD)
+    shown = states.debounced(found, times, states.HOLD)
     runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
     assert all(frames >= 5 or now == names[2] for now, frames in runs[1:-1])
     assert all(after == now for after, now in zip(shown, found, strict=True) if now == names[2])
@@ -416,14 +416,14 @@ def test_several_channels_are_told_in_one():
     assert states.stick_words(np.array([True, True, False])) == "2 of 3 stick"
     assert states.stick_words(np.ones(3, bool)) == "sticks"
     assert states.stick_words(np.zeros(3, bool)) == "slides"
-    assert states.play_words([0, 0, 1]) == "2 of 3 in play"
-    assert states.play_words([-1, -1]) == "left flank"
+    assert states.backlash_words([0, 0, 1]) == "2 of 3 in play"
+    assert states.backlash_words([-1, -1]) == "left flank"
 
 
 def test_a_failed_machine_has_no_state(stuck):
-    told = states.told(broken(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
+    told = states.timeline(broken(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
     assert [now is None for now in told] == [False, False, True, True]
-    assert states.told(film.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
+    assert states.timeline(film.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
 
 
 @renders
@@ -472,25 +472,25 @@ def test_friction_draws_an_arrow_of_its_own_and_the_key_says_so(stuck):
     bare = dataclasses.replace(stuck, reaction=np.zeros_like(stuck.reaction))
     (rubbed,), (smooth,) = pictures([stuck], [0.5]), pictures([bare], [0.5])
     assert share(rubbed, style.REACTION) > share(smooth, style.REACTION) + 3e-4
-    assert "violet arrow: friction, longest 0.5 N" in key([stuck], longest([stuck]))
+    assert "violet arrow: friction, longest 0.5 N" in key([stuck], scales([stuck]))
 
 
 def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
-    scales = longest([hit])
-    scale = scales[driven([hit])]
+    found = scales([hit])
+    scale = found[driven([hit])]
     assert scale.reaction == scale.control < np.abs(hit.reaction).max()
-    assert f"violet arrow: contact, longest {scale.control:.2g} N or more" in key([hit], scales)
+    assert f"violet arrow: contact, longest {scale.control:.2g} N or more" in key([hit], found)
 
 
 @renders
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
 def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
     traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
-    told = [states.told(trace, film.clock(traces, 30.0)) for trace in traces]
+    told = [states.timeline(trace, film.clock(traces, 30.0)) for trace in traces]
     names = style.labels(traces, None)
-    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, longest(traces), told)
+    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told)
     with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:
-        caption.put(shown.boxes)
+        caption.place(shown.boxes)
     boxes = np.concatenate([caption.pills, caption.badges])
     assert (boxes[:, :2] >= 0).all()
     assert (boxes[:, 2:] <= (1280, 460)).all()

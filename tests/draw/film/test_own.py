@@ -10,7 +10,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera
-from smc_mujoco.draw.film.arrows import Arrow, longest
+from smc_mujoco.draw.film.arrows import Arrow, scales
 from smc_mujoco.draw.film.caption import key
 from smc_mujoco.draw.film.stage import Stage
 
@@ -55,14 +55,14 @@ def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture
         ]
         assert len(fixed) == 2
         assert right - left > 500  # the rail's 4 m fill the room, not the cart's 0.4 m
-        assert scene.grips[0][0].unit == pytest.approx(0.25 * plant.load().stat.extent)
+        assert scene.mounts[0][0].unit == pytest.approx(0.25 * plant.load().stat.extent)
 
 
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0)))
     assert trace.reaction.any()  # the joint's limit
-    words = [word for word in key([trace], longest([trace])) if "violet" in word]
+    words = [word for word in key([trace], scales([trace])) if "violet" in word]
     assert len(words) == 1
     assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
 
