@@ -23,7 +23,6 @@ import smc_mujoco as smc
 from smc_mujoco.simulation.batch import Chunk
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.paper import scenarios as paper
@@ -50,9 +49,10 @@ def bare(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     spent = 0.0
     for batch in executors.batches(scenarios, threads):
         with installed():
-            chunk = Chunk([prepare(scenario) for scenario in batch], threads)
+            chunk = Chunk(batch, threads)
         start = time.perf_counter()
-        chunk.batch.step(nstep=batch[0].samples * batch[0].steps)
+        scenario = batch[0].scenario
+        chunk.batch.step(nstep=scenario.samples * scenario.steps)
         spent += time.perf_counter() - start
     return spent
 

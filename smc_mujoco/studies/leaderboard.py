@@ -4,11 +4,11 @@
     boards[0].winner                                   # a law's name, or None inside the noise
     rich.print(tables.leaderboard(boards))             # of `cli.tables`
 
-What intervals, ranks and winners mean: `statistics`, `ranking`. A board is one metric in one group of runs; laws are
-compared in each of its blocks, a plant in a condition, and the correction for many comparisons is over all pairs of
-laws in all blocks of the board. Over several blocks a board tells what holds in each of them: its winner wins in every
-one. The conclusions hold for the plants and conditions of the table, over starts and noise; `Board.friedman` says how
-they would carry over to other conditions.
+What intervals, ranks and winners mean: `analysis.bootstrap`, `analysis.ranking`. A board is one metric in one group of
+runs. Laws are compared in each of its blocks, a plant in a condition. The correction for many comparisons is over all
+pairs of laws in all blocks of the board. The winner of a board with several blocks wins in every one. The conclusions
+hold for the plants and conditions of the table, over starts and noise; `Board.friedman` says how they would carry over
+to other conditions.
 """
 
 import dataclasses
@@ -22,7 +22,8 @@ from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_
 from smc_mujoco.analysis.friedman import Friedman, friedman
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank, compare, ranks
-from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.metrics.catalogue import CATALOGUE
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
@@ -44,11 +45,11 @@ class Block:
       plant: its name.
       condition: its name.
       medians: law -> median over the seeds; of "settles" the share of runs that do not.
-      best: the laws that none is better than.
-      seeds: how many every law ran from.
-      runs: how many of these are distinct: in the others every law does what it does in an earlier one.
-      most: how many distinct runs two laws have at most: a seed that changes neither is no sample of the two.
-      fewest: how many two of the best have at least; `most` where there is one.
+      best: the laws that no other law is better than.
+      seeds: number of seeds that every law ran from.
+      runs: number of distinct runs among these: in the others every law does what it does in an earlier one.
+      most: largest number of distinct runs of two laws: a seed that changes neither is no sample of the two.
+      fewest: smallest number of distinct runs of two of the best laws; `most` where one law is best.
     """
 
     plant: str
@@ -79,12 +80,12 @@ class Board:
     Attributes:
       group: what the runs have in common, such as {"plant": "duffing"}.
       metric: a metric's name, or "settles".
-      unit: of the medians, with {x} and {u} as in `measure.Metric.unit`; "" for "settles", which is 0 to 1.
+      unit: of the medians, with {x} and {u} as in `conventions.Metric.unit`; "" for "settles", which is 0 to 1.
       entries: lowest mean rank first. A median over several plants is NaN where its unit depends on the plant.
       blocks: the same laws on each plant in each condition by itself.
-      cells: how many runs each law has here: those that all laws have, and equal ones once.
-      seeds: in how many seeds, equal ones included.
-      pairs: how many comparisons the tests are corrected for: of every two laws, in every block.
+      cells: number of runs of each law: those that all laws have, and equal ones once.
+      seeds: number of seeds, equal runs included.
+      pairs: number of comparisons that the tests are corrected for: of every two laws, in every block.
       level: of intervals and tests.
       friedman: None of one law, or one plant in one condition.
     """
@@ -134,15 +135,13 @@ class Board:
         """In words: the winner, or who wins and loses where, or why there is no winner, or who is undefeated."""
         if self.winner:
             return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
-        told = []
-        for entry in self.entries:
-            if wins := self.wins(entry.law):
-                losses = self.losses(entry.law)
-                told.append(
-                    f"{entry.law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
-                )
-        if told:
-            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(told)}"
+        results = []
+        for law in (entry.law for entry in self.entries):
+            if wins := self.wins(law):
+                losses = self.losses(law)
+                results.append(f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses))
+        if results:
+            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(results)}"
         if self.why:
             return f"no winner: {self.why}"
         fewest = min(block.fewest for block in self.blocks)
@@ -188,19 +187,22 @@ def leaderboard(
 ) -> list[Board]:
     """Compare the laws of a table in each metric within each group.
 
-    Only cells - plant, condition, seed - that every law of the group has are compared; a run that failed is inf in all
-    metrics. Seeds in which both of two laws do what they did in
-    an earlier one are no further samples of the two. A metric that does not apply to a group has no board
-    there.
+    Only cells - plant, condition, seed - that every law of the group has are compared. A run that failed is inf in all
+    metrics. A seed in which two laws both do what they did in an earlier one is no further sample of the two. A metric
+    that does not apply to a group has no board there.
 
     Args:
       metrics: names of metrics, lower being better, or "settles".
-      by: what makes a group, of "plant" and "condition"; () is all runs together.
+      by: what the runs of a group share, of "plant" and "condition"; () is one group of all runs.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
     """
-    units, boards, seed = _units(metrics), [], whole("seed", seed, 0, 2**53 - 1)
+    if isinstance(metrics, str) or not metrics:
+        raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
+    known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
+    units = {name: find("metric", name, known) for name in metrics}
+    boards, seed = [], whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
         ran = cells.scenarios(table, group)
@@ -246,30 +248,17 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
     )
 
 
-def _units(metrics: Sequence[str]) -> dict[str, str]:
-    """Return name -> unit of the metrics asked for."""
-    from smc_mujoco.metrics.catalogue import metrics as catalogue
-
-    known = {SETTLES: ""} | {m.name: m.unit for m in catalogue()}
-    if isinstance(metrics, str) or not metrics:
-        raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
-    for name in metrics:
-        if name not in known:
-            raise unknown("metric", name, known)
-    return {name: known[name] for name in metrics}
-
-
 def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
     """Return the laws' lines; `mixed`: values have several units, so that there is no median."""
-    lines, scores = [], dict(zip(found.laws, found.cells, strict=True))
+    entries = []
     for rank in ranks(found, resamples, seed):
-        by_cell = scores[rank.law]
-        n = by_cell.shape[1]
+        scores = found.cells[found.laws.index(rank.law)]
+        n = scores.shape[1]
         if found.shares:
-            interval = share_interval(float(1 - np.nanmean(by_cell, axis=1).mean()), n, found.level)
+            interval = share_interval(float(1 - np.nanmean(scores, axis=1).mean()), n, found.level)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(by_cell, found.level, resamples, seed)
-        lines.append(Entry(law=rank.law, interval=interval, rank=rank))
-    return tuple(lines)
+            interval = median_of(scores, found.level, resamples, seed)
+        entries.append(Entry(law=rank.law, interval=interval, rank=rank))
+    return tuple(entries)

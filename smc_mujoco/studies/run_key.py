@@ -1,5 +1,6 @@
 """The identity of a run: its key, the name of its condition, and the columns of a table that describe it."""
 
+import contextlib
 import functools
 import hashlib
 import json
@@ -16,7 +17,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.paper import scenarios
 
 OURS = "smc_mujoco."
-# Of a description: what tells no condition from another, for it is of the plant, the law or the run.
+# Fields of a description that are no part of the condition: they belong to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
 UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that change no run
 LONGEST = 60  # characters of a condition's name
@@ -29,23 +30,27 @@ def described(scenario: Scenario) -> dict[str, Any]:
     return data
 
 
-def key(scenario: Scenario) -> str:
+def key(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     """Return a hash of everything that decides a run: its scenario, the code of its parts and of the package, versions.
 
-    32 hex digits.
+    32 hex digits. `data`: what `described` returns, where it is at hand.
     """
-    return _key(scenario, described(scenario))
+    data = data or described(scenario)
+    if scenario.condition in NAMED:  # a name for what the fields say
+        data = data | {"condition": None}
+    text = to_json([data, _codes(scenario), fingerprint.package(*UNRELATED)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def row(scenario: Scenario) -> dict[str, Any]:
     """Return the columns of a table that say what ran."""
     data = described(scenario)
     return {
-        "hash": _key(scenario, data),
+        "hash": key(scenario, data),
         "plant": scenario.plant.name,
         "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)),
-        "condition": _condition(scenario, data),
+        "condition": condition(scenario, data),
         "seed": scenario.seed,
         "duration": scenario.duration,
         "versions": to_json(data["versions"]),
@@ -53,19 +58,21 @@ def row(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def condition(scenario: Scenario) -> str:
+def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     """Return the name of the run's condition: as given, the suite's own, or its differences from the nominal one.
 
-    Plant, law, start, seed and duration are no conditions.
+    Plant, law, start, seed and duration are no part of it. `data`: what `described` returns, where it is at hand.
     """
-    return _condition(scenario, described(scenario))
-
-
-def _key(scenario: Scenario, data: dict[str, Any]) -> str:
-    if scenario.condition in NAMED:  # which the fields tell
-        data = data | {"condition": None}
-    text = to_json([data, _codes(scenario), fingerprint.package(*UNRELATED)], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    if scenario.condition:
+        return scenario.condition
+    known = _conditions(scenario.plant, scenario.duration)
+    if (text := _compared(data or described(scenario))) in known:
+        return known[text]
+    nominal = json.loads(next(iter(known), "{}"))
+    changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
+    differ = [name for name in changed if name not in scenario.left_out]  # not what another field implies
+    name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
+    return name if len(name) <= LONGEST else f"{name[:LONGEST]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
 
 def _codes(s: Scenario) -> list[str]:
@@ -80,37 +87,22 @@ def _codes(s: Scenario) -> list[str]:
     return [fingerprint.of(thing) for thing in (*functions, *signals, *own)]
 
 
-def _condition(scenario: Scenario, data: dict[str, Any]) -> str:
-    if scenario.condition:
-        return scenario.condition
-    known = _conditions(scenario.plant, scenario.duration)
-    if (text := _compared(data)) in known:
-        return known[text]
-    nominal = json.loads(next(iter(known), "{}"))
-    changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
-    differ = [name for name in changed if name not in scenario.left_out]  # what others brought with them
-    name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
-    return name if len(name) <= LONGEST else f"{name[:LONGEST]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
-
-
 def _compared(data: dict[str, Any]) -> str:
     return to_json({name: value for name, value in data.items() if name not in NO_CONDITION})
 
 
 @functools.lru_cache(maxsize=256)
 def _conditions(plant: Plant, duration: float) -> dict[str, str]:
-    """Return what runs of a plant look like in the suite's conditions -> names of these, the nominal one first."""
+    """Return description -> name of the suite's conditions on a plant, the nominal one first."""
     found: dict[str, str] = {}
+    common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
+    common["control_period"] = scenarios.CONTROL_PERIOD
+    if not plant.limits:  # else the bound is that of its motors
+        common["u_max"] = scenarios.U_MAX
     for name in NAMED:
-        try:
-            given = scenarios.fields(name, plant, duration)
-            common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
-            common |= {"control_period": scenarios.CONTROL_PERIOD}
-            if not plant.limits:  # else it is what its motors give, unless somebody says another
-                common |= {"u_max": scenarios.U_MAX}
-            with recorded():  # nor is it to be run: the start that its model has may be outside a joint's range
-                scenario = Scenario(**common | given)
-        except ScenarioError:  # it is not for this plant, or for runs as short as this
-            continue
-        found.setdefault(_compared(described(scenario)), name)
+        # ScenarioError: a condition that is not for this plant, or not for runs as short as this.
+        # `recorded`: the scenario is not to be run, so its start may be outside a joint's range.
+        with contextlib.suppress(ScenarioError), recorded():
+            scenario = Scenario(**common | scenarios.fields(name, plant, duration))
+            found.setdefault(_compared(described(scenario)), name)
     return found

@@ -1,6 +1,5 @@
 """The traces of a study that are saved as files."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,6 @@ from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.table import Table
 
 CHOICES = ("none", "worst", "all")
-
-
-def folder(out: str | os.PathLike) -> Path:
-    """Return the folder of a study's traces."""
-    return Path(out) / "traces"
 
 
 def path(folder: Path, row: Mapping[str, Any]) -> Path:
@@ -35,17 +29,17 @@ def worst(table: Table) -> list[int]:
     """
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
-    lost = table.column("settling_time") == np.inf
-    badness = list(zip(failed, lost & ~failed, np.where(failed, 0.0, ends), strict=True))
+    unsettled = table.column("settling_time") == np.inf
+    badness = list(zip(failed, unsettled & ~failed, np.where(failed, 0.0, ends), strict=True))
     found: dict[tuple, int] = {}
-    for i, place in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
-        if place not in found or badness[i] > badness[found[place]]:
-            found[place] = i
+    for i, cell in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
+        if badness[i] > badness[found.setdefault(cell, i)]:
+            found[cell] = i
     return list(found.values())
 
 
 def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
-    """Save the chosen traces that have no file yet, by running them again.
+    """Run those of the chosen runs again that have no file yet, and save their traces.
 
     Raises:
       ScenarioError: the folder cannot be written.
@@ -53,11 +47,11 @@ def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) 
     chosen = {"none": [], "worst": worst(table), "all": range(len(table))}[choice]
     files = {}
     for i in chosen:
-        row = table.data.slice(int(i), 1).to_pylist()[0]
+        (row,) = table.data.slice(i, 1).to_pylist()
         if not (file := path(folder, row)).exists():
-            files[table.scenario(int(i))] = file
+            files[table.scenario(i)] = file
     with counter(len(files), sum(s.work for s in files), progress) as counts:
         for batch in batches(files, threads):
             for i, trace in stream(batch, threads, counts.stepped):
-                trace.save(files[batch[i]])
+                trace.save(files[batch[i].scenario])
                 counts.finished(1)

@@ -16,13 +16,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
 
-LONGEST = 60  # bytes of a name in a file's name, which most file systems bound at 255
+LONGEST = 60  # bytes of a name in a file's name, which most file systems limit to 255
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ class Scene:
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
       film: the condition that is filmed; by default the first.
       figure: "overview" (x, u, s and phase portrait, a figure a condition) or "signals" (u of all conditions in one).
-      answers: metrics of the driven channels that answer the scene's question, printed on their own after the scores.
+      answers: metrics of the driven channels that answer the scene's question, printed after the scores.
       facts: label -> sentence, printed under the answers: what else was measured.
     """
 
@@ -67,14 +67,12 @@ class Scene:
             if same := [name for file, name in named if made.count(file) > 1]:
                 raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(same)}")
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
-        if self.film not in self.conditions:
-            raise unknown(f"condition to film in scene {self.title!r}", self.film, self.conditions)
-        if self.figure not in ("overview", "signals"):
-            raise unknown("kind of figure", self.figure, ("overview", "signals"))
+        lookup(f"condition to film in scene {self.title!r}", self.film, self.conditions)
+        lookup("kind of figure", self.figure, dict.fromkeys(("overview", "signals")))
         answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
         object.__setattr__(self, "answers", answers)
         for name in answers:
-            lookup(f"metric that answers scene {self.title!r}", name, {m.name: m for m in metrics()})
+            lookup(f"metric that answers scene {self.title!r}", name, CATALOGUE)
         if not isinstance(self.facts, Mapping) or not all(isinstance(text, str) for text in self.facts.values()):
             raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
 
@@ -143,11 +141,11 @@ def _execute(path: Path) -> dict:
 def slug(name: str, longest: int = LONGEST) -> str:
     """Return a name as part of a file name: letters, digits, and _ . + - between them.
 
-    It holds no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
+    It has no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
     """
     words = re.sub(r"\s*=\s*", "-", name.lower())
-    made = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
-    if len(made.encode()) > longest:
-        start = made.encode()[: longest - 9].decode(errors="ignore")
-        made = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
-    return made
+    part = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
+    if len(part.encode()) > longest:
+        start = part.encode()[: longest - 9].decode(errors="ignore")
+        part = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    return part

@@ -5,9 +5,8 @@
     store.add(rows)                        # a part: there whole or not at all
     store.collect(["5f0c...", ...])        # results.parquet, in this order, from whatever parts hold it
 
-A part is a parquet file whose name is the hash of the runs in it. What a crash or another program left in its place -
-cut short, of other columns, scored by other code - is passed over, and its runs count as not done. The bytes of
-results.parquet depend on its rows alone.
+A part is a parquet file, named by a hash of the runs in it. A file that is damaged, or has other columns or scores of
+other code, is passed over, and its runs count as not done. The bytes of results.parquet depend on its rows alone.
 """
 
 import contextlib
@@ -30,8 +29,8 @@ from smc_mujoco.studies import table
 if TYPE_CHECKING:
     import pyarrow as pa
 
-GROUP = 4096  # rows that are in memory at once while the table is written; chosen
-PARTS_HELD = 64  # parts likewise
+GROUP = 4096  # rows in memory at once while the table is written; chosen
+PARTS_HELD = 64  # parts in memory, likewise
 ABANDONED = 3600.0  # s, after which a temporary file is one that a killed study left; chosen
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
@@ -45,7 +44,7 @@ class Store:
         self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, its row there
 
     def open(self, resume: bool) -> None:
-        """Make the folder, and look up the runs that are in it; without `resume` remove them, and the table.
+        """Make the folder and list the runs in it; without `resume` remove them, and the table.
 
         Raises:
           ScenarioError: the folder cannot be made.
@@ -59,12 +58,14 @@ class Store:
         except OSError as error:
             raise ScenarioError(f"cannot use {self.parts}: {error.strerror}; choose another folder") from error
         for path in parts if resume else ():
-            self._enter(path)
+            if (part := self._read(path)) is not None:
+                for i, name in enumerate(part["hash"].to_pylist()):
+                    self.where.setdefault(name, (path, i))
 
     def _tidy(self) -> None:
         """Remove the temporary files of studies that were killed long ago."""
         for path in [*self.parts.glob(".*.parquet"), *self.parts.parent.glob(".results.*.parquet")]:
-            with contextlib.suppress(FileNotFoundError):  # another study's, which has just ended
+            with contextlib.suppress(FileNotFoundError):  # of another study, which has just ended
                 if time.time() - path.stat().st_mtime > ABANDONED:
                     path.unlink()
 
@@ -89,31 +90,25 @@ class Store:
         """
         import pyarrow as pa
 
-        held = functools.lru_cache(maxsize=PARTS_HELD)(self._read)
+        read = functools.lru_cache(maxsize=PARTS_HELD)(self._read)
 
         def rows(names: Sequence[str]) -> "pa.Table":
-            wanted: dict[Path, list[int]] = {}  # part -> which of the names are in it
+            places: dict[Path, list[int]] = {}  # part -> indices of the names in it
             for i, name in enumerate(names):
-                wanted.setdefault(self.where[name][0], []).append(i)
+                places.setdefault(self.where[name][0], []).append(i)
             found = []
-            for path, here in wanted.items():
-                if (part := held(path)) is None:
+            for path, indices in places.items():
+                if (part := read(path)) is None:
                     raise ScenarioError(f"part {path} was removed or broken while the study ran: start it once more")
-                found.append(part.take([self.where[names[i]][1] for i in here]))
-            order = np.argsort(np.concatenate(list(wanted.values())))
+                found.append(part.take([self.where[names[i]][1] for i in indices]))
+            order = np.argsort(np.concatenate(list(places.values())))
             return pa.concat_tables(found).take(order).combine_chunks()
 
         groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
         table.write(self.results, self.schema, map(rows, groups))
 
-    def _enter(self, path: Path) -> None:
-        part = self._read(path)
-        if part is not None:
-            for i, name in enumerate(part["hash"].to_pylist()):
-                self.where.setdefault(name, (path, i))
-
     def _read(self, path: Path) -> "pa.Table | None":
-        """Return a part, or None for a file that is no part or not whole."""
+        """Return a part, or None for a file that is no part, or is damaged."""
         try:
             with reading(path, "part", "start the study once more") as file:
                 part = table.read(file, sealed=True)

@@ -5,7 +5,7 @@
     print(table.select(law="classical").column("ultimate_bound"))
 
 A run is identified by everything that decides its outcome: the scenario, the code of its law, signals and other parts
-of yours, and the versions of the packages. A run whose result is in the folder is not run again, unless its law was
+of yours, and the versions of the packages. A run with a result in the folder is not run again, unless its law was
 edited.
 """
 
@@ -14,11 +14,10 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
-from smc_mujoco.common.progress import Counter, counter
+from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.simulation.run import cores
@@ -68,12 +67,12 @@ def study(
     """Run scenarios, score them, and write a table with a row for each, out/results.parquet.
 
     Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored in out/parts, some
-    seconds of work in each file. A study that was killed, or found the disk full, can be started again with the same
-    arguments: it goes on from there and ends with the same file, bit for bit.
+    seconds of work in each file. A study that was killed, or that filled the disk, can be started again with the same
+    arguments: it continues there and ends with the same file, bit for bit.
 
     Args:
       out: the folder; it may hold the parts of other studies.
-      resume: False forgets what the folder holds.
+      resume: whether to keep the finished runs in the folder; False removes them first.
       executor: "local", "dask://HOST:PORT" for the workers of that scheduler, or any concurrent.futures.Executor, whose
         workers run a simulation each; it stays open.
       threads: simulations at once, if local; None for one per available core.
@@ -90,25 +89,35 @@ def study(
     where = executors.checked(executor)
     find("choice of traces", traces, dict.fromkeys(saved_traces.CHOICES))
     threads = cores(threads)
-    store = Store(Path(out))
-    named = _named(scenarios)
+    store, folder = Store(Path(out)), Path(out) / "traces"
+    by_key = _by_key(scenarios)
     store.open(resume)
-    missing = [scenario for name, scenario in named.items() if name not in store.where]
-    if progress and len(missing) < len(named):
-        print(f"{len(named) - len(missing)} of {len(named)} runs are in {printable(str(store.parts))}", file=sys.stderr)
+    missing = [scenario for name, scenario in by_key.items() if name not in store.where]
+    if progress and (done := len(by_key) - len(missing)):
+        print(f"{done} of {len(by_key)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
+
+        def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
+            store.add([run_key.row(one.scenario) | its for one, its in zip(batch, outcomes, strict=True)])
+            counts.finished(len(batch))
+
+        def finish_here(batch: Batch, found: Sequence[Trace]) -> None:
+            for trace in found if traces == "all" else ():
+                trace.save(saved_traces.path(folder, run_key.row(trace.scenario)))
+            finish(batch, [executors.outcome(trace) for trace in found])
+
         if where == "local":
-            folder = saved_traces.folder(out) if traces == "all" else None
-            _compute_here(missing, store, threads, counts, folder)
+            executors.compute_here(executors.batches(missing, threads), threads, finish_here, counts.stepped)
         else:
-            _compute_elsewhere(missing, store, where, counts)
-    store.collect(list(named))
-    table = dataclasses.replace(Table.read(store.results), known=named)
-    saved_traces.save(table, traces, saved_traces.folder(out), threads, progress)
+            with executors.opened(where) as pool:
+                executors.compute_elsewhere(executors.batches(missing, 1), pool, finish, counts.stepped)
+    store.collect(list(by_key))
+    table = dataclasses.replace(Table.read(store.results), known=by_key)
+    saved_traces.save(table, traces, folder, threads, progress)
     return table
 
 
-def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
+def _by_key(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     """Return key -> scenario, in order; of equal ones the first."""
     found: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
@@ -120,31 +129,3 @@ def _named(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
     if not found:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
     return found
-
-
-def _compute_here(scenarios: list[Scenario], store: Store, threads: int, counts: Counter, folder: Path | None) -> None:
-    """Run scenarios in this process; with a folder also save their traces there."""
-
-    def finish(batch: Batch, traces: Sequence[Trace]) -> None:
-        if folder:
-            for scenario, trace in zip(batch, traces, strict=True):
-                trace.save(saved_traces.path(folder, run_key.row(scenario)))
-        _store_rows(store, counts, batch, [executors.outcome(trace) for trace in traces])
-
-    executors.compute_here(executors.batches(scenarios, threads), threads, finish, counts.stepped)
-
-
-def _compute_elsewhere(scenarios: list[Scenario], store: Store, where: str | Executor, counts: Counter) -> None:
-    """Have the workers of an executor run scenarios."""
-
-    def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
-        _store_rows(store, counts, batch, outcomes)
-        counts.stepped(sum(s.work for s in batch))
-
-    with executors.dask_executor(where) if isinstance(where, str) else nullcontext(where) as pool:
-        executors.compute_elsewhere(executors.batches(scenarios, 1), pool, finish)
-
-
-def _store_rows(store: Store, counts: Counter, batch: Batch, outcomes: Sequence[Outcome]) -> None:
-    store.add([run_key.row(scenario) | outcome for scenario, outcome in zip(batch, outcomes, strict=True)])
-    counts.finished(len(batch))

@@ -4,9 +4,9 @@
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
     table.scenario(0), table.trace(0)          # what ran, and what it did, by running it again
 
-Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s), every metric of
-`metrics.score` (null where the run failed or the metric is not for it, inf for "never"), how it
-failed if it did (`diverged_at` in s, `failure`), and from what to make it again (`versions`, `scenario`, both JSON).
+Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); every metric of
+`metrics.score`, null where the run failed or the metric does not apply, inf for "never"; how the run failed if it did
+(`diverged_at` in s, `failure`); and what it is made again from (`versions`, `scenario`, both JSON).
 """
 
 import dataclasses
@@ -21,7 +21,6 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
@@ -31,24 +30,20 @@ from smc_mujoco.simulation.trace import Trace
 if TYPE_CHECKING:
     import pyarrow as pa
 
+# Column -> its type, before and after the metrics.
 BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
 BEFORE |= {"seed": "int64", "duration": "float64"}
 AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
 DIGEST = b"digest"  # in a file's metadata
-FEW: Mapping[str, Scenario] = frozen({})
 
 
-def columns() -> dict[str, str]:
-    """Return column -> its type, in order."""
-    return BEFORE | {m.name: "float64" for m in metrics()} | AFTER
-
-
-def schema(metadata: Mapping[str, str] | None = None) -> "pa.Schema":
+def schema(metadata: Mapping[str, str]) -> "pa.Schema":
     """Return the schema of a study's files."""
     import pyarrow as pa
 
     kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
-    return pa.schema([(name, kinds[kind]) for name, kind in columns().items()], metadata=dict(metadata or {}))
+    columns = BEFORE | {m.name: "float64" for m in metrics()} | AFTER
+    return pa.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata))
 
 
 def content(rows: "pa.Table") -> bytes:
@@ -67,7 +62,7 @@ def content(rows: "pa.Table") -> bytes:
 def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
     """Write a parquet file with a row group for each table, and a digest of all rows in its metadata.
 
-    Checksums of parquet cover pages, but neither their headers nor the footer.
+    Checksums of parquet cover pages, but neither headers of pages nor the footer.
 
     Raises:
       ScenarioError: the folder cannot be written.
@@ -102,10 +97,10 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
         groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
         rows = pa.concat_tables(groups) if groups else file.read()
         metadata = dict(file.metadata.metadata or {})
-    said, digest = metadata.pop(DIGEST, None), hashlib.sha256()
+    written, digest = metadata.pop(DIGEST, None), hashlib.sha256()
     for group in groups:
         digest.update(content(group))
-    if said != digest.hexdigest().encode() and (sealed or said is not None):
+    if written != digest.hexdigest().encode() and (sealed or written is not None):
         raise ScenarioError("it is damaged, or was changed, since it was written")
     metadata.pop(b"ARROW:schema", None)
     return rows.replace_schema_metadata(metadata)
@@ -121,7 +116,7 @@ class Table:
     """
 
     data: "pa.Table"
-    known: Mapping[str, Scenario] = dataclasses.field(default=FEW, repr=False)
+    known: Mapping[str, Scenario] = dataclasses.field(default_factory=dict, repr=False)
 
     @classmethod
     def read(cls, path: str | os.PathLike) -> "Table":
@@ -167,11 +162,11 @@ class Table:
         data = self.data
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
-                there = dict.fromkeys(self.column(name).tolist())
                 several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
                 names = taken(name, wanted) if several else [wanted]
+                known = dict.fromkeys(self.column(name).tolist())
                 for one in names:
-                    find(f"{name} of this table", one, there)
+                    find(f"{name} of this table", one, known)
                 data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))
         return dataclasses.replace(self, data=data)
 

@@ -17,6 +17,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.study import study
@@ -46,8 +47,8 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
     monkeypatch.setattr(executors, "STEPS", steps)
     scenarios = mixed()
     found = list(executors.batches(scenarios, threads=2))
-    assert sorted(map(id, scenarios)) == sorted(id(s) for batch in found for s in batch)
-    for batch in found:
+    assert sorted(map(id, scenarios)) == sorted(id(one.scenario) for batch in found for one in batch)
+    for batch in [[one.scenario for one in batch] for batch in found]:
         assert len({(s.plant.name, s.integrator, s.physics_step) for s in batch}) == 1
         assert len(batch) == 1 or sum(s.work for s in batch) <= 2 * steps
 
@@ -73,7 +74,8 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
     batches = list(executors.batches(mixed(), threads=1))
     finished = []
     executors.compute_here(batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces])))
-    assert [batch for batch, _ in finished] == [done for _, done in finished] == batches
+    assert [batch for batch, _ in finished] == batches
+    assert [[one.scenario for one in batch] for batch in batches] == [done for _, done in finished]
 
     for doomed in (batches[0], batches[-1]):
 
@@ -154,9 +156,9 @@ def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
         def batches():
             for scenario in mixed():
                 assert pool.tasks - len(finished) <= 2
-                yield [scenario]
+                yield [prepare(scenario)]
 
-        executors.compute_elsewhere(batches(), pool, lambda batch, outcomes: finished.append(batch[0]))
+        executors.compute_elsewhere(batches(), pool, lambda batch, outcomes: finished.append(batch[0].scenario))
     assert sorted(map(repr, finished)) == sorted(map(repr, mixed()))
 
 
@@ -174,7 +176,7 @@ def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
 
 
 def test_what_ended_well_is_kept_before_an_error_is_told(monkeypatch):
-    batches, kept = [[scenario] for scenario in mixed()[:6]], []
+    batches, kept = [[prepare(scenario)] for scenario in mixed()[:6]], []
     ends = [died(), *(Future() for _ in batches[1:])]
     for future in ends[1:]:
         future.set_result([])
@@ -205,9 +207,9 @@ def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, mo
 
 
 def test_a_law_without_a_module_cannot_be_sent():
-    law = smc.law_function(lambda y, gains, memory: (0.0, y.e))()
+    scenario = smc.Scenario(plant="duffing", law=smc.law_function(lambda y, gains, memory: (0.0, y.e))())
     with Elsewhere(1) as pool, pytest.raises(smc.ScenarioError, match="define it at the top of a module"):
-        executors.compute_elsewhere([[smc.Scenario(plant="duffing", law=law)]], pool, lambda *found: None)
+        executors.compute_elsewhere([[prepare(scenario)]], pool, lambda *found: None)
 
 
 # a cluster

@@ -188,7 +188,9 @@ def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     study(small(seeds=2), tmp_path)
     ran = []
     honest = executors.simulated
-    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    monkeypatch.setattr(
+        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+    )
     study(small(seeds=3), tmp_path)
     assert sorted(s.seed for s in ran) == [2] * 4
     study(small(seeds=3), tmp_path / "anew")
@@ -200,7 +202,9 @@ def test_without_resume_everything_is_run_anew_and_foreign_files_stay(tmp_path, 
     (tmp_path / "parts" / "mine.parquet").write_text("not a part")
     ran = []
     honest = executors.simulated
-    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    monkeypatch.setattr(
+        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+    )
     study(small(), tmp_path, resume=False)
     assert len(ran) == len(small())
     assert (tmp_path / "parts" / "mine.parquet").exists()
@@ -232,7 +236,9 @@ def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
     harm(parts[1])
     ran = []
     honest = executors.simulated
-    monkeypatch.setattr(executors, "simulated", lambda batch, *rest: ran.extend(batch) or honest(batch, *rest))
+    monkeypatch.setattr(
+        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+    )
     study(small(), tmp_path)
     assert 0 < len(ran) < len(small())
     assert bytes_of(tmp_path) == before

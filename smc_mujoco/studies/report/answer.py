@@ -1,19 +1,24 @@
 """The report's answer in sentences: which law leads where, where no winner is known, where the paper's law loses.
 
-Everything here is counted from `Findings.scores`; no sentence is there that the numbers do not make.
+Everything here is counted from `Findings.scores`.
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.differences import ROUNDING
+from smc_mujoco.studies.paper.claims.verdict import VERDICTS
 from smc_mujoco.studies.report import words
-from smc_mujoco.studies.report.findings import Findings, Place, Score
+from smc_mujoco.studies.report.scores import Place, Score
 
-PAPER = "observer_free"  # the law that the suite was built to test
+if TYPE_CHECKING:
+    from smc_mujoco.studies.report.stages import Findings
+
 NAMED = 3  # laws in a sentence
-VERDICTS = ("supported", "partly supported", "refuted", "not testable")
+
+Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score for each law
 
 
 class Standing(NamedTuple):
@@ -30,10 +35,11 @@ class Standing(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """A cell in which another law is better than the paper's: medians, and its own over that of the best law.
+    """A cell in which another law is better than the paper's.
 
-    `times` is a lower bound where the best is less than what rounding leaves of zero, see `rounded`. `settles` says
-    whether the best law settles there: who hardly acts may be calm, and never arrives.
+    `own`, `rival`: medians of the paper's law and of the best law. `times`: own over rival, a lower bound where the
+    rival's is zero but for rounding (`rounded`). `settles`: whether the best law settles there: a law that hardly acts
+    may be calm, and never arrive.
     """
 
     metric: str
@@ -43,22 +49,8 @@ class Loss(NamedTuple):
     rival: float
     law: str
     times: float
+    rounded: bool
     settles: bool
-
-    @property
-    def rounded(self) -> bool:
-        """Whether the best is zero but for rounding."""
-        return self.rival < ROUNDING
-
-
-class Open(NamedTuple):
-    """How many of `of` comparisons name no winner."""
-
-    open: int
-    of: int
-
-
-Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score a law
 
 
 def cells(scores: Sequence[Score]) -> Cells:
@@ -76,52 +68,39 @@ def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
 
 
 def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
-    """The law that wins, as on a board: it alone leads, among several."""
+    """Return the law that wins, as on a board: it alone leads, among several."""
     leading = leaders(found, plant, condition, metric)
     return leading[0] if len(leading) == 1 < len(found[plant, condition, metric]) else None
 
 
-def standings(findings: Findings, found: Cells, metric: str) -> list[Standing]:
-    """Return how often each law leads, and how often it is behind, most wins first."""
-    best = {key: leaders(found, *key) for key in found if key[2] == metric}
-    behind = {key: [s.law for s in found[key] if not s.best] for key in best}
-    rows = [
-        Standing(
-            law,
-            sum(law in b for b in best.values()),
-            sum(winner(found, *key) == law for key in best),
-            sum(law in b for b in behind.values()),
-            len(best),
-        )
-        for law in findings.laws
-    ]
+def standings(findings: "Findings", metric: str) -> list[Standing]:
+    """Return how often each law leads, and how often another law is better, most wins first."""
+    found = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
+    best = Counter(law for key in found for law in leaders(found, *key))
+    alone = Counter(winner(found, *key) for key in found)
+    lost = Counter(s.law for scores in found.values() for s in scores if not s.best)
+    rows = [Standing(law, best[law], alone[law], lost[law], len(found)) for law in findings.laws]
     return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
 
 
-def everywhere(found: Cells, metric: str) -> dict[str, list[str]]:
-    """Return law -> the conditions under which it wins on every plant, where there are at least two."""
-    winners: dict[str, list[str | None]] = {}
-    for key in (key for key in found if key[2] == metric):
-        winners.setdefault(key[1], []).append(winner(found, *key))
-    told: dict[str, list[str]] = {}
-    for condition, by_plant in winners.items():
-        if len(by_plant) > 1 and by_plant[0] and set(by_plant) == {by_plant[0]}:
-            told.setdefault(by_plant[0], []).append(words.condition(condition))
-    return told
+def everywhere(findings: "Findings", metric: str) -> dict[str, list[str]]:
+    """Return law -> the conditions in which it wins on every plant, of those with two plants or more."""
+    found = cells(findings.scores)
+    conditions: dict[str, list[str]] = {}
+    for condition in findings.conditions:
+        winners = [winner(found, *key) for key in found if key[1:] == (condition, metric)]
+        if len(winners) > 1 and winners[0] and len(set(winners)) == 1:
+            conditions.setdefault(winners[0], []).append(words.condition(condition))
+    return conditions
 
 
-def undecided(found: Cells, metrics: Sequence[str]) -> Open:
-    """Return how many comparisons end without one winner."""
+def undecided(found: Cells, metrics: Sequence[str]) -> tuple[int, int]:
+    """Return how many comparisons have no winner, and how many comparisons there are."""
     winners = [winner(found, *key) for key in found if key[2] in metrics]
-    return Open(winners.count(None), len(winners))
+    return winners.count(None), len(winners)
 
 
-def repeated(found: Cells) -> int:
-    """Return in how many cells some seeds repeat the run of another seed."""
-    return len({(plant, condition) for (plant, condition, _), s in found.items() if s[0].runs < s[0].seeds})
-
-
-def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]:
+def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list[Loss]:
     """Return the cells in which another law is better than this one, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in found.items():
@@ -130,47 +109,41 @@ def losses(found: Cells, metrics: Sequence[str], law: str = PAPER) -> list[Loss]
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
-            times = own.median / max(best.median, ROUNDING)
-            times_to_settle = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
-            settles = times_to_settle.get(best.law) != math.inf
-            lost.append(Loss(metric, plant, condition, own.median, best.median, best.law, times, settles))
+            settling = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
+            loss = Loss(
+                metric=metric,
+                plant=plant,
+                condition=condition,
+                own=own.median,
+                rival=best.median,
+                law=best.law,
+                times=own.median / max(best.median, ROUNDING),
+                rounded=best.median < ROUNDING,
+                settles=settling.get(best.law) != math.inf,
+            )
+            lost.append(loss)
     return sorted(lost, key=lambda loss: -loss.times)
 
 
-def counts(findings: Findings) -> dict[str, int]:
-    """Return verdict -> how many claims have it."""
-    return {name: sum(claim.verdict == name for claim in findings.claims) for name in VERDICTS}
+def counts(findings: "Findings") -> dict[str, int]:
+    """Return verdict -> how many claims have it, where some do."""
+    found = Counter(claim.verdict for claim in findings.claims)
+    return {verdict: found[verdict] for verdict in VERDICTS if found[verdict]}
 
 
-def overall(findings: Findings, metric: str) -> list[Place]:
+def overall(findings: "Findings", metric: str) -> list[Place]:
     """Return the laws' places over all runs, best first."""
     return sorted((p for p in findings.places if p.metric == metric and not p.plant), key=lambda p: p.mean)
 
 
-class Sentence(NamedTuple):
-    """A sentence of the answer, and what it is about: "" for all."""
-
-    about: str
-    text: str
+# sentences
 
 
-def paragraph(findings: Findings, metrics: Sequence[str] = words.HEADLINE) -> list[Sentence]:
-    """Return the answer, sentence by sentence."""
-    found = cells(findings.scores)
-    standing = {metric: standings(findings, found, metric) for metric in metrics}
-    leads = [Sentence(words.ASKS[m].capitalize(), _leads(m, standing[m], everywhere(found, m))) for m in metrics]
-    rest = [
-        _sure(undecided(found, metrics), findings.about.seeds, repeated(found)),
-        *_settled(findings),
-        *_paper(standing, losses(found, metrics)),
-        *_claims(findings),
-    ]
-    return [Sentence("", _first(standing)), *leads, *(Sentence("", text) for text in rest)]
-
-
-def _first(standing: dict[str, list[Standing]]) -> str:
-    winners = [{row.law for row in rows if row.alone == row.of} for rows in standing.values()]
-    unbeaten = [{row.law for row in rows if not row.lost} for rows in standing.values()]
+def first(findings: "Findings", metrics: Sequence[str]) -> str:
+    """Return whether there is one best law."""
+    standing = [standings(findings, metric) for metric in metrics]
+    winners = [{row.law for row in rows if row.alone == row.of} for rows in standing]
+    unbeaten = [{row.law for row in rows if not row.lost} for rows in standing]
     if winner := set.intersection(*winners) if winners else set():
         return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
     if common := set.intersection(*unbeaten) if unbeaten else set():
@@ -179,74 +152,84 @@ def _first(standing: dict[str, list[Standing]]) -> str:
     return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
 
 
-def _leads(metric: str, standing: Sequence[Standing], conditions: dict[str, list[str]]) -> str:
+def leads(findings: "Findings", metric: str) -> str:
     """Return who leads on a metric: in every cell, else on every plant, else in how many cells."""
-    what, top = words.metric(metric), standing[0]
+    standing, what = standings(findings, metric), words.metric(metric)
+    top = standing[0]
     if top.alone == top.of:
         return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
-    told = [
+    if not top.alone:
+        level = [words.law(row.law) for row in standing if not row.lost]
+        unbeaten = f"; none is better than {_joined(level)} in any" if 0 < len(level) <= NAMED else ""
+        return f"no winner on {what} in any of {top.of} cells{unbeaten}."
+    plants = [
+        f"{words.law(law)} wins on every plant under {_joined(names)}"
+        for law, names in everywhere(findings, metric).items()
+    ]
+    wins = [
         f"{words.law(row.law)} wins in {row.alone} and loses in {row.lost or 'none'}"
         for row in standing[:NAMED]
         if row.alone
     ]
-    if not told:
-        level = [words.law(row.law) for row in standing if not row.lost]
-        never = f"; none is better than {_joined(level)} in any" if 0 < len(level) <= NAMED else ""
-        return f"no winner on {what} in any of {top.of} cells{never}."
-    plants = [f"{words.law(law)} wins on every plant under {_joined(names)}" for law, names in conditions.items()]
     nobody = top.of - sum(row.alone for row in standing)
     return (
-        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(told)}; "
+        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
         f"in {nobody or 'none'} nobody wins."
     )
 
 
-def _sure(found: Open, seeds: int, repeats: int) -> str:
-    told = (
-        f"In {found.open} of {found.of} comparisons no single winner can be declared; each has {seeds} seeds, and the "
-        "tests are corrected for all comparisons of a metric on a plant."
-    )
-    return told + (
-        f" In {repeats} of the cells seeds change nothing, or not each: equal runs count once." if repeats else ""
+def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
+    """Return the other sentences: how sure it is, who settles, how the paper's law and its claims do."""
+    return list(
+        filter(None, [_sure(findings, metrics), _settled(findings), _paper(findings, metrics), _claims(findings)])
     )
 
 
-def _settled(findings: Findings) -> list[str]:
+def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
+    open, of = undecided(cells(findings.scores), metrics)
+    repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
+    return (
+        f"In {open} of {of} comparisons no single winner can be declared; each has {findings.about.seeds} seeds, and "
+        "the tests are corrected for all comparisons of a metric on a plant."
+        + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
+        * bool(repeated)
+    )
+
+
+def _settled(findings: "Findings") -> str:
     """Return what share of runs settles, and how many failed; a run that does not settle may still be calm."""
     share = {place.law: place.median for place in overall(findings, "settles")}
     if not share:
-        return []
+        return ""
     least, most = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
-    told = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
+    text = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
     if f"{share[least]:.2f}" != f"{share[most]:.2f}":
-        told = f"Of {words.law(least)}’s runs {100 * share[least]:.0f} % settle, the fewest; one that does "
-        told += "not may be calm all the same"
-    about = findings.about
-    return [f"{told}. {about.failed or 'None'} of {about.runs} runs failed."]
+        text = f"Of {words.law(least)}’s runs {100 * share[least]:.0f} % settle, the fewest; one that does "
+        text += "not may be calm all the same"
+    return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
 
 
-def _paper(standing: dict[str, list[Standing]], lost: Sequence[Loss]) -> list[str]:
-    own = {metric: next((row for row in rows if row.law == PAPER), None) for metric, rows in standing.items()}
-    shown = [f"{row.best} on {words.metric(metric)}" for metric, row in own.items() if row]
-    if not shown:
-        return []
-    of = next(row.of for row in own.values() if row)
+def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
+    own = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER}
+    if not own:
+        return ""
+    lost = losses(cells(findings.scores), metrics)
     beaten = f"; it is beaten in {len(lost)} comparisons, listed below, in half of them by a factor of " if lost else ""
     beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
-    return [
-        f"The paper’s observer-free law leads, or is level with what leads, in {_joined(shown)}, "
-        f"of {of} cells each{beaten}."
-    ]
+    return (
+        "The paper’s observer-free law leads, or is level with what leads, in "
+        f"{_joined([f'{row.best} on {words.metric(metric)}' for metric, row in own.items()])}, "
+        f"of {own[metrics[0]].of} cells each{beaten}."
+    )
 
 
-def _claims(findings: Findings) -> list[str]:
+def _claims(findings: "Findings") -> str:
     if not findings.claims:
-        return []
-    told = counts(findings)
-    parts = [f"{n} {'are' if n != 1 else 'is'} {name}" for name, n in told.items() if n]
+        return ""
+    parts = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
     flips = sum(claim.flips for claim in findings.claims)
-    tail = f"; {flips} of these verdicts depend on the gains" if flips else ""
-    return [f"Of {len(findings.claims)} claims of the paper that were checked, {_joined(parts)}{tail}."]
+    depend = f"; {flips} of these verdicts depend on the gains" if flips else ""
+    return f"Of {len(findings.claims)} claims of the paper that were checked, {_joined(parts)}{depend}."
 
 
 def _joined(parts: Sequence[str]) -> str:

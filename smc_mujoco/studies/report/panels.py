@@ -5,8 +5,8 @@ Small multiples throughout: the same axes, one panel a plant (and a law), one co
 
 import base64
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from smc_mujoco.studies.report.words import style
 
 Figure = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-WIDE, DECADES = 50.0, 5  # of what an axis shows: a wider span than this is drawn in decades, so many at most
-AXIS: dict[str, Any] = {
+WIDE, DECADES = 50.0, 5  # an axis with a wider span than this is logarithmic, and shows at most so many decades
+AXIS = {
     "gridcolor": style.GRID,
     "linecolor": style.RULE,
     "zeroline": False,
@@ -24,69 +24,95 @@ AXIS: dict[str, Any] = {
     "tickfont": {"size": 11, "color": style.MUTED},
     "title": {"font": {"size": 12, "color": style.MUTED}, "standoff": 6},
 }
-
-
-def figure(data: list[dict], layout: dict[str, Any], height: int, legend: bool = False) -> Figure:
-    """Return a figure in the report's style; height in px."""
-    common = {
-        "font": {"family": FONT, "size": 12, "color": style.INK},
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "height": height,
-        "margin": {"l": 56, "r": 12, "t": 34, "b": 48},
-        "showlegend": legend,
-        "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "font": {"size": 12}},
-        "hoverlabel": {"font": {"family": FONT, "size": 12}, "bgcolor": "#FFFFFF", "bordercolor": style.RULE},
-        "hovermode": "closest",
-        "dragmode": "zoom",
-    }
-    return {"data": data, "layout": common | layout}
-
-
-def panels(rows: int, columns: int, gaps: tuple[float, float]) -> list[tuple[str, list[float], list[float]]]:
-    """Return the axis ending ("", "2", ...), x domain and y domain of each panel; gaps are shares of the whole."""
-    wide, high = (1 - gaps[0] * (columns - 1)) / columns, (1 - gaps[1] * (rows - 1)) / rows
-    found = []
-    for k in range(rows * columns):
-        left, top = (k % columns) * (wide + gaps[0]), 1 - (k // columns) * (high + gaps[1])
-        found.append(("" if k == 0 else str(k + 1), [left, left + wide], [max(top - high, 0.0), top]))
-    return found
-
-
-def axes(panel: tuple[str, list[float], list[float]], x: dict[str, Any], y: dict[str, Any]) -> dict[str, Any]:
-    """Return the two axes of a panel."""
-    end, across, up = panel
-    return {
-        f"xaxis{end}": AXIS | {"domain": across, "anchor": f"y{end}"} | x,
-        f"yaxis{end}": AXIS | {"domain": up, "anchor": f"x{end}"} | y,
-    }
-
-
-def heading(panel: tuple[str, list[float], list[float]], text: str, size: int = 12) -> dict[str, Any]:
-    """Return a title above a panel, at its left."""
-    _, across, up = panel
-    return {
-        "text": f"<b>{words.escape(text)}</b>",
+STYLE = {
+    "font": {"family": FONT, "size": 12, "color": style.INK},
+    "paper_bgcolor": "rgba(0,0,0,0)",
+    "plot_bgcolor": "rgba(0,0,0,0)",
+    "legend": {"orientation": "h", "x": 0, "yanchor": "bottom", "font": {"size": 12}},
+    "hoverlabel": {"font": {"family": FONT, "size": 12}, "bgcolor": "#FFFFFF", "bordercolor": style.RULE},
+    "hovermode": "closest",
+    "dragmode": "zoom",
+    "xaxis": AXIS,
+    "yaxis": AXIS,
+    "annotationdefaults": {
         "xref": "paper",
         "yref": "paper",
-        "x": across[0],
-        "y": up[1],
         "yshift": 4,
         "xanchor": "left",
         "yanchor": "bottom",
         "align": "left",
         "showarrow": False,
-        "font": {"size": size, "color": style.INK},
-    }
+        "font": {"size": 12, "color": style.INK},
+    },
+}
 
 
-def titles(grid: Sequence[tuple[str, list[float], list[float]]], names: Sequence[str], size: int = 12) -> list[Figure]:
-    """Return a heading for each panel, on two lines where there are more than three panels."""
-    many = len(names) > 3
-    made = [heading(panel, name, size) for panel, name in zip(grid, names, strict=True)]
-    for each in made if many else ():
-        each["text"] = each["text"].replace(" network", "<br>network")
+class Panel(NamedTuple):
+    """A pair of axes: their ending ("", "2", ...) and their domains, shares of the whole."""
+
+    end: str
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @property
+    def trace(self) -> dict[str, Any]:
+        """What puts a trace on these axes."""
+        return {"xaxis": f"x{self.end}", "yaxis": f"y{self.end}"}
+
+    def axes(self, x: Mapping[str, Any], y: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the layout of the two axes."""
+        return {
+            f"xaxis{self.end}": {"domain": self.x, "anchor": f"y{self.end}"} | dict(x),
+            f"yaxis{self.end}": {"domain": self.y, "anchor": f"x{self.end}"} | dict(y),
+        }
+
+    def heading(self, text: str, **fields: Any) -> dict[str, Any]:
+        """Return a text above the panel, at its left; fields of the annotation."""
+        return {"text": text, "x": self.x[0], "y": self.y[1]} | fields
+
+    def title(self, text: str, **fields: Any) -> dict[str, Any]:
+        """Return a heading in bold, where HTML tags have no effect."""
+        return self.heading(f"<b>{words.escape(text)}</b>", **fields)
+
+
+def panels(rows: int, columns: int, gaps: tuple[float, float]) -> list[Panel]:
+    """Return the panels of a grid, row by row; gaps across and up are shares of the whole."""
+    width, height = (1 - gaps[0] * (columns - 1)) / columns, (1 - gaps[1] * (rows - 1)) / rows
+    found = []
+    for k in range(rows * columns):
+        left, top = (k % columns) * (width + gaps[0]), 1 - (k // columns) * (height + gaps[1])
+        found.append(Panel("" if k == 0 else str(k + 1), (left, left + width), (max(top - height, 0.0), top)))
+    return found
+
+
+def plant_titles(grid: Sequence[Panel], plants: Sequence[str]) -> list[dict[str, Any]]:
+    """Return a title for each panel, on two lines where there are more than three panels."""
+    made = [panel.title(words.plant(plant)) for panel, plant in zip(grid, plants, strict=True)]
+    for title in made if len(made) > 3 else ():
+        title["text"] = title["text"].replace(" network", "<br>network")
     return made
+
+
+def figure(
+    data: list[dict], layout: dict[str, Any], height: int, margin: tuple[int, int, int, int], **fields: Any
+) -> Figure:
+    """Return a figure in the report's style.
+
+    Args:
+      height: in px.
+      margin: left, right, top and bottom, in px.
+      fields: more of the layout.
+    """
+    sides = dict(zip("lrtb", margin, strict=True))
+    common = {"template": {"layout": STYLE}, "height": height, "margin": sides, "showlegend": False}
+    return {"data": data, "layout": common | layout | fields}
+
+
+def law_axis(laws: Sequence[str], shown: bool) -> dict[str, Any]:
+    """Return a y axis with a line for each law, the first at the top; their names where shown."""
+    names = [words.escape(words.law(law)) for law in reversed(laws)]
+    y = {"categoryarray": names, "categoryorder": "array", "range": [-0.6, len(laws) - 0.4], "showgrid": False}
+    return y | {"dtick": 1, "showticklabels": shown, "tickfont": {"size": 11.5, "color": style.INK}}
 
 
 def rounded(values: Sequence[float] | np.ndarray, digits: int = 5) -> list[float | None]:

@@ -1,6 +1,6 @@
-"""How much a report computes, and how its finished results are cached.
+"""How much a report computes, its progress, and the cache of its results.
 
-A report that was killed and is started again computes nothing twice: every result has a file in the report's folder.
+Every result has a file in the report's folder, so a report that was killed and is started again computes nothing twice.
 """
 
 import contextlib
@@ -15,47 +15,40 @@ from typing import TypeVar
 from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common import fingerprint, progress
-from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
+from smc_mujoco.studies.study import Extent
 
-GAINS = "tuned"  # of everything but the claims, which are judged under every set
+GAINS = "tuned"  # the set of gains of everything but the claims, which are judged under every set
 
 T = TypeVar("T")
 Item = TypeVar("Item")
-Report = Callable[[float, float], None]  # told the work done and the whole
-
-
-# how much
+Report = Callable[[float, float], None]  # called with the work done and the whole
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Plan:
-    """How much of everything.
+class Plan(Extent):
+    """How much of everything: the extent of the grid, and the rest.
 
     Attributes:
-      quick: whether margins and claims are to be quick.
-      plants, laws, conditions, seeds, duration: of the grid; s. Fewer than 16 seeds name no winner, see `ranking`.
-      kinds: of margins, found for all plants and laws.
-      compared: those of them that are found under every set of gains.
-      basins: plants whose regions of attraction are mapped: on 2 cores a map of 1000 states takes 12 s.
-      basin_laws: under which laws.
+      quick: whether margins and claims are quick.
+      kinds: of margins, searched for all plants and laws.
+      compared: those kinds that are searched under every set of gains.
+      basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
+      basin_laws: laws of these maps.
       points: of a map, across and up.
       region: the longest run of a map, s.
       claims: ids of claims to judge; None for all.
       scenes: (plant, condition) of the traces and films.
       filmed: how many of the scenes are filmed.
-      scene_laws: side by side in them.
-      scene: s, of traces and films.
+      scene_laws: laws side by side in a scene.
+      scene: duration of traces and films, s.
     """
 
     quick: bool
-    plants: tuple[str, ...] = scenarios.PLANTS
-    laws: tuple[str, ...] = sets.LAWS
-    conditions: tuple[str, ...] = tuple(GRID.conditions)
+    conditions: tuple[str, ...] = GRID.conditions
     seeds: int = SEEDS  # the fewest that name a winner
-    duration: float = scenarios.DURATION
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
     compared: tuple[str, ...] = ("disturbance",)
     basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")
@@ -71,11 +64,8 @@ class Plan:
 
 FULL = Plan(quick=False)
 QUICK = Plan(
+    **vars(QUICK_GRID),
     quick=True,
-    plants=QUICK_GRID.plants,
-    conditions=QUICK_GRID.conditions,
-    seeds=QUICK_GRID.seeds,
-    duration=QUICK_GRID.duration,
     kinds=("delay", "disturbance"),
     compared=(),
     basins=("inverted_pendulum",),
@@ -85,11 +75,8 @@ QUICK = Plan(
 )
 
 
-# progress and cache
-
-
 class Bars:
-    """What a report says on the terminal: a bar for each stage, then a line with its time; or nothing.
+    """Progress on the terminal: a bar for each stage, then a line with its time; or nothing.
 
     `spent`: stage -> s.
     """
@@ -99,11 +86,11 @@ class Bars:
         self.spent: dict[str, float] = {}
 
     @contextlib.contextmanager
-    def stage(self, name: str, what: str = "", bar: bool = True) -> Iterator[Report]:
-        """Time a stage, and show its bar unless `bar` says that it has one of its own."""
+    def stage(self, name: str, what: str = "", whole: float | None = None, bar: bool = True) -> Iterator[progress.Bar]:
+        """Time a stage, and show its bar; without one if `bar` is False, for work that shows its own."""
         start = time.monotonic()
-        with progress.bar(f"{name}  {what}", shown=bar and self.shown) as drawn:
-            yield drawn.reached
+        with progress.bar(f"{name}  {what}", whole, shown=bar and self.shown) as drawn:
+            yield drawn
         self.spent[name] = time.monotonic() - start
         if self.shown:
             print(f"{name:11} {what:16} {self.spent[name]:6.0f} s", flush=True)
@@ -112,25 +99,25 @@ class Bars:
 def cached(
     path: Path, depends: object, make: Callable[[], T], save: Callable[[T, Path], object], load: Callable[[Path], T]
 ) -> T:
-    """Return what `make` gives, from its file if there is one.
+    """Return what `make` returns, from its file if there is one.
 
     The file's name ends in a hash of what the result depends on: `depends`, the package's code, models and gains, and
-    the versions of the packages below. Files of other hashes are removed when a new one is written.
+    the versions of the packages below. Files with other hashes are removed when a new one is written.
 
     Args:
-      path: of the file; before its ending the hash is put.
-      depends: what the result depends on beside the code, JSON-able.
+      path: of the file, without the hash.
+      depends: what the result depends on besides the code, as JSON data.
     """
     text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
-    own = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
-    if own.exists():
-        with contextlib.suppress(Exception):  # whatever damaged bytes raise: it is computed again
-            return load(own)
-    found = make()
+    file = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
+    if file.exists():
+        with contextlib.suppress(Exception):  # damaged bytes raise any exception there is; compute it again
+            return load(file)
+    made = make()
     for old in path.parent.glob(f"{path.stem}-{'?' * 12}.*"):
         old.unlink()
-    save(found, own)
-    return load(own)
+    save(made, file)
+    return load(file)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -143,24 +130,10 @@ class Work:
     bars: Bars
 
     def each(self, stage: str, unit: str, items: Sequence[Item], compute: Callable[[Item, Report], T]) -> list[T]:
-        """Compute something for every item of a stage; `compute` reports on its item alone."""
+        """Return compute(item, report) for each item of a stage; `report` takes the progress within that item."""
         found = []
-        with self.bars.stage(stage, f"{len(items)} {unit}") as report:
+        with self.bars.stage(stage, f"{len(items)} {unit}") as bar:
             for k, item in enumerate(items):
-                found.append(
-                    compute(item, lambda done, total, k=k: report(k + (done / total if total else 0.0), len(items)))
-                )
-                report(k + 1, len(items))
+                found.append(compute(item, lambda done, total, k=k: bar.reached(k + done / (total or 1), len(items))))
+                bar.reached(k + 1, len(items))
         return found
-
-
-def counted(report: Report, total: float) -> Callable[[int], None]:
-    """Return a report that is told how much more is done."""
-    done = 0
-
-    def told(more: int) -> None:
-        nonlocal done
-        done += more
-        report(done, total)
-
-    return told

@@ -25,10 +25,10 @@ from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.studies.report import answer, charts, films, page, panels, report, stages, words
+from smc_mujoco.studies.report import answer, charts, films, maps, page, panels, report, stages, words
 from smc_mujoco.studies.report import scores as scores_of
-from smc_mujoco.studies.report.findings import Place, Score
 from smc_mujoco.studies.report.plan import QUICK, Bars, cached
+from smc_mujoco.studies.report.scores import Place, Score
 
 TINY = dataclasses.replace(
     QUICK,
@@ -200,11 +200,7 @@ def test_the_gains_of_every_set_stand_beside_each_other(reader, findings):
 def test_a_law_that_a_set_has_no_gains_for_stands_there_without(findings):
     few = {"tuned": findings.by_set["tuned"], "study": findings.by_set["study"][:1]}
     rows = page.set_margins(dataclasses.replace(findings, by_set=few))
-    assert [[margin is not None for margin in row.by_set] for row in rows] == [
-        [True, True],
-        [True, False],
-        [True, False],
-    ]
+    assert [list(by_set) for by_set in rows.values()] == [["tuned", "study"], ["tuned"], ["tuned"]]
     text = page.page(dataclasses.replace(findings, by_set=few))
     assert "The same under every set of gains" in text
 
@@ -218,13 +214,15 @@ THIRTEEN = (
 
 def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     monkeypatch.setattr(gains, "LAWS", THIRTEEN)
-    words._colours.cache_clear()
     assert len({words.colour(law) for law in THIRTEEN}) == 13
     assert len({words.short(law) for law in THIRTEEN}) == 13
     assert max(len(words.short(law)) for law in THIRTEEN) <= 3
     assert words.colour("classical") == words.style.law_colour("classical")
     assert words.law("pid") == "PID"
-    words._colours.cache_clear()
+
+
+def forest_of(findings):
+    return charts.forest(findings.scores, words.HEADLINE, findings.plants, findings.laws)
 
 
 def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
@@ -232,15 +230,14 @@ def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
     many = tuple(s._replace(law=law) for law in THIRTEEN for s in cell)
     place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
     shown = dataclasses.replace(findings, scores=many, places=place)
-    forest = page.overview(shown)["forest"]
-    here = page.overview(findings)["forest"]
+    forest, here = forest_of(shown), forest_of(findings)
     per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.HEADLINE)
     assert per_law >= 15  # px: a line of text
     assert all(words.law(law) in page.page(shown) for law in THIRTEEN)
 
 
 def test_a_map_is_drawn_as_it_was_found(findings):
-    figure = panels_of(page.regions(findings)["maps"][0].figure)
+    figure = panels_of(maps.basins(findings.basins, maps.horizons(findings.basins)))
     z = figure["data"][0]["z"]
     drawn = np.frombuffer(base64.b64decode(z["bdata"]), np.int8).reshape(tuple(map(int, z["shape"].split(","))))
     home = findings.basins[0].outcome == 1
@@ -257,11 +254,13 @@ def panels_of(figure):
 
 
 def test_plotly_knows_every_word_of_every_chart(findings):
-    panels_of(page.overview(findings)["forest"])
-    panels_of(page.claims(findings)["fields"])
-    panels_of(page.tradeoffs(findings)["fronts"])
-    for one in [*page.margins(findings)["kinds"], *page.films(findings)["scenes"]]:
-        panels_of(one.figure)
+    panels_of(forest_of(findings))
+    panels_of(maps.fields(findings.fields))
+    panels_of(charts.fronts(findings.fronts))
+    for kind in TINY.kinds:
+        panels_of(charts.margins(findings.margins, kind))
+    for scene in findings.scenes:
+        panels_of(charts.curves(scene))
 
 
 def test_what_comes_from_outside_is_escaped(findings):
@@ -300,7 +299,12 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
 def told(findings, *cells):
     """The answer, of these cells alone."""
     few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), places=())
-    return " ".join(part.text for part in answer.paragraph(few, ["settling_time"]))
+    return sentences(few, ["settling_time"])
+
+
+def sentences(findings, metrics):
+    leads = [answer.leads(findings, metric) for metric in metrics]
+    return " ".join([answer.first(findings, metrics), *leads, *answer.rest(findings, metrics)])
 
 
 def test_laws_that_are_level_share_the_lead_and_no_winner_is_named(findings):
@@ -382,7 +386,7 @@ def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
     few = dataclasses.replace(
         findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
     )
-    told = " ".join(part.text for part in answer.paragraph(few, []))
+    told = sentences(few, [])
     assert "Of Classical’s runs 50 % settle, the fewest" in told
     assert "3 of 40 runs failed" in told
 
@@ -451,7 +455,7 @@ def test_fronts_and_gains_taken_are_of_the_accurate_runs(monkeypatch):
 
 
 def test_fronts_are_staircases_from_the_left(findings):
-    lines = [line for line in charts.fronts(findings.fronts, ["duffing"])["data"] if line.get("line", {}).get("shape")]
+    lines = [line for line in charts.fronts(findings.fronts)["data"] if line.get("line", {}).get("shape")]
     assert len(lines) == len(TINY.laws)
     for line in lines:
         assert line["line"]["shape"] == "hv"
