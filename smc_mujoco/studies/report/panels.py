@@ -18,6 +18,7 @@ FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, s
 WIDE, DECADES = 50.0, 5  # an axis with a wider span than this is logarithmic, and shows at most so many decades
 AXIS = {
     "gridcolor": style.GRID,
+    "showline": True,
     "linecolor": style.RULE,
     "zeroline": False,
     "ticks": "",
