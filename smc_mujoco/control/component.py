@@ -1,8 +1,8 @@
-"""A component is a pure function with named gains and a memory. Laws, surfaces and estimators are components.
+"""Components: pure functions with named gains and a memory. Laws, surfaces and estimators are components.
 
-A `Template` is the function with its default gains. Called with gains it gives a `Component`: plain data that a
-Scenario holds. The function is called as `function(y, gains, memory)`. It reads y and gains by attribute. Memory is a
-float array, zero at the start of a run, one per channel, free to change.
+A `Template` is the function with its default gains. Called with gains it returns a `Component`, the plain data in a
+Scenario. The function is called as `function(y, gains, memory)` and reads y and gains by attribute. The memory is an
+array of floats, one per channel, which the function may change. It is zero at the start of a run.
 """
 
 import dataclasses
@@ -24,15 +24,15 @@ from smc_mujoco.common.registry import modules
 from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
-RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # words of version 0.1
+RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # names in version 0.1
 
 
 class Rest(NamedTuple):
-    """What linear theory needs to know of a law that is linear near s = 0. Gains are read by attribute.
+    """The part of a law that linear theory uses, for a law that is linear near s = 0.
 
     Attributes:
-      linear: gains -> lam and k1 of u = -lam (e' + k1 e), the law near s = 0.
-      force: gains and errors x, (k,) -> the force towards 0 while the plant is held at x.
+      linear: gains -> (lam, k1) of u = -lam (e' + k1 e), the law near s = 0. Gains are read by attribute.
+      force: (gains, errors x of shape (k,)) -> the force towards 0 at rest at x, shape (k,).
     """
 
     linear: Callable[[SimpleNamespace], tuple[float, float]]
@@ -70,7 +70,7 @@ OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
 
 
 class GainWarning(UserWarning):
-    """Gains that miss a condition under which the law's theorem holds."""
+    """Gains violate a condition of the law's theorem."""
 
 
 def renamed(old: str) -> property:
@@ -88,8 +88,8 @@ class Component:
     """A function bound to its gains.
 
     Attributes:
-      function: None when a loaded trace names one that is not at hand.
-      template: what it was made from; None when that is not at hand.
+      function: None if a loaded trace names one that is not available.
+      template: the Template it was made from; None if that is not available.
     """
 
     kind: str
@@ -109,27 +109,27 @@ class Component:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
-        """Pickle by the name of the template: the name of the decorated function leads to the template, not to it."""
-        home = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
-        found = _at(*home)
-        if isinstance(found, Template) and found.function is self.function:
-            return _bind, (*home, dict(self.gains), self.name)
+        """Pickle the name of the template: a decorated function's own name leads to its template, not to itself."""
+        name = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
+        template = _template_at(*name)
+        if template is not None and template.function is self.function:
+            return _unpickled, (*name, dict(self.gains), self.name)
         return super().__reduce__()
 
     def __post_init__(self):
         gains = {name: number(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.template and (self.template.function is not self.function or self.template.name != self.name):
-            object.__setattr__(self, "template", None)  # another function took its place
+            object.__setattr__(self, "template", None)  # the function or the name was replaced
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
     def named(self, name: str) -> "Component":
-        """Return the same function and gains under another name, which tables and figures show.
+        """Return the same function and gains under another name, to compare two sets of gains of one law.
 
-        So two sets of gains of one law can be compared. A run of it is another run.
+        Tables and figures show the name, and its runs count as other runs.
 
         Raises:
-          ScenarioError: no name of 1 to 100 printable characters.
+          ScenarioError: not a name of 1 to 100 printable characters.
         """
         errors.name(f"name of the {self.kind}", name)
         template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
@@ -139,35 +139,35 @@ class Component:
         return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
 
 
-def _at(module: str, name: str) -> object:
-    """Return what a module holds under a dotted name, or None."""
-    found: object = sys.modules.get(module)
+def _template_at(module: str, name: str) -> "Template | None":
+    """Return the Template with a dotted name in a module, or None."""
+    value: object = sys.modules.get(module)
     for part in name.split("."):
-        found = getattr(found, part, None)
-    return found
+        value = getattr(value, part, None)
+    return value if isinstance(value, Template) else None
 
 
-def _bind(module: str, name: str, gains: dict[str, float], called: str = "") -> Component:
+def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str = "") -> Component:
     importlib.import_module(module)
-    template = _at(module, name)
-    assert isinstance(template, Template)
-    bound = template.bind(gains)
-    return bound.named(called) if called and called != bound.name else bound
+    template = _template_at(module, qualname)
+    assert template is not None
+    component = template.bind(gains)
+    return component.named(name) if name and name != component.name else component
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Template:
-    """A function and what its author said of it.
+    """A function with the properties its decorator states.
 
     Attributes:
-      gains: name -> its default, unit and range.
+      gains: name -> default, unit and range.
       memory: floats of memory per channel.
       relative_degree: of the sliding variable that a law needs, or that a surface gives.
-      conditions: what a theorem asks of the gains, in words -> whether gains, read by attribute, satisfy it.
-      plants: names of the plants it is for; empty: every one.
-      requires_model: whether it cannot work without the nominal model.
-      label, short, colour: as its author gave them; "" means automatic, see `smc_mujoco.draw.style`.
-      rest: what linear theory needs to know of it; None: it is not linear at rest.
+      conditions: condition of a theorem, in words -> function of the gains, read by attribute, that tests it.
+      plants: names of the plants it is for; empty for all plants.
+      requires_model: whether it needs the nominal model.
+      label, short, colour: as in the decorator; "" means automatic, see `smc_mujoco.draw.style`.
+      rest: its linear part; None if it is not linear at rest.
     """
 
     kind: str
@@ -210,21 +210,21 @@ class Template:
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
 
     def __call__(self, **gains: float) -> Component:
-        """Bind the function to its gains, some of them changed. Errors and warnings as `bind`."""
+        """Return `bind(gains, warn=True)`."""
         return self.bind(gains, warn=True)
 
     def bind(self, gains: Mapping[str, float], warn: bool = False) -> Component:
-        """Bind the function to its gains, some of them changed.
+        """Bind the function to these gains, and to the defaults of the others.
 
         Args:
           gains: name -> value.
-          warn: whether to warn of gains that miss a condition.
+          warn: whether to warn of gains that violate a condition.
 
         Raises:
-          ScenarioError: unknown gain, not a finite number, or out of its range.
+          ScenarioError: an unknown gain, a value that is not a finite number or out of range.
 
         Warns:
-          GainWarning: gains that miss a condition of the theorem behind it.
+          GainWarning: gains violate a condition of the theorem.
         """
         values = self.defaults
         for key, value in gains.items():
@@ -235,10 +235,10 @@ class Template:
             least = 0.0 if gain.nonnegative else -math.inf
             infinite = math.isinf(gain.default)
             values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
-        for words, holds in self.conditions.items():
-            if warn and not _holds(holds, SimpleNamespace(**values)):
-                given = ", ".join(f"{name} = {value:g}" for name, value in values.items())
-                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {given}", GainWarning, users_frame())
+        for words, condition in self.conditions.items():
+            if warn and not _holds(condition, SimpleNamespace(**values)):
+                text = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
         return Component(
             kind=self.kind,
             name=self.name,
@@ -253,7 +253,7 @@ class Template:
 
 
 def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace) -> bool:
-    """Return whether gains satisfy a condition; no, where it cannot be computed."""
+    """Return whether gains satisfy a condition; False if it cannot be computed."""
     try:
         return condition(gains)
     except (ArithmeticError, ValueError):
@@ -261,30 +261,30 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
 
 
 def _gains(gains: object) -> dict[str, Gain]:
-    """Return gains as stated in a decorator, a number or a Gain each.
+    """Return the gains of a decorator, numbers or Gains, as Gains.
 
     Raises:
-      ScenarioError: no such mapping, a name or a default that is none, or a gain that is divided by an unknown one.
+      ScenarioError: not a mapping, a bad name or default, or a gain over an unknown one.
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    found: dict[str, Gain] = {}
+    checked: dict[str, Gain] = {}
     for key, value in (gains or {}).items():
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
-        found[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
-    for key, gain in found.items():
-        if gain.over is not None and gain.over not in found:
-            raise unknown(f"gain that {key} is divided by", gain.over, found)
-    return found
+        checked[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
+    for key, gain in checked.items():
+        if gain.over is not None and gain.over not in checked:
+            raise unknown(f"gain that {key} is divided by", gain.over, checked)
+    return checked
 
 
 def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
-    """Return the Template of a function, or the decorator that makes it where no function is given yet.
+    """Return the Template of a function, or its decorator if the function is None.
 
     Raises:
-      ScenarioError: an option that this kind of component does not have, or one out of its range.
+      ScenarioError: an option that this kind of component does not have, or that is out of range.
     """
     options = dict(options)
     for old, new in RENAMED.items():
@@ -308,13 +308,13 @@ def template(
     plants: Iterable[str] = (),
     **words: object,
 ) -> Callable[[Callable], Template]:
-    """Return a decorator that makes a Template of a function.
+    """Return a decorator that turns a function into a Template.
 
     Raises:
-      ScenarioError: a gain's name is no identifier, its default no number, memory no whole number in 1 .. 10000, or
-        the function's name longer than 100 characters.
+      ScenarioError: an option out of range. From the decorator: a function with other arguments, or with a name
+        longer than 100 characters.
     """
-    found = _gains(gains)
+    stated = _gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
@@ -327,9 +327,9 @@ def template(
         raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
-            if name not in found:
-                raise unknown("gain with a sign", name, found)
-            found[name] = dataclasses.replace(found[name], **{sign: True})
+            if name not in stated:
+                raise unknown("gain with a sign", name, stated)
+            stated[name] = dataclasses.replace(stated[name], **{sign: True})
 
     def decorate(function: Callable) -> Template:
         name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
@@ -341,7 +341,7 @@ def template(
             kind=kind,
             name=name,
             function=function,
-            gains=found,
+            gains=stated,
             memory=memory,
             relative_degree=relative_degree,
             conditions=dict(conditions or {}),
@@ -354,7 +354,5 @@ def template(
 
 def discover(package: str) -> dict[str, Template]:
     """Return every Template at the top level of a package's modules, by name."""
-    found: dict[str, Template] = {}
-    for module in modules(package):
-        found |= {value.name: value for value in vars(module).values() if isinstance(value, Template)}
-    return dict(sorted(found.items()))
+    values = [value for module in modules(package) for value in vars(module).values()]
+    return dict(sorted((value.name, value) for value in values if isinstance(value, Template)))

@@ -1,4 +1,4 @@
-"""Gains from a plant's own model: what a textbook's formula makes of its nominal f and g."""
+"""Gains from a plant's nominal f and g, by textbook formulas."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -13,12 +13,12 @@ STEP = 1e-6  # rad or m, and per second: of the central differences, about the c
 
 
 def linearised(plant: Plant) -> tuple[float, float, float]:
-    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; of a network, for its least stable channel.
+    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; for a network, of its least stable channel.
 
-    What a neighbour's motion does to a channel is no part of them.
+    The motion of neighbours is not included.
 
     Raises:
-      ScenarioError: a channel that no actuator pushes its own way: a joint that only moves with others.
+      ScenarioError: no nominal model, or a channel without an actuator.
     """
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
@@ -47,7 +47,7 @@ def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
 
 
 def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
-    """Design the law `lqr` for a plant at the origin: least integral of q[0] e^2 + q[1] de^2 + r u^2.
+    """Design the law `lqr` for a plant at the origin, for the least integral of q[0] e^2 + q[1] de^2 + r u^2.
 
     Args:
       of: a Plant or the name of one.
@@ -55,7 +55,7 @@ def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0)
       r: weight of the control.
 
     Raises:
-      ScenarioError: a weight out of its range, or a joint without an actuator.
+      ScenarioError: a weight out of range, or a joint without an actuator.
     """
     a1, a2, b = linearised(plant(of) if isinstance(of, str) else of)
     return law("lqr", q1=q[0], q2=q[1], r=r, a1=a1, a2=a2, b=b)

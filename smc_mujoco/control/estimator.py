@@ -1,7 +1,4 @@
-"""What a velocity estimator is: a pure function (y, gains, memory) -> velocity. They are found in their package.
-
-An estimator of higher order returns the pair (velocity, acceleration).
-"""
+"""Velocity estimators: pure functions (y, gains, memory) -> velocity, or -> (velocity, acceleration)."""
 
 import functools
 from collections.abc import Callable
@@ -14,7 +11,7 @@ Estimator = Component
 
 
 class Reading(NamedTuple):
-    """What an estimator sees of its channel at a sample, SI units."""
+    """The inputs of an estimator: its channel at a sample, in SI units."""
 
     dt: float  # control period
     x: float  # measured position
@@ -28,7 +25,7 @@ def estimator_function(**options: Unpack[Options]) -> Callable[[Callable], Templ
 def estimator_function(
     function: Callable | None = None, /, **options: Unpack[Options]
 ) -> Callable[[Callable], Template] | Template:
-    """Make an estimator of a function (y, gains, memory) -> velocity.
+    """Turn a function (y, gains, memory) -> velocity, or -> (velocity, acceleration), into an estimator.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.
     """
@@ -42,10 +39,10 @@ def catalogue() -> dict[str, Template]:
 
 
 def estimator(name: str, **gains: float) -> Estimator:
-    """Return the estimator `name`, with some of its gains changed.
+    """Return the estimator `name` with these gains.
 
     Raises:
-      ScenarioError: unknown estimator or gain, or a gain out of its range.
+      ScenarioError: an unknown estimator or gain, or a gain out of range.
     """
     return find("velocity estimator", name, catalogue()).bind(gains, warn=True)
 

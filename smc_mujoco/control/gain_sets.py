@@ -1,16 +1,16 @@
-"""Gains of the laws that the study compares, on its five plants, in sets.
+"""Sets of gains for the laws that the study compares, on its five plants.
 
-    law("duffing", "classical")                # as tuned by the rule of `tuning`, variation of u priced
+    law("duffing", "classical")                # tuned by the rule of `tuning`, with a cost of the variation of u
     law("duffing", "classical", "study")       # as first chosen
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6, kept whatever the results.
-- tuned: what `tuning` finds for every general law with 96 evaluations, with a price on the variation of u. The laws of
-  LAWS are tuned from three seeds, all others from one, so that the spread of tuning shows in their results. Three
-  tunings are three samples of it, however many runs take them in turn.
-- tracking: the same for the laws of LAWS, from one seed and without that price.
+- tuned: the result of `tuning` for every general law, with 96 evaluations and a cost of the variation of u. The laws of
+  LAWS are tuned from three seeds, so that their results show the spread of tuning; all others from one. Three tunings
+  are three samples of this spread, however many runs use them in turn.
+- tracking: the same for the laws of LAWS, from one seed and without that cost.
 - default: the law's own.
 
-The files of `tuned_gains/` hold each tuning whole, with history and versions; `make gains` makes them again.
+`tuned_gains/` contains the complete tunings, with history and versions. `make gains` computes them again.
 """
 
 import dataclasses
@@ -29,20 +29,20 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# What the report's first page compares: the four laws of the paper, the two that its first study added, and the first
-# law of each other family in the order of README's table, which was there before any of them was tuned.
+# The laws on the report's first page: the four of the paper, two added by its first study, and the first law of each
+# other family in README's table. The table was older than all tunings.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
 )  # fmt: skip
-SEEDS = {"tuned": 3, "tracking": 1}  # set -> from how many seeds the laws of LAWS are tuned
+SEEDS = {"tuned": 3, "tracking": 1}  # set -> number of seeds from which the laws of LAWS are tuned
 
-# The same law computed otherwise, or under the name of its published form: it takes the gains of the law itself.
+# Other implementations or names of a law -> the law, whose gains they use.
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
 FORMS["super_twisting_unclamped"] = "super_twisting"
-SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the first set, whose gains it was not given
+SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
-# The first set: plant -> law -> gains. Super-twisting's were found with its integral held within u_max, and are run so.
+# The set "study": plant -> law -> gains. Super-twisting was tuned with its integral limited to u_max, and runs so.
 STUDY: dict[str, dict[str, dict[str, float]]] = {
     "inverted_pendulum": {
         "observer_free": {"lam": 4.364, "k1": 9.708},
@@ -88,26 +88,28 @@ STUDY: dict[str, dict[str, dict[str, float]]] = {
 
 
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
-    """Return the law with its gains for a plant, from a set. It warns of no condition that these gains miss.
+    """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
     Args:
-      seed: of a run; run s takes the gains from tuning seed s modulo the number of seeds that the law was tuned from.
+      seed: of a run. It uses the gains from tuning seed `seed` modulo the number of seeds the law was tuned from.
 
     Raises:
-      ScenarioError: an unknown set, or one that has no gains for this law on this plant.
+      ScenarioError: an unknown set, or a set without gains for this law on this plant.
     """
     base = find_law(name)
     find("set of gains", gains, dict.fromkeys((*SETS, "default")))
     if gains == "default":
         return base
     machine = find_plant(plant) if isinstance(plant, str) else plant
-    tuned = FORMS.get(name, name)
-    found = _study(machine.name, name) if gains == "study" else _found(machine, tuned, gains, seed)
-    return dataclasses.replace(base, gains={gain: found.get(gain, value) for gain, value in base.gains.items()})
+    if gains == "study":
+        values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(machine.name)])
+    else:
+        values = _tuned(machine, FORMS.get(name, name), gains, seed)
+    return dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
 
 
 def general() -> tuple[str, ...]:
-    """List every law that can be a rival on some plant: those of LAWS, then all others by name."""
+    """List every law that can be compared on some plant: those of LAWS, then all others by name."""
     others = {name for name, each in catalogue().items() if not each.plants} - {"none", *FORMS, *LAWS}
     return *LAWS, *sorted(others)
 
@@ -133,12 +135,12 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
 
 
 def tunings(gains: str, name: str) -> int:
-    """Return from how many seeds a law was tuned for a set."""
+    """Return the number of seeds from which a law was tuned for a set."""
     return SEEDS[gains] if name in LAWS else 1
 
 
 def paper_plant(plant: object) -> str:
-    """Return the name of one of the paper's plants, which have gains; ScenarioError for any other plant."""
+    """Return the plant if it is the name of one of the paper's plants. Raise ScenarioError otherwise."""
     if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
@@ -149,30 +151,21 @@ def paper_plant(plant: object) -> str:
 
 
 def file(plant: str, name: str, objective: str, seed: int = 0) -> Path:
-    """Return where the tuning of a law on a plant for an objective from a seed is kept."""
+    """Return the file with the tuning of a law on a plant for an objective from a seed."""
     ending = f"-{seed}" if seed else ""
     return Path(__file__).parent / "tuned_gains" / objective / f"{plant}-{name}{ending}.json"
 
 
-def _study(plant: str, name: str) -> Mapping[str, float]:
-    laws = STUDY[paper_plant(plant)]
-    return find("law of the paper's study", SAME.get(name, name), laws)
-
-
-def _found(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:
+def _tuned(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:
     path = file(plant.name, name, OBJECTIVES[gains], seed % tunings(gains, name))
-    if not path.is_file():
-        raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {_cure(plant, name)}")
-    return _read(path)
-
-
-def _cure(plant: Plant, name: str) -> str:
-    """Return what to do about a law that a set has no gains for on a plant."""
+    if path.is_file():
+        return _read(path)
     example = next(iter(find_law(name).gains), "k")
-    own = f"give the law with gains of its own, as {name}({example}=...)"
+    cure = f"give the law with gains of its own, as {name}({example}=...)"
     if not plant.unscaled:
-        own += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
-    return f"{own}, or take default ones (--gains default)"
+        cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
+    cure += ", or take default ones (--gains default)"
+    raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
 
 
 @functools.cache

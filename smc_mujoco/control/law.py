@@ -1,16 +1,16 @@
-"""What a control law is: a pure function of one channel's measurement, its gains and its memory.
+"""Control laws: pure functions of one channel's measurement, of gains and of a memory.
 
     @law_function(gains={"lam": 6.0, "k1": 3.0})
     def my_law(y, gains, memory):
         s = y.de + gains.k1 * y.e
         return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
 
-The law runs once per control sample; its u is clipped to +-limit and held. It never sees the simulator: what it knows
-of the plant is the nominal f and g in its measurement.
+The law runs once per control sample. Its u is clipped to +-limit and held until the next sample. A law knows nothing of
+the simulator, and nothing of the plant except the nominal f and g in its measurement.
 
-Laws of this library are written in the wanted acceleration v of the error: `sliding` gives the sliding variable and the
-acceleration that keeps it, and `command` turns v into u, with the nominal model where the scenario gives it to the law,
-and as it stands where it does not (f = 0, g = 1).
+The laws of this library compute a desired acceleration v of the error. `sliding` returns the sliding variable and the
+acceleration that keeps it constant. `command` converts v to u: with the nominal model if the scenario gives it to the
+law, otherwise with f = 0 and g = 1.
 """
 
 import functools
@@ -30,7 +30,7 @@ Law = Component
 
 
 class Measurement(NamedTuple):
-    """What a law sees of its channel at a sample, SI units."""
+    """The inputs of a law: its channel at a sample, in SI units."""
 
     t: float  # time of the sample
     dt: float  # control period
@@ -43,24 +43,24 @@ class Measurement(NamedTuple):
     ddr: float
     f: float  # nominal f(x, v) of x'' = f + g u, at the measured x and v
     g: float
-    a: float = 0.0  # estimated acceleration; r'' where the estimator gives none
-    limit: float = math.inf  # bound on |u|: u_max, or what the channel's own motor gives
-    model: float = 0.0  # 1 where the scenario lets its law use f and g
-    surfaced: float = 0.0  # 1 where the scenario has a surface, and what it gives:
-    s: float = 0.0  # sliding variable
+    a: float = 0.0  # estimated acceleration; r'' if the estimator gives none
+    limit: float = math.inf  # bound on |u|: u_max, or the limit of the channel's motor
+    model: float = 0.0  # 1 if the scenario lets the law use f and g, else 0
+    surfaced: float = 0.0  # 1 if the scenario has a surface, else 0
+    s: float = 0.0  # sliding variable of the scenario's surface
     eq: float = 0.0  # acceleration of the error that keeps s constant
-    q: float = 0.0  # of the joint that moves with this one without an actuator of its own: measured position,
-    dq: float = 0.0  # velocity,
-    fq: float = 0.0  # and nominal q'' = fq + gq u; all 0 without such a joint
+    q: float = 0.0  # measured position of the joint without actuator that this one moves; 0 without such a joint
+    dq: float = 0.0  # its velocity
+    fq: float = 0.0  # its nominal q'' = fq + gq u
     gq: float = 0.0
 
 
 @njit
 def sliding(y, c):
-    """Return the sliding variable s, and the acceleration of the error that keeps it constant.
+    """Return the sliding variable s, and eq, the acceleration of the error that keeps s constant.
 
-    Those of the scenario's surface, eq included whether the law has the model or not; or s = de + c e, for which
-    eq = -c de: left out where the law has no model, as model-free laws are published without it.
+    Both are those of the scenario's surface, with the model and without. If the scenario has no surface, s = de + c e.
+    Then eq is -c de with the model and 0 without, because model-free laws are published without this term.
     """
     if y.surfaced != 0.0:
         return y.s, y.eq
@@ -69,7 +69,7 @@ def sliding(y, c):
 
 @njit
 def command(y, v):
-    """Return the u that gives the error the acceleration v: (v - f + r'') / g with the model, v without."""
+    """Return the u for the acceleration v of the error: (v - f + r'') / g with the model, v without."""
     if y.model == 0.0:
         return v
     return (v - y.f + y.ddr) / y.g
@@ -77,13 +77,13 @@ def command(y, v):
 
 @njit
 def input_gain(y):
-    """Return g as the law may know it: nominal with the model, 1 without."""
+    """Return g as the law knows it: nominal with the model, 1 without."""
     return y.g if y.model != 0.0 else 1.0
 
 
 @njit
 def sgn(a):
-    """Return the sign of a; 0 at 0."""
+    """Return the sign of a, with sgn(0) = 0."""
     return math.copysign(1.0, a) if a != 0.0 else 0.0
 
 
@@ -100,61 +100,62 @@ def law_function(**options: Unpack[LawOptions]) -> Callable[[Callable], Template
 def law_function(
     function: Callable | None = None, /, **options: Unpack[LawOptions]
 ) -> Callable[[Callable], Template] | Template:
-    """Make a law of a function (y, gains, memory) -> (u, s).
+    """Turn a function (y, gains, memory) -> (u, s) into a law.
 
     Args:
-      gains: name -> default value, or a Gain that says its unit and range too. `smc.tune` needs the units.
+      gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
       memory: floats of memory per channel. Default: 8.
-      positive, nonnegative: gains that must be greater than 0, or at least 0; a Gain can say it itself.
-      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 and 3 for laws of e.
-      conditions: what its theorem asks of the gains, in words -> whether gains satisfy it. A warning quotes the words.
-      plants: names of the plants that it is for; empty: every one.
-      requires_model: whether it cannot work without the nominal model, which a scenario then gives it by default.
-      label: its name in figures and tables. Default: the function's name.
-      short: its name in two or three letters. Default: initials.
-      colour: "#RRGGBB". Default: one of a palette, always the same.
-      rest: what linear theory needs to know, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
+      positive, nonnegative: names of gains that must be greater than 0, or at least 0. A Gain can state this itself.
+      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 or 3 for laws of e.
+      conditions: condition of the theorem, in words -> function of the gains, read by attribute, that tests it. A
+        warning quotes the words.
+      plants: names of the plants that the law is for. Default: all.
+      requires_model: whether the law needs the nominal model. A scenario then gives it by default.
+      label: name in figures and tables. Default: the function's name.
+      short: name in two or three letters. Default: initials.
+      colour: "#RRGGBB". Default: a colour of a palette, always the same.
+      rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
 
-    The function must be pure: what it is to remember goes into memory, what is to vary into gains. Compiled, it keeps
-    the globals and closed-over values that it was compiled with, and random numbers in it would come from a shared
-    generator. Each new function object is compiled once and stays in memory, about 2.5 MB, because numba frees no code:
-    give a gain other values instead of making a function for each. Ctrl-C does not stop a compiled law that never ends;
-    kill the process. A compiled law that calls itself without end crashes the process.
+    The function must be pure: state belongs in memory, parameters in gains. A compiled function keeps the values that
+    its globals and closure had at compilation, and its random numbers would come from a shared generator. Each new
+    function object is compiled once and occupies about 2.5 MB until the process ends, because numba never frees code.
+    So change the value of a gain instead of defining a function per value. Ctrl-C does not stop a compiled law with an
+    endless loop; kill the process. Endless recursion in a compiled law crashes the process.
 
     Returns:
-      A decorator; the decorated function called with gains, `my_law(lam=5.0)`, gives the Law of a Scenario.
+      A decorator. The decorated function, called with gains as in `my_law(lam=5.0)`, returns the Law of a Scenario.
     """
     return decorated("law", function, options)
 
 
 @functools.cache
 def catalogue() -> dict[str, Template]:
-    """Return every law found in smc_mujoco.control.laws, by name."""
+    """Return every law of smc_mujoco.control.laws, by name."""
     return discover("smc_mujoco.control.laws")
 
 
 def checked_name(law: Law) -> Law:
-    """Return the law; ScenarioError if it is a user's and has the name of one of the library."""
+    """Return the law. Raise ScenarioError if it is a user's with the name of a library law."""
     known = catalogue().get(law.name) if law.kind == "law" else None
     if known is None or law.function in (None, known.function):
         return law
     raise ScenarioError(
-        f"law {law.name!r} is yours and has the name of one of the library: call its function otherwise, or give "
+        f"law {law.name!r} is yours and has the name of one of the library: rename its function, or give "
         f"law.named('my_{law.name}')"
     )
 
 
 def law(name: str, **gains: float) -> Law:
-    """Return the law `name` of the library, with some gains changed. `law(...).named("slow")` gives it another name.
+    """Return the library's law `name` with these gains. `law(...).named("slow")` gives it another name.
 
     Raises:
-      ScenarioError: unknown law or gain, or a gain out of its range.
+      ScenarioError: an unknown law or gain, or a gain out of range.
     """
     return find("law", name, catalogue()).bind(gains, warn=True)
 
 
 def fits(law: Law | Template, plant: Plant) -> bool:
-    """Return whether a law is for a plant: for every plant, for one of its name, or for models of its kind."""
+    """Return whether a law is for a plant: by name, for models of the same kind, or because it is for all plants."""
     if not law.plants or plant.name in law.plants:
         return True
     known = [plants_known()[name] for name in law.plants if name in plants_known()]
@@ -162,10 +163,10 @@ def fits(law: Law | Template, plant: Plant) -> bool:
 
 
 def laws(plant: Plant | str | None = None) -> list[str]:
-    """List the names that `law` knows; with a plant, of the laws that are for it.
+    """List the names that `law` knows; with a plant, only those of laws for this plant.
 
-    A law without `plants` of its own is for every plant whose channels all have an actuator; `none` for every plant;
-    one for joints without an actuator for models of yours that have such joints too.
+    A law that names no plants is for every plant whose channels all have an actuator. `none` is for every plant. A law
+    for joints without an actuator is also for models of your own with such joints.
     """
     if plant is None:
         return list(catalogue())

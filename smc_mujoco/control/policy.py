@@ -1,10 +1,10 @@
-"""A policy as a law of the benchmark: scored like any other.
+"""Policies as laws of the benchmark, scored like any other law.
 
     trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(network)))
 
-A policy sees the positions and velocities that it has in an environment. In a network it is asked for each channel,
-with that channel's own. It must be a function of the observation alone: a memory of its own would go from channel to
-channel and from run to run. It is Python, so its runs take the reference loop.
+A policy observes the same positions and velocities as in an environment. On a plant of several channels it is called
+once per channel, with that channel's observation. It must be a function of the observation alone, because all channels
+and runs share it. A policy is Python, so its runs take the reference loop.
 """
 
 import copy
@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]
 CURE = "give a callable from an observation to an action"
 SCRIPT = "give TorchScript, as torch.jit.script(module).save writes it, and no state_dict"
-FORMATS = {  # suffix of a file -> library that reads it, what to give where it does not
+FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".onnx": ("onnxruntime", "give what torch.onnx.export writes"),
     ".pt": ("torch", SCRIPT),
     ".pth": ("torch", SCRIPT),
@@ -48,7 +48,7 @@ class Policy(Uncompiled):
     Attributes:
       act: the policy as a callable.
       name: of the law.
-      reference: whether the observation ends in r, r', r''.
+      reference: whether r, r' and r'' are at the end of the observation.
     """
 
     act: Act
@@ -65,10 +65,10 @@ class Policy(Uncompiled):
     def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
         """Return u, and 0 for s."""
         if math.isinf(y.limit):
-            raise ValueError("its action is in parts of a limit, and u_max is inf")
+            raise ValueError("its action is a fraction of u_max, and u_max is inf")
         state = [y.x, y.q, y.v, y.dq] if any((y.q, y.dq, y.fq, y.gq)) else [y.x, y.v]
-        given = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
-        u = np.asarray(self.act(given), float).ravel()
+        observation = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
+        u = np.asarray(self.act(observation), float).ravel()
         if len(u) != 1:
             raise ValueError(f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel")
         return float(u[0]) * y.limit, 0.0
@@ -76,7 +76,7 @@ class Policy(Uncompiled):
 
 @dataclasses.dataclass(frozen=True)
 class File:
-    """A policy in a file: plain data, which is pickled, and which differs as the file does."""
+    """A policy in a file. Two are equal if path and content are."""
 
     path: str
     digest: str  # of its bytes
@@ -91,12 +91,12 @@ def opened(file: File) -> Act:
     """Return the network in a file.
 
     Raises:
-      ScenarioError: its library is not installed, or does not read it; it takes more than an observation; the file
-        has changed.
+      ScenarioError: the file has changed, its library is not installed or cannot read it, or the network has other
+        inputs than one observation.
     """
     path = Path(file.path)
     if not path.is_file() or _digest(path) != file.digest:
-        raise ScenarioError(f"policy {path.name!r} is gone, or another than it was: call smc.policy again")
+        raise ScenarioError(f"policy {path.name!r} is gone or has changed: call smc.policy again")
     name, cure = FORMATS[path.suffix]
     library = _library(name, path.name)
     try:
@@ -104,28 +104,28 @@ def opened(file: File) -> Act:
     except ScenarioError:
         raise
     except Exception as error:
-        raise ScenarioError(f"policy {path.name!r} cannot be read ({_line(error)}): {cure}") from error
+        raise ScenarioError(f"policy {path.name!r} cannot be read ({one_line(str(error))}): {cure}") from error
 
 
 def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
-    """Return the network in a file of onnx."""
+    """Return the network in an ONNX file."""
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1  # a batch of one gains nothing from more, which would spin meanwhile
+    options.intra_op_num_threads = 1  # more would only spin: the batch is one observation
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    taken = session.get_inputs()
-    kind, shape = ONNX.get(taken[0].type), list(taken[0].shape)
-    if len(taken) != 1 or kind is None or len(shape) != 2 or (shape[0] != 1 and isinstance(shape[0], int)):
-        found = ", ".join(f"{one.name} {one.type} {one.shape}" for one in taken)
-        raise ScenarioError(f"policy {path.name!r} takes {found}: export it for one input of floats, of shape (1, n)")
-    return lambda observation: session.run(None, {taken[0].name: observation[None].astype(kind)})[0]
+    inputs = session.get_inputs()
+    dtype, shape = ONNX.get(inputs[0].type), list(inputs[0].shape)
+    if len(inputs) != 1 or dtype is None or len(shape) != 2 or (shape[0] != 1 and isinstance(shape[0], int)):
+        text = ", ".join(f"{each.name} {each.type} {each.shape}" for each in inputs)
+        raise ScenarioError(f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)")
+    return lambda observation: session.run(None, {inputs[0].name: observation[None].astype(dtype)})[0]
 
 
 def _torch(torch: ModuleType, path: Path) -> Act:
-    """Return the network in a file of torch."""
+    """Return the network in a torch file."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # that of TorchScript
+        warnings.simplefilter("ignore", DeprecationWarning)  # TorchScript is deprecated
         if path.suffix == ".pt2":
-            module = torch.export.load(str(path)).module()  # in the mode it was exported in: it refuses eval()
+            module = torch.export.load(str(path)).module()  # it keeps the mode of its export and refuses eval()
         else:
             module = torch.jit.load(str(path), map_location="cpu").eval()
     return functools.partial(_forward, torch, module)
@@ -133,11 +133,11 @@ def _torch(torch: ModuleType, path: Path) -> Act:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network:
-    """A copy of a torch module, on the CPU and in evaluation mode: training goes on without changing the law.
+    """A copy of a torch module, on the CPU and in evaluation mode. Further training does not change it.
 
     Attributes:
       module: the copy.
-      predicts: whether its method `predict` is asked, as that of a policy of stable-baselines3, and not itself.
+      predicts: whether to call its method `predict`, as of a policy of stable-baselines3, instead of itself.
     """
 
     module: Any
@@ -150,44 +150,44 @@ class Network:
         return _forward(sys.modules["torch"], self.module, observation)
 
     def __reduce__(self) -> tuple:
-        """Return what pickle and run keys hold: the module's bytes, its classes, and torch's version."""
-        torch, held = sys.modules["torch"], io.BytesIO()
+        """Return what pickle and run keys contain: the module's bytes, its classes, and torch's version."""
+        torch, file = sys.modules["torch"], io.BytesIO()
         _settle(self.module)
-        torch.save(self.module, held)
-        kinds = {type(part) for part in self.module.modules()}
-        ordered = sorted(kinds, key=lambda kind: (kind.__module__, kind.__qualname__))
-        return _restored, (held.getvalue(), tuple(ordered), torch.__version__, *[True] * self.predicts)
+        torch.save(self.module, file)
+        classes = {type(part) for part in self.module.modules()}
+        ordered = sorted(classes, key=lambda kind: (kind.__module__, kind.__qualname__))
+        return _unpickled, (file.getvalue(), tuple(ordered), torch.__version__, self.predicts)
 
 
-def _restored(held: bytes, kinds: tuple[type, ...], version: str, predicts: bool = False) -> Network:
-    """Return the Network that `Network.__reduce__` describes."""
-    return Network(_library("torch", "network").load(io.BytesIO(held), weights_only=False), predicts)
+def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts: bool) -> Network:
+    return Network(_library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts)
 
 
 def policy(act: Any, *, reference: bool = False) -> Law:
     """Return a policy as a law.
 
     Args:
-      act: one of: a callable from an observation to an action in parts of its limit, beyond which it saturates; an
-        object with a method `predict`, as a model of stable-baselines3, asked for its deterministic action; a torch
-        module, which is copied and put in evaluation mode, as is the policy of a model; the path of a file of onnx
-        (.onnx), of torch.export (.pt2) or of TorchScript (.pt, .pth, .ts).
-      reference: whether its observation ends in r, r', r'', as that of the task `track` does.
+      act: one of
+        - a callable from an observation to an action, a fraction of u_max that is clipped to -1 .. 1;
+        - an object with a method `predict`, such as a model of stable-baselines3, called for its deterministic action;
+        - a torch module, which is copied and put in evaluation mode, as is the policy of a model;
+        - the path of a file of ONNX (.onnx), torch.export (.pt2) or TorchScript (.pt, .pth, .ts).
+      reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
 
-    The observation is x, v, or x, q, v, q' of a joint with one that moves with it: a float64 array of a single
-    channel, for onnx and torch a batch of one in the network's own type. A policy that looks ahead makes and steps its
-    environments in its own thread: in another thread they would wait for the run to end, and the run for them.
+    The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
+    ONNX and torch get it as a batch of one in the network's own type. A policy that looks ahead must make and step its
+    environments in its own thread. In another thread they would wait for the run to end, and the run for them.
 
     Raises:
       ScenarioError: none of these, no such file, or a library that is not installed.
     """
     try:
-        asked, name = _callable(act)
+        function, name = _callable(act)
     except ScenarioError:
         raise
-    except Exception as error:  # the object's own: it does not even say whether it can be called
+    except Exception as error:  # of the object itself, when it is inspected
         raise ScenarioError(f"policy is {shown(act)}: {CURE}") from error
-    return law_function(Policy(asked, name, reference))()
+    return law_function(Policy(function, name, reference))()
 
 
 def _callable(act: Any) -> tuple[Act, str]:
@@ -199,11 +199,11 @@ def _callable(act: Any) -> tuple[Act, str]:
         if not path.is_file():
             raise ScenarioError(f"no policy {str(path)!r}: give the path of a file")
         file = File(str(path.resolve()), _digest(path))
-        opened(file)  # now, not in the run
+        opened(file)  # so that errors show now, not in the run
         return file, path.stem
     torch, name = sys.modules.get("torch"), type(act).__name__
     predicts = callable(getattr(act, "predict", None))
-    if predicts and not callable(act):  # a model of stable-baselines3 has its policy's own predict
+    if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
         act = getattr(act, "policy", act)
     elif not callable(act):
         raise ScenarioError(f"policy is {shown(act)}: {CURE}")
@@ -215,29 +215,29 @@ def _callable(act: Any) -> tuple[Act, str]:
         return Network(module.to("cpu").eval(), predicts), name
     except Exception as error:
         cure = "give a file, by torch.onnx.export"
-        raise ScenarioError(f"policy {name!r} cannot be copied ({_line(error)}): {cure}") from error
+        raise ScenarioError(f"policy {name!r} cannot be copied ({one_line(str(error))}): {cure}") from error
 
 
 def _predict(model: Any, observation: np.ndarray) -> Any:
-    """Return the action that a model predicts: what `predict` returns, or the first of a pair."""
-    found = model.predict(observation, deterministic=True)
-    return found[0] if isinstance(found, tuple) else found
+    """Return the action that a model predicts: the result of `predict`, or the first of a pair."""
+    action = model.predict(observation, deterministic=True)
+    return action[0] if isinstance(action, tuple) else action
 
 
 def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndarray:
-    """Return the output of a torch module for an observation, which it gets in the type of its own numbers."""
-    kind = next((p.dtype for p in module.parameters() if p.is_floating_point()), torch.float32)
+    """Return the output of a torch module for an observation, converted to the type of its parameters."""
+    dtype = next((p.dtype for p in module.parameters() if p.is_floating_point()), torch.float32)
     with torch.no_grad():
-        found = module(torch.as_tensor(observation[None], dtype=kind))
-    if isinstance(found, tuple | list | dict):
-        raise TypeError(f"it gave a {type(found).__name__}, not an action: wrap it in one that gives the action alone")
-    return found.double().numpy()
+        action = module(torch.as_tensor(observation[None], dtype=dtype))
+    if isinstance(action, tuple | list | dict):
+        raise TypeError(f"it gave a {type(action).__name__}, not an action: wrap it in one that gives the action alone")
+    return action.double().numpy()
 
 
 def _settle(module: Any) -> None:
-    """Ask a policy of stable-baselines3 for an action at 0, because it keeps the distribution of its last answer.
+    """Let a policy of stable-baselines3 predict at 0, because it stores the distribution of its last action.
 
-    After training the distribution has a graph, which cannot be copied; after a run it differs from run to run.
+    After training that distribution has a graph, which cannot be copied. After a run it depends on the run.
     """
     space = getattr(module, "observation_space", None)
     if space is not None and hasattr(module, "predict"):
@@ -248,13 +248,8 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _line(error: Exception) -> str:
-    """Return the text of another library's error on one line."""
-    return " ".join(str(error).split())[:200]
-
-
 def _library(name: str, what: str) -> ModuleType:
-    """Return a library, imported, or raise a ScenarioError that says how to install it."""
+    """Import a library, or raise a ScenarioError that says how to install it."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

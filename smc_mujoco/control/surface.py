@@ -1,7 +1,7 @@
-"""What a sliding surface is: a pure function (y, gains, memory) -> (s, eq). The surfaces are found in their package.
+"""Sliding surfaces: pure functions (y, gains, memory) -> (s, eq).
 
-A surface gives a first-order law the sliding variable s, of relative degree `relative_degree`, and eq, the acceleration
-of the error that keeps s constant: s' = 0 for e'' = eq. Letters as in laws.
+A surface gives a first-order law its sliding variable s, of relative degree `relative_degree`, and eq, the acceleration
+of the error that keeps s constant: s' = 0 for e'' = eq. Notation as in laws.
 """
 
 import functools
@@ -21,7 +21,7 @@ def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable], 
 def surface_function(
     function: Callable | None = None, /, **options: Unpack[SurfaceOptions]
 ) -> Callable[[Callable], Template] | Template:
-    """Make a surface of a function (y, gains, memory) -> (s, eq).
+    """Turn a function (y, gains, memory) -> (s, eq) into a surface.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree, conditions and label.
     """
@@ -35,10 +35,10 @@ def catalogue() -> dict[str, Template]:
 
 
 def surface(name: str, **gains: float) -> Surface:
-    """Return the surface `name`, with some of its gains changed.
+    """Return the surface `name` with these gains.
 
     Raises:
-      ScenarioError: unknown surface or gain, or a gain out of its range.
+      ScenarioError: an unknown surface or gain, or a gain out of range.
     """
     return find("surface", name, catalogue()).bind(gains, warn=True)
 

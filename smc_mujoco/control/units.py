@@ -2,9 +2,9 @@
 
     @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
-A unit is a product of powers of force F, position X and time T. Tuning takes F, X and T from the plant, and so finds
-where to search each gain (`smc_mujoco.analysis.tuning.search_space`). Tests convert gains by their units and compare:
-a law does the same in every system of units.
+A unit is a product of powers of force F, position X and time T. Tuning derives the bounds of each gain from its unit
+and from F, X and T of the plant (`smc_mujoco.analysis.tuning.search_space`). Tests use the units to check that a law
+behaves the same in every system of units.
 """
 
 import dataclasses
@@ -21,7 +21,7 @@ class Unit(NamedTuple):
     time: float = 0.0
 
     def of(self, scales: Mapping[str, float]) -> float:
-        """Return its size, from the sizes of F, X and T."""
+        """Return the size of the unit for these sizes of F, X and T."""
         return scales["F"] ** self.force * scales["X"] ** self.position * scales["T"] ** self.time
 
 
@@ -48,13 +48,13 @@ class Gain:
     """A gain of a law, a surface or an estimator.
 
     Attributes:
-      default: its value where none is given.
-      unit: its unit. A function of all gains, read by attribute, where an exponent among them decides it. None: a
-        number without a unit, or not known; tuning refuses to search it.
+      default: value if none is given.
+      unit: a function of all gains, read by attribute, if an exponent among them decides the unit. None: a number
+        without a unit, or an unknown unit; tuning refuses to search it.
       positive: whether it must be greater than 0.
       nonnegative: whether it must be at least 0.
-      held: whether tuning keeps it as it is: an initial value, an exponent, a table's size, a processor's range.
-      over: name of the gain that the law divides it by, b of the force k / b. Tuning then takes no k above u_max b.
+      held: whether tuning leaves it at its default, such as an initial value, an exponent or the size of a table.
+      over: name of the gain that the law divides it by, b in the force k / b. Tuning then bounds k by u_max b.
     """
 
     default: float
@@ -65,7 +65,7 @@ class Gain:
     over: str | None = None
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
-        """Return the unit for these values of all gains."""
+        """Return the unit at these values of all gains."""
         return self.unit(SimpleNamespace(**gains)) if callable(self.unit) else self.unit
 
 

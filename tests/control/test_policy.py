@@ -177,7 +177,7 @@ def test_a_file_that_changed_before_its_run_is_not_taken_for_what_it_was(tmp_pat
     law = smc.policy(tmp_path / "net.onnx")
     (tmp_path / "net.onnx").write_bytes(b"second")
     policy.opened.cache_clear()  # as in another process
-    assert "'net.onnx' is gone, or another than it was: call smc.policy again" in str(briefly(law).failure)
+    assert "'net.onnx' is gone or has changed: call smc.policy again" in str(briefly(law).failure)
 
 
 @pytest.mark.parametrize(
