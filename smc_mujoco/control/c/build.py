@@ -1,4 +1,4 @@
-"""Compile C with the system's compiler into a shared library, and say its errors in one sentence."""
+"""Compile C into a shared library with the system's compiler, and report its errors in one sentence."""
 
 import atexit
 import functools
@@ -20,20 +20,20 @@ HERE = Path(__file__).parent
 HEADER = HERE / "smc_law.h"
 INPUTS = len(Measurement._fields)  # numbers in a measurement
 PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
-# The same arithmetic as compiled Python: no products and sums fused into one rounding.
+# The same arithmetic as compiled Python: no fused multiply-add.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
-# A library calls its own functions and uses its own data, also where C has the name: remove, y0, timezone.
+# A library uses its own functions and data even if the C library has the same names, such as remove, y0, timezone.
 OWN_NAMES = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
-# For a trial: a step beyond an array, or what C leaves undefined, ends the process with a report.
+# For a trial: an access beyond an array or undefined behaviour ends the process with a report.
 SANITIZERS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 WARNINGS = ("-Wall", "-Wextra")
-# Warnings of compilers that are errors here.
+# Compiler warnings that are errors here.
 STRICT = tuple(
     f"-Werror={name}" for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
 )
 ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE)
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
-# Lines of `nm -f sysv`. A number that the compiler adds to a variable's name is left out.
+# Lines of `nm -f sysv`, without the number that the compiler appends to a static variable's name.
 FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
 DATA = re.compile(r"^(\S+?)(?:\.\d+)? *\|([0-9a-f]+)\| +[bBdDuV] +\| +OBJECT\|([0-9a-f]+)\|", re.MULTILINE)
 
@@ -42,22 +42,22 @@ _count = itertools.count()
 
 @functools.cache
 def folder() -> Path:
-    """Return a folder for what is compiled. It stays until the process ends.
+    """Return the folder for compiled files, which is removed when the process ends.
 
-    A file that is deleted earlier gives its number to a new one, which the loader then takes for the old one.
+    No file is deleted earlier: a new file could get its inode number, and the loader would take it for the old one.
     """
-    path = tempfile.mkdtemp(prefix="smc_mujoco-")
-    atexit.register(_remove, path, os.getpid())
+    path, owner = tempfile.mkdtemp(prefix="smc_mujoco-"), os.getpid()
+
+    @atexit.register
+    def remove() -> None:
+        if os.getpid() == owner:  # a forked child leaves its parent's files
+            shutil.rmtree(path, ignore_errors=True)
+
     return Path(path)
 
 
-def _remove(path: str, owner: int) -> None:
-    if os.getpid() == owner:  # a forked child leaves its parent's files
-        shutil.rmtree(path, ignore_errors=True)
-
-
 def fresh(suffix: str) -> Path:
-    """Return a file name that nothing had before."""
+    """Return a new file name in `folder()`."""
     return folder() / f"{os.getpid()}-{next(_count)}{suffix}"
 
 
@@ -66,15 +66,15 @@ def compiler() -> list[str]:
     command = os.environ.get("CC", "")
     try:
         return shlex.split(command) or ["cc"]
-    except ValueError:  # a quotation without an end: there is no such program
+    except ValueError:  # an unclosed quotation mark: no such program
         return [command]
 
 
 def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
-    """Compile a C file, with the glue that calls `symbol` in it, and return the library and the compiler's warnings.
+    """Compile a C file with the glue that calls its function `symbol`. Return the library and the warnings.
 
     Raises:
-      ScenarioError: there is no compiler, it needs too long, or it finds an error.
+      ScenarioError: there is no compiler, it takes too long, or it reports an error.
     """
     path, target, command = str(source.resolve()), fresh(".so"), compiler()
     if set('"\\\n') & set(path):
@@ -100,7 +100,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
 
 @functools.cache
 def replayer(command: tuple[str, ...]) -> Path | None:
-    """Return the program of `replay.c` with a compiler's sanitizers, or None where it has none that work."""
+    """Return `replay.c`, compiled with a compiler's sanitizers; None if these do not work."""
     target = fresh(".exe")
     line = [*command, *SANITIZERS, f"-DSMC_INPUTS={INPUTS}", str(HERE / "replay.c"), "-o", str(target), "-ldl"]
     try:
@@ -112,10 +112,7 @@ def replayer(command: tuple[str, ...]) -> Path | None:
 
 
 def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, int]]]:
-    """Return a law's address in its library, and name, address and size of the library's static data.
-
-    nm tells them. The data is what the law may change, without constants.
-    """
+    """Return a law's address in its library, and (name, address, size) of the library's writable static data, by nm."""
     try:
         table = timed(["nm", "-f", "sysv", str(library)], 60.0).stdout
     except (Late, OSError):
@@ -126,7 +123,7 @@ def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, i
 
 
 def undefined(source: str, symbol: str) -> str:
-    """Return the sentence for a file without the law's function."""
+    """Return the error message for a file without the law's function."""
     return f"{source} has no function {symbol}: define {_prototype(symbol)}"
 
 
@@ -134,14 +131,14 @@ def _prototype(symbol: str) -> str:
     return PROTOTYPE.replace("smc_law(", f"{symbol}(")
 
 
-def _sentence(source: Path, symbol: str, command: str, said: str) -> str:
-    """Return the first error of a compiler, with a cure."""
-    error, name = ERROR.search(said), source.name
+def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
+    """Return the first error in a compiler's output, with a cure."""
+    error, name = ERROR.search(output), source.name
     what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
-    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", said):
+    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", output):
         return undefined(name, symbol)
-    if error is None or error["line"] is None:  # of the linker, or of the command
-        lines = [line for line in said.splitlines() if line.strip()] or ["it says nothing"]
+    if error is None or error["line"] is None:  # from the linker or the command itself
+        lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
         return f"{name} does not compile, {command} says: {telling[0].strip()}; mend it, or give other flags="
     if f"'{symbol}'" in what or file == "glue.c":

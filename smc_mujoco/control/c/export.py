@@ -1,8 +1,8 @@
-"""Write laws out as C99: one file without dependencies, with the signature of `smc_law.h`.
+"""Export laws to C99: one file without dependencies, with the signature of `smc_law.h`.
 
-The C is translated from the law's own Python, operation by operation. In double precision it gives the bits of the
-compiled law where the functions of the C library are the same. A division by zero raises nothing in C: it gives inf or
-NaN, which ends a run too.
+The C is translated from the law's Python, operation by operation. In double precision it equals the compiled law bit
+for bit if both use the same C library. A division by zero raises nothing in C: it gives inf or NaN, which ends a run
+too.
 """
 
 import functools
@@ -27,14 +27,14 @@ SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of 
 
 
 def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
-    """Return a law as one file of C99, with its gains as defaults. `smc.law_from_c` reads it back.
+    """Return a law as one C99 file, with its gains as defaults. `smc.law_from_c` can load it.
 
     Args:
       law: a Law, its Template, or its name.
-      numbers: "double", "float", or "q15", which is for the paper's law, observer_free: words of 16 bits.
+      numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
 
     Raises:
-      ScenarioError: no such law or numbers, or it uses Python that has no translation, which is named.
+      ScenarioError: no such law or type of numbers, or the law uses Python without translation, which is quoted.
     """
     if numbers not in BYTES:
         raise unknown("type of numbers", numbers, BYTES)
@@ -59,7 +59,7 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
 
 
 def _in_q15(law: Component) -> Component:
-    """Return the fixed-point law with the gains of a law: itself, or the paper's."""
+    """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point itself."""
     if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
         law = catalogue()[Q15].bind(law.gains, warn=True)
     if law.function is not catalogue()[Q15].function:
@@ -70,7 +70,7 @@ def _in_q15(law: Component) -> Component:
 
 
 def _fixed_point(law: Component) -> str:
-    """Return the fixed-point law with its table and the words of its gains."""
+    """Return the C of the fixed-point law, with its table and the words of its gains."""
     from smc_mujoco.control.laws import observer_free_q15 as q15
 
     gains, word = law.gains, q15.word.py_func
@@ -85,7 +85,7 @@ def _fixed_point(law: Component) -> str:
 
 
 def _facts(law: Component, slots: int) -> str:
-    """Return the header, the names of the gains, and the constants with which the file describes its law."""
+    """Return the header, the names of the gains, and the constants that describe the law."""
     names = ", ".join(f"GAIN_{plain(name)}" for name in law.gains)
     defaults = ",".join(f"{plain(name)}={value!r}" for name, value in law.gains.items())
     lines = [
@@ -124,13 +124,13 @@ def _head(law: Component, numbers: str, slots: int, size: str) -> str:
 
 @functools.cache
 def _tools(command: tuple[str, ...]) -> tuple[str, str]:
-    """Return a compiler's version, and the program that tells the sizes of what it makes."""
+    """Return a compiler's version, and the program that prints the sizes of an object file."""
     version = timed([*command, "-dumpversion"], 60.0).stdout.strip()
     return version, timed([*command, "-print-prog-name=size"], 60.0).stdout.strip() or "size"
 
 
 def _measured(code: str) -> str:
-    """Return the bytes of code and of constants, where there are a compiler and its `size`."""
+    """Return the bytes of code and of constants in words, or why they are not measured."""
     source, target, command = build.fresh(".c"), build.fresh(".o"), build.compiler()
     source.write_text(code)
     try:

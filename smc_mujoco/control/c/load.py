@@ -1,8 +1,8 @@
 """Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
 
-`smc_law.h`, beside this file, describes the C function. A file is compiled together with a few lines that call it as
-the callback calls laws, so that a law of another type is a compiler's error. A shared library is called as it is. What
-can hang or crash is tried in a process of its own first: loading, smc_setup, and where asked the law itself.
+`smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`, which calls the law
+the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Whatever
+can hang or crash is tried in a separate process first: loading, smc_setup and, on request, the law itself.
 """
 
 # pyright: reportCallIssue=false
@@ -36,7 +36,7 @@ DEFAULT_MEMORY = 8
 class CLaw(AtAddress):
     """A law in C: called by its address in the callback, and through ctypes in the reference loop.
 
-    Two laws are equal where their machine code is, and so all that went into it: file, headers, flags, compiler.
+    Two laws are equal if their machine code is, and so file, headers, flags and compiler.
     """
 
     def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
@@ -48,12 +48,12 @@ class CLaw(AtAddress):
         if not hasattr(self.library, "smc_mujoco_entry"):
             self._trampoline = _trampoline(self.address)
             self.address = self._trampoline.address
-        self.sizes = 0, 1  # how many gains and numbers of memory
+        self.sizes = 0, 1  # number of gains and of memory slots
         self.__name__ = re.sub(r"\W", "_", path.stem)
         self.__module__, self.__doc__ = path.name, doc
 
     def __call__(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
-        """Return u and s. ArithmeticError where the C function returns anything but 0."""
+        """Return u and s. Raise ArithmeticError if the C function returns anything but 0."""
         out = sandbox.doubles([math.nan] * 2)
         code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
         if code != 0:
@@ -62,7 +62,7 @@ class CLaw(AtAddress):
         return out[0], out[1]
 
     def set_up(self, gains: int, memory: int, name: str | None) -> None:
-        """Call smc_setup, and set the name and how many gains and numbers of memory there are."""
+        """Call smc_setup, and set the name and the number of gains and of memory slots."""
         if code := sandbox.set_up(self.library):
             raise ScenarioError(f"{self.path.name}: smc_setup returned {code}: mend it")
         self.sizes, self.__name__ = (gains, memory), name or self.__name__
@@ -78,17 +78,17 @@ class CLaw(AtAddress):
         return hash(self._identity())
 
     def _identity(self) -> tuple:
-        """Return what distinguishes it. A copy, pickled or loaded again, is the same law."""
+        """Return the key of equality: a copy, pickled or loaded again, is the same law."""
         return self.digest, self.sizes, self.__name__
 
     def __reduce__(self):
-        """Pickle the machine code: another process runs this law, whatever its file holds by then."""
+        """Pickle the machine code: another process runs this law even if its file has changed."""
         return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
 
 
 @functools.cache
 def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: str, doc: str | None) -> CLaw:
-    """Return the law of another process, loaded once in this one."""
+    """Return a law from another process, loaded once in this one."""
     copy = build.fresh(".so")
     copy.write_bytes(code)
     try:
@@ -107,7 +107,7 @@ def _trampoline(address: int) -> Function:
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
-        output[0], output[1] = math.nan, math.nan  # a number that the law leaves out ends its run
+        output[0], output[1] = math.nan, math.nan  # a result that the law does not set ends its run
         return call_int(address, y, g, m, out)
 
     return Function(native)
@@ -129,34 +129,35 @@ def law_from_c(
     plants: Iterable[str] = (),
     modelled: bool | None = None,
 ) -> Template:
-    """A law of your own in C, running in MuJoCo's control callback at the speed of the built-in ones.
+    """Load a law of your own in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
 
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
         `smc_law.h`, which the file may include, describes the function.
-      gains: name -> default or Gain, in the order of the function's gains[]. A file with smc_law_gains has names and
-        defaults itself; these then change the defaults.
-      memory: numbers of state per channel; where left out what the file says in smc_law_memory, or 8.
-      name: of the law; the file's where left out.
+      gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
+        change its defaults.
+      memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.
+      name: of the law. Default: the file's name.
       symbol: the function's name.
-      flags: more for the compiler: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
-      isolate: whether to try the law first in a process of its own, on short runs of a double integrator. One sentence
-        says where it crashes, hangs, returns NaN, reads gains that have no name, writes beyond its memory or keeps
-        state elsewhere.
-      timeout: s, for each of the compiler, the set-up and the trial.
-      positive, nonnegative, degree, plants, modelled: as of `smc.law_function`; where degree and modelled are left
-        out, what the file says in smc_law_degree and smc_law_modelled.
+      flags: additional compiler flags or files: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
+      isolate: whether to try the law first in a separate process, on short runs of a double integrator. The error is
+        one sentence that says where the law crashes, hangs, returns NaN, reads gains without a name, writes beyond its
+        memory or keeps state elsewhere.
+      timeout: s, for each of compilation, set-up and trial.
+      positive, nonnegative, plants: as in `smc.law_function`.
+      degree, modelled: relative_degree and requires_model of `smc.law_function`. Default: smc_law_degree and
+        smc_law_modelled of the file.
 
     Returns:
-      A Template, called with gains for the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It is the code of now:
-      after an edit of the file call this again. Pickled, it takes its machine code along.
+      A Template. Called with gains it returns the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It does not
+      follow later edits of the file: call `law_from_c` again. A pickle contains the machine code.
 
     Raises:
-      ScenarioError: no such file or function, what does not compile or has another type, a set-up that fails, crashes
-        or does not end, and with isolate a law that does.
+      ScenarioError: no such file or function, a compiler error, a function of another type, a set-up that fails,
+        crashes or does not end, and with isolate a law that does.
 
-    C is not checked while it runs. A law that reads or writes where it should not takes the whole process down, or
-    changes a neighbour's numbers; one that does not return hangs it. Try what is new with isolate=True, or with
+    Nothing checks C while it runs. A law that accesses other memory crashes the process or changes the numbers of
+    other runs; one that does not return hangs it. Try a new law with isolate=True, or with
     `smc-mujoco check-c my_law.c`.
     """
     if name is not None:
@@ -179,7 +180,7 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Yield lines on a law that passes its trial, without loading it: warnings, what was not seen, gains and memory.
+    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory.
 
     Arguments and errors are those of `law_from_c`.
     """
@@ -194,7 +195,7 @@ def check(
 
 
 def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: float) -> sandbox.Library:
-    """Return the library of a law, compiled where it is a .c file. Arguments and errors are those of `law_from_c`."""
+    """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
     if not isinstance(source, str | Path):
         raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
     path = Path(source)
@@ -211,14 +212,14 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
         file, warnings = build.library(path, symbol, flags, timeout)
         return sandbox.Library(file, path, symbol, flags, timeout, warnings)
     try:
-        copy = shutil.copy(path, build.fresh(path.suffix))  # so that a library that was built again is loaded again
+        copy = shutil.copy(path, build.fresh(path.suffix))  # so that a rebuilt library is loaded again
     except OSError as error:
         raise ScenarioError(f"{path} cannot be read ({error.strerror}): give one that can") from None
     return sandbox.Library(Path(copy), path, symbol, flags, timeout)
 
 
 class About(NamedTuple):
-    """What a law is called with, and what it is."""
+    """Properties of a law in C."""
 
     gains: dict[str, float | Gain]
     memory: int
@@ -238,7 +239,7 @@ def _about(
     degree: int | None,
     modelled: bool | None,
 ) -> About:
-    """Try to load a library, and return what its file says of its law, changed by what is given."""
+    """Return the properties of a library's law: the arguments, or else what the file states."""
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     facts, file, gains = sandbox.load(library), library.path.name, dict(gains or {})
@@ -258,23 +259,23 @@ def _about(
 
 
 def parsed_gains(text: str, what: str) -> dict[str, float]:
-    """Return gains that are given as text, such as "lam=6,k1=3"; `what` names the text in errors."""
-    found: dict[str, float] = {}
+    """Return the gains in a text such as "lam=6,k1=3". `what` names the text in errors."""
+    parsed: dict[str, float] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
         name, equals, value = (word.strip() for word in part.partition("="))
-        if name in found:
+        if name in parsed:
             raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
         try:
-            found[name] = float(value)
+            parsed[name] = float(value)
         except ValueError:
-            found[name] = math.nan
-        if not (equals and name.isidentifier()) or math.isnan(found[name]):
+            parsed[name] = math.nan
+        if not (equals and name.isidentifier()) or math.isnan(parsed[name]):
             raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
-    return found
+    return parsed
 
 
 def _first_comment(path: Path) -> str | None:
-    """Return the comment that a C file begins with."""
+    """Return the comment at the top of a C file."""
     text = path.read_text(encoding="utf-8", errors="replace") if path.suffix == ".c" else ""
     found = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
     return re.sub(r"^ ?\* ?", "", found[1], flags=re.MULTILINE).strip() if found else None

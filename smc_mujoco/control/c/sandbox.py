@@ -1,8 +1,8 @@
-"""Try a law's library in a process of its own, which it may take down, and say in one sentence how that ended.
+"""Try a law's library in a separate process, which may crash, and report the result in one sentence.
 
-The process runs this file as a script: it loads the library, sets it up, calls the law where asked, and unloads it.
-It writes its progress to a file, whose last line names what was going on when it died, or what it found. A script
-cannot import smc_mujoco quickly, so the functions that start the process import what they need of it themselves.
+The process runs this file as a script: it loads the library, sets it up, calls the law on request, and unloads it. It
+writes its progress to a file. The last line names the step in which the process died, or the result. The script must
+start quickly, so the functions that start it, and only they, import smc_mujoco.
 """
 
 import contextlib
@@ -19,15 +19,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms in each of the runs, and in the longest
-LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of the times of two in a row: to 15 hours
-MAX_POSITION = 3.0  # where a stop holds the double integrator, which a law need not stabilise
-GUARD, GUARDS = -7.25, 512  # a value that no law writes by chance; how many stand on either side of its numbers
-MORE_GAINS = 16  # beyond those that have names, to see whether the law reads them
-BEYOND = 2**40  # the code of glue.c for a law of floats that wrote beyond its memory; one more: beyond out
-ALTERED = BEYOND + 2  # the code of glue.c for a law that changed the arithmetic of its thread
+STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
+LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
+MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
+GUARD, GUARDS = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
+MORE_GAINS = 16  # additional gains, which detect a law that reads them
+BEYOND = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
+ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thread
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
-FAULTS = {  # code -> what the law did, for its size of memory, and the cure
+FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
     BEYOND + 1: ("writes beyond the two numbers of out", "write out[0] and out[1] alone"),
     ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
@@ -36,24 +36,24 @@ SHARED = "which all channels and simulations share, on several threads"
 NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
-# What a law does that ends by these signals. By others most read, write or divide.
+# Signal -> its usual cause in a law. The causes of other signals are reads, writes and divisions.
 SIGNALS = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
-# Lines of the sanitizers: undefined behaviour; a kind of access, and the functions that it happened in.
+# Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
 UNDEFINED = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
 ACCESS = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
 FRAME = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
 
 
 class Library(NamedTuple):
-    """A law's library that this process has not loaded.
+    """A law's library, not loaded into this process.
 
     Attributes:
-      file: the library; compiled, or a copy.
-      path: the file that the user gave.
-      symbol: the law's function.
-      flags: more for the compiler.
-      timeout: s, for a process that tries it.
-      warnings: the compiler's.
+      file: the library, compiled or copied.
+      path: the user's file.
+      symbol: name of the law's function.
+      flags: additional compiler flags.
+      timeout: of a trial, s.
+      warnings: of the compiler.
     """
 
     file: Path
@@ -65,25 +65,25 @@ class Library(NamedTuple):
 
 
 def load(library: Library) -> dict[str, Any]:
-    """Load, set up and unload a library in a process of its own, and return what its file says of its law.
+    """Load, set up and unload a library in a separate process, and return the constants that describe its law.
 
     Raises:
-      ScenarioError: it crashed, did not end in time, or did what a law must not.
+      ScenarioError: the process crashed, did not end in time, or found a fault.
     """
     return _run(library, None)
 
 
 def call(library: Library, fields: Sequence[str], gains: Sequence[float], memory: int, modelled: bool) -> list[str]:
-    """Call a law in a process of its own, then with sanitizers, and return sentences on what could not be seen.
+    """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
 
     Args:
       fields: names of the numbers in a measurement.
-      gains: their values.
-      memory: how many numbers of state it has.
-      modelled: whether it cannot do without the nominal model.
+      gains: values of the gains.
+      memory: number of state variables.
+      modelled: whether the law needs the nominal model.
 
     Raises:
-      ScenarioError: as of `load`.
+      ScenarioError: as in `load`.
     """
     from smc_mujoco.control.c import build
 
@@ -100,7 +100,7 @@ def call(library: Library, fields: Sequence[str], gains: Sequence[float], memory
 
 
 def _run(library: Library, trial: dict | None) -> dict[str, Any]:
-    """Run this file as a script, and return what it says of the law at its end."""
+    """Run this file as a script, and return the constants that it prints at its end."""
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.common.process import Late, timed
     from smc_mujoco.control.c import build
@@ -129,18 +129,18 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
 
 
 def _ended(code: int | None, timeout: float) -> str:
-    """Say how a process ended: with an exit code, by a signal, or not in time."""
+    """Return in words how a process ended: by an exit code, a signal or the timeout."""
     if code is None:
         return f"did not end within {timeout:g} s: mend what it waits for, or give timeout="
     if code >= 0:
         return f"ended the process with exit code {code}: let it return"
-    names = {known.value: known.name for known in signal.Signals}  # without most of the real-time ones
+    names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
     name, does = names.get(-code, f"signal {-code}"), SIGNALS.get(-code, "reads, writes or divides")
     return f"died of {name} ({signal.strsignal(-code)}): mend where it {does}"
 
 
 def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
-    """Repeat the calls of a trial with sanitizers. Return why that is not possible, or an empty text."""
+    """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.common.process import Late, timed
     from smc_mujoco.control.c import build
@@ -172,11 +172,11 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     raise ScenarioError(f"{name} does harm in {where}: {what}; mend it")
 
 
-# Libraries through ctypes: in the script, and where smc_mujoco loads a law
+# libraries through ctypes, in the script and in the process that runs the law
 
 
 def entry(path: str, symbol: str):
-    """Return the function of a library as ctypes calls it, and the library."""
+    """Return the law's ctypes function, and its library."""
     library = ctypes.CDLL(path, mode=getattr(os, "RTLD_NOW", 0) | getattr(os, "RTLD_LOCAL", 0))
     glued = hasattr(library, "smc_mujoco_entry")
     function = getattr(library, "smc_mujoco_entry" if glued else symbol)
@@ -185,21 +185,21 @@ def entry(path: str, symbol: str):
 
 
 def facts(library) -> dict[str, str | int]:
-    """Return what a file says of its law, by the names in smc_law.h, and whether the glue is in it."""
-    found: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
+    """Return the constants of smc_law.h that a library defines, and whether it contains the glue."""
+    constants: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
     if hasattr(library, "smc_law_gains"):
         text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "smc_law_gains")))
-        found["smc_law_gains"] = text.decode(errors="replace")
-    return found | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
+        constants["smc_law_gains"] = text.decode(errors="replace")
+    return constants | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
 
 
 def set_up(library) -> int:
-    """Call smc_setup where there is one, and return its code."""
+    """Return the result of smc_setup; 0 if the library has none."""
     return int(library.smc_setup()) if hasattr(library, "smc_setup") else 0
 
 
 def set_sizes(library, gains: int, memory: int) -> None:
-    """Tell the glue how many gains and numbers of memory there are."""
+    """Set the number of gains and of memory slots in the glue, if the library contains it."""
     if hasattr(library, "smc_mujoco_entry"):
         ctypes.c_int.in_dll(library, "smc_mujoco_gains").value = gains
         ctypes.c_int.in_dll(library, "smc_mujoco_memory").value = memory
@@ -210,15 +210,15 @@ def doubles(values) -> ctypes.Array:
     return (ctypes.c_double * len(values))(*values)
 
 
-# The script
+# the script
 
 
 class Fault(Exception):
-    """What is wrong with a law, in words."""
+    """A fault of a law, in words."""
 
 
 def arithmetic() -> bytes:
-    """Return bits of results that another rounding or flush-to-zero changes. An enabled trap ends the process."""
+    """Return results that depend on rounding and flush-to-zero. An enabled trap ends the process."""
     one, half, big, inf, zero, ulp, normal, tiny = 1.0, 0.5, 1e308, math.inf, 0.0, 2.0**-52, 2.0**-1022, 2.0**-1074
     with contextlib.suppress(ValueError):
         math.pow(zero, -one)  # divides by zero
@@ -229,7 +229,7 @@ STANDARD = arithmetic()
 
 
 class Fenced:
-    """Numbers between guards, which no law may write."""
+    """An array between guards, which a law must not write."""
 
     def __init__(self, values, guard: float = GUARD):
         edge = [guard] * GUARDS
@@ -238,7 +238,7 @@ class Fenced:
         self.before = self.guards()
 
     def guards(self) -> bytes:
-        """Return the guards, bit by bit."""
+        """Return the bytes of the guards."""
         whole = bytes(self.whole)
         return whole[: 8 * GUARDS] + whole[-8 * GUARDS :]
 
@@ -248,12 +248,13 @@ class Fenced:
 
 
 class Trial:
-    """Runs of a law on a double integrator x'' = u, and calls far away from it.
+    """Runs of a law on a double integrator x'' = u, and calls far outside of them.
 
     Args:
-      law, library: as of `entry`.
-      order: fields, gains, memory and modelled as of `call`; the static data and where the file has the law; a file for
-        the gains and for the measurement of each call, which `replay.c` reads.
+      law, library: as returned by `entry`.
+      order: fields, gains, memory and modelled as in `call`; "data" and "anchor", the static data and the law's address
+        in the file.
+      calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
     """
 
     def __init__(self, law, library, order, calls):
@@ -263,13 +264,13 @@ class Trial:
         self.data = [(name, base + place, size) for name, place, size in order["data"]]
         self.data_before = self.static_data()
         self.y, self.out = Fenced([0.0] * len(self.fields)), Fenced([0.0] * 2)
-        self.gains = Fenced(order["gains"], math.nan)  # where the law reads more gains than it has, u is NaN
+        self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
         self.gains_before = bytes(self.gains.whole)
         calls.write(bytes(self.gains.own))
         self.random = random.Random(0)
 
     def all(self) -> None:
-        """Make every kind of run, and calls at the end of the finite world, where a law may give up."""
+        """Make every kind of run, and calls at very large errors, at which a law may return an error."""
         steps = LONG_STEPS
         for model in (1.0,) if self.modelled else (0.0, 1.0):
             for surfaced in (0.0, 1.0):
@@ -282,7 +283,7 @@ class Trial:
         self.check_static_data()
 
     def run(self, model: float, surfaced: float, x: float, steps: int) -> None:
-        """Make a run with measurement noise and a sine as reference. After its steps the time goes on in leaps."""
+        """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
         v, dt, memory = 0.0, 1e-3, Fenced([0.0] * self.size)
         for k in range(steps + LATER_STEPS):
             t = dt * (k if k < steps else steps * GROWTH ** (k - steps))
@@ -308,22 +309,22 @@ class Trial:
                 x, v = math.copysign(MAX_POSITION, x), 0.0
 
     def measurement(self, **seen: float) -> list[float]:
-        """Return a measurement's numbers in their order: 0 where nothing is given."""
+        """Return the numbers of a measurement in their order. Those left out are 0."""
         return [seen.get(name, 0.0) for name in self.fields]
 
-    def state(self, kept: bytes) -> Fenced:
-        """Return memory as it was."""
-        return Fenced(struct.unpack(f"{self.size}d", kept))
+    def state(self, saved: bytes) -> Fenced:
+        """Return a memory with saved content."""
+        return Fenced(struct.unpack(f"{self.size}d", saved))
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
-        """Call the law, and note the call for the sanitizers."""
+        """Call the law, and record the call for the sanitizers."""
         self.calls.write(struct.pack(f"{len(y)}d", *y))
         return self.law_at(y, memory)
 
     def law_at(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
-        """Return the law's code, u and s. Fault where it writes anything but memory and out."""
+        """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
         self.y.own[:], self.out.own[:] = y, [math.nan, math.nan]
-        given = bytes(self.y.whole)
+        y_before = bytes(self.y.whole)
         code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
         if memory.crossed():
             code = BEYOND
@@ -334,23 +335,23 @@ class Trial:
         if code in FAULTS:
             what, cure = FAULTS[code]
             raise Fault(f"{what.format(self.size)}: {cure}")
-        if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != given:
+        if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != y_before:
             raise Fault("changes its gains or its measurement: keep what changes in memory")
         return code, self.out.own[0], self.out.own[1]
 
     def static_data(self) -> dict[str, bytes]:
-        """Return the static data of now."""
+        """Return the current content of the static data."""
         return {name: ctypes.string_at(place, size) for name, place, size in self.data}
 
     def check_static_data(self) -> None:
-        """Fault where the law has changed what other simulations see."""
+        """Raise Fault if the law has changed static data, which all simulations share."""
         changed = [name for name, now in self.static_data().items() if now != self.data_before[name]]
         if changed:
             cure = "keep state in memory, and fill tables in smc_setup"
             raise Fault(f"changes static data ({changed[0]}), {SHARED}: {cure}")
 
     def check_gains(self, y: list[float], before: bytes) -> None:
-        """Fault where u becomes a number once there are more gains than have names."""
+        """Raise Fault if u becomes finite when additional gains are finite."""
         count, out = len(self.gains.own), Fenced([math.nan, math.nan])
         more = Fenced([*self.gains.own, *[1.0] * MORE_GAINS])
         set_sizes(self.library, count + MORE_GAINS, self.size)
@@ -363,7 +364,7 @@ class Trial:
 
 
 def attempt(order, progress) -> None:
-    """Load, set up and where asked call a law; write its progress, and at the end what its file says of it."""
+    """Load, set up and on request call a law. Write the progress, and at the end the library's constants."""
 
     def done(step: str) -> None:
         if arithmetic() != STANDARD:
@@ -390,7 +391,7 @@ def attempt(order, progress) -> None:
 
 
 def main(file: str) -> None:
-    """Do what a JSON file asks."""
+    """Carry out the order in a JSON file."""
     order = json.loads(Path(file).read_text())
     with Path(order["progress"]).open("w", buffering=1) as progress:
         try:
