@@ -1,5 +1,3 @@
-"""smc_mujoco.studies.scene, under its old name."""
-
 from smc_mujoco.moved import forward
 
-forward(__name__)
+forward(__name__, "smc_mujoco.studies.scene")
