@@ -1,24 +1,35 @@
-"""What calls of public names are given: where Python would complain, the argument that does not fit is named instead.
+"""Calls of public names: where Python would complain, the argument that does not fit is named instead.
 
-A public function checks what it is given where it uses it, and says so in a sentence of its own. For all that it does
-not check this module speaks, once for every public name: an exception of Python's is answered by looking at the call's
-arguments beside the annotations of the signature. The first that does not fit its annotation is named, with its value
-and with what to give. If all of them fit, the exception stays as it is. A call that ends well costs nothing.
+A public function checks what it is given where it uses it, and says so in a sentence of its own. This module covers the
+rest, once for every public name: when Python raises an exception, the call's arguments are compared with the
+annotations of the signature. The first that does not fit is named, with its value and with what to give. If all fit,
+the exception stays as it is. A call without an exception is not looked at.
+
+    kind_of(Sequence[float] | None).takes([1.0, "a"])        # False
+    kind_of(Sequence[float] | None).one                      # "a list of numbers or None"
 """
 
 import builtins
+import contextlib
 import functools
 import inspect
+import itertools
+import math
+import numbers
+import os
 import sys
 import types
 import typing
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from smc_mujoco.common.annotations import kind_of
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+import numpy as np
+
+from smc_mujoco.common.errors import MOST, ScenarioError, number, shown, unknown, whole
 
 OURS = "smc_mujoco"
+LONGEST = 255  # bytes of a file's name
 _KNOWN: set[type] = set()  # classes whose methods explain themselves
 
 
@@ -60,33 +71,33 @@ def _explained(function: Callable, home: type | None = None) -> Callable:
 
     @functools.wraps(function)
     def call(*args: Any, **named: Any) -> Any:
-        try:
+        with _explaining(function, home, args, named):
             result = function(*args, **named)
-        except ScenarioError:
-            raise
-        except Exception:
-            if (wrong := _misfit(function, home, args, named)) is None:
-                raise
-        else:
-            for one in result[:1] if isinstance(result, list) else (result,):
-                _open(type(one))
-            return result
-        raise wrong
+        for one in result[:1] if isinstance(result, list) else (result,):
+            _open(type(one))
+        return result
 
     @functools.wraps(function)
     def iterate(*args: Any, **named: Any) -> Any:
-        try:
+        with _explaining(function, home, args, named):
             return (yield from function(*args, **named))
-        except ScenarioError:
-            raise
-        except Exception:
-            if (wrong := _misfit(function, home, args, named)) is None:
-                raise
-        raise wrong
 
     found = iterate if inspect.isgeneratorfunction(function) else call
     found.explains = function  # pyright: ignore[reportFunctionMemberAccess]
     return found
+
+
+@contextlib.contextmanager
+def _explaining(function: Callable, home: type | None, args: tuple, named: dict[str, Any]) -> Iterator[None]:
+    """Turn an exception of a call into the error that names the argument at fault, if there is one."""
+    try:
+        yield
+    except ScenarioError:
+        raise
+    except Exception:
+        if (wrong := _misfit(function, home, args, named)) is None:
+            raise
+        raise wrong from None
 
 
 def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str, Any]) -> ScenarioError | None:
@@ -96,7 +107,8 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
         given = signature.bind(*args, **named).arguments
     except TypeError:
         return _unbound(function, home, signature, args, named)
-    kinds = {name: kind_of(hint) for name, hint in _hints(function).items()}
+    hints = typing.get_type_hints(function, localns=_Names(function.__globals__))
+    kinds = {name: kind_of(hint) for name, hint in hints.items()}
     defaults = {name: p.default for name, p in signature.parameters.items() if name in kinds}
     if any(default is None and not kinds[name].takes(None) for name, default in defaults.items()):
         return None  # a Scenario: its annotations say what fields hold, not what they are made from
@@ -147,6 +159,117 @@ class _Names(dict):
         return type(name, (), {})  # of a module that nobody has loaded: no value is of it
 
 
-def _hints(function: Callable) -> dict[str, Any]:
-    """The annotations of a function's arguments, those resolved that are text."""
-    return typing.get_type_hints(function, localns=_Names(function.__globals__))
+class Kind(NamedTuple):
+    """What an annotation asks for: whether a value is that, and the words for one and for several."""
+
+    fits: Callable[[Any], bool]
+    one: str
+    several: str
+
+    def takes(self, value: Any) -> bool:
+        """Whether a value is of this kind; of an iterator the items are not looked at."""
+        try:
+            return self.fits(value)
+        except Exception:  # whatever `number`, `whole` and the value's own methods raise
+            return False
+
+
+def _flag(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1))
+
+
+def _text(value: Any) -> bool:
+    return isinstance(value, str) and "\0" not in value and value.encode() is not None
+
+
+def _path(value: Any) -> bool:
+    text = os.fspath(value)
+    return _text(text) and all(len(part.encode()) <= LONGEST for part in Path(text).parts)
+
+
+def _number(value: Any) -> bool:
+    plain = isinstance(value, float | np.floating) or math.isfinite(float(value))  # an int beyond floats is no number
+    return plain and not isinstance(value, np.ndarray) and number("", value, infinite=True) is not None
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, numbers.Integral) and whole("", value, -(2**63), 2**63 - 1) is not None
+
+
+KINDS: dict[Any, Kind] = {
+    Any: Kind(lambda value: True, "anything", "anything"),
+    bool: Kind(_flag, "True or False", "flags"),
+    int: Kind(_whole, "a whole number", "whole numbers"),
+    float: Kind(_number, "a number", "numbers"),
+    str: Kind(_text, "text", "texts"),
+    os.PathLike: Kind(_path, "a path", "paths"),
+    types.NoneType: Kind(lambda value: value is None, "None", "None"),
+    Callable: Kind(callable, "a function", "functions"),
+}
+
+
+def kind_of(hint: Any) -> Kind:
+    """What an annotation asks for."""
+    origin, args = typing.get_origin(hint) or hint, typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        found = _either([kind_of(arm) for arm in args])
+    elif origin in KINDS or not isinstance(origin, type):
+        found = KINDS.get(origin, KINDS[Any])
+    elif getattr(origin, "_is_protocol", False):
+        asked = sorted(name for name in vars(origin) if not name.startswith("_"))
+        words = f"something that has {' and '.join(asked)}"
+        found = Kind(lambda value: all(hasattr(value, name) for name in asked), words, words)
+    elif issubclass(origin, Mapping):
+        found = _mapping([kind_of(arg) for arg in args or (Any, Any)])
+    elif issubclass(origin, Iterable) and origin.__module__ in ("builtins", "collections.abc"):
+        fixed = origin is tuple and args and args[-1] is not ...
+        found = _several(origin, [kind_of(arg) for arg in args if arg is not ...], len(args) if fixed else None)
+    else:
+        name = origin.__name__
+        article = "an" if name[0] in "AEIOU" else "a"
+        found = Kind(lambda value: isinstance(value, origin), f"{article} {name}", f"{name}s")
+    return found
+
+
+def _either(arms: Sequence[Kind]) -> Kind:
+    """What fits one of the arms."""
+    if KINDS[os.PathLike] in arms:  # which takes texts too, if they are paths
+        arms = [arm for arm in arms if arm is not KINDS[str]]
+    one, several = _joined([arm.one for arm in arms]), _joined([arm.several for arm in arms])
+    return Kind(lambda value: any(arm.takes(value) for arm in arms), one, several)
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Words with "or" before the last."""
+    *most, last = dict.fromkeys(words)
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+def _mapping(held: Sequence[Kind]) -> Kind:
+    """A dict from the first kind to the second."""
+    keys, values = held
+
+    def test(value: Any) -> bool:
+        items = value.items() if isinstance(value, Mapping) else [(keys, None)]
+        return all(keys.takes(key) and values.takes(item) for key, item in items)
+
+    words = f"a dict of {keys.several} and {values.several}"
+    return Kind(test, words, words.replace("a dict", "dicts"))
+
+
+def _several(origin: type, held: list[Kind], count: int | None) -> Kind:
+    """A list or an iterator of a kind, or of `count` values each of its own."""
+
+    def test(value: Any) -> bool:
+        if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+            return False
+        if not isinstance(value, Sized):
+            return not issubclass(origin, Sized)
+        if count not in (None, len(value)):
+            return False
+        kinds = itertools.repeat(held[0]) if count is None and held else held
+        items = itertools.islice(value, MOST)  # of a range without end the beginning
+        return all(kind.takes(item) for kind, item in zip(kinds, items, strict=False))
+
+    plural = held[0].several if held else "values"
+    return Kind(test, f"a list of {plural}" if count is None else f"{count} {plural}", f"lists of {plural}")

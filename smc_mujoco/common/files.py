@@ -5,6 +5,7 @@ import json
 import math
 import os
 import tempfile
+import uuid
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -36,10 +37,16 @@ def writable(path: str | os.PathLike) -> None:
     path = Path(path)
     if path.is_dir():
         raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
+    with _writing(path), tempfile.TemporaryFile(dir=path.parent):
+        pass
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Make a file's folder, and turn an OSError in the block into a ScenarioError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
+        yield
     except OSError as error:
         why = error.strerror or error
         raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
@@ -135,23 +142,11 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
       ScenarioError: the folder cannot be made or written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
-        os.close(handle)
+    part = path.with_name(f".{path.stem}.{uuid.uuid4().hex}{path.suffix}")
+    with _writing(path):
+        part.touch(exist_ok=False)
         try:
-            yield Path(name)
-            os.chmod(name, 0o666 & ~_umask())
-            os.replace(name, path)
+            yield part
+            part.replace(path)
         finally:
-            Path(name).unlink(missing_ok=True)
-    except OSError as error:
-        why = error.strerror or error
-        raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
-
-
-def _umask() -> int:
-    """The user's; it can only be read by setting it."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
+            part.unlink(missing_ok=True)

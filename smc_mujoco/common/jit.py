@@ -40,55 +40,45 @@ class NotCompilable(Exception):
     """Why a function runs in the reference loop instead."""
 
 
-def _pointer_to(kind: types.Type) -> Callable:
-    @intrinsic
-    def pointer(typingctx, address):
-        def codegen(context, builder, signature, args):
-            return builder.inttoptr(args[0], context.get_value_type(kind).as_pointer())
-
-        return types.CPointer(kind)(types.intp), codegen
-
-    return pointer
-
-
-pointer = _pointer_to(types.float64)  # an address as a pointer to float64
-integers = _pointer_to(types.int64)  # an address as a pointer to int64
-
-
-def record_at(dtype: Any) -> Callable:
-    """A compiled function that reads the address of a NumPy record of this dtype as that record."""
-    record = from_dtype(dtype)
+def _at(kind: types.Type) -> Callable:
+    """Return a compiled function that takes an address for a pointer or record of this type."""
 
     @intrinsic
     def at(typingctx, address):
         def codegen(context, builder, signature, args):
-            return builder.inttoptr(args[0], context.get_value_type(record))
+            return builder.inttoptr(args[0], context.get_value_type(kind))
 
-        return record(types.intp), codegen
+        return kind(types.intp), codegen
 
     return at
 
 
-@intrinsic
-def call(typingctx, address, inputs, parameters, memory, outputs):
-    """Call the C function at an address; the status it returns."""
-
-    def codegen(context, builder, signature, args):
-        function = ir.FunctionType(ir.IntType(64), [ir.IntType(64)] * 4).as_pointer()
-        return builder.call(builder.inttoptr(args[0], function), args[1:])
-
-    return types.int64(*[types.intp] * 5), codegen
+pointer = _at(types.CPointer(types.float64))  # an address as a pointer to float64
+integers = _at(types.CPointer(types.int64))  # an address as a pointer to int64
 
 
-@intrinsic
-def call_int(typingctx, address, inputs, parameters, memory, outputs):
-    """`call` for a C function that returns an int: the rest of the register it comes in is not its own."""
+def record_at(dtype: Any) -> Callable:
+    """Return a compiled function that takes an address for a NumPy record of this dtype."""
+    return _at(from_dtype(dtype))
 
-    def codegen(context, builder, signature, args):
-        function = ir.FunctionType(ir.IntType(32), [ir.IntType(64)] * 4).as_pointer()
-        return builder.sext(builder.call(builder.inttoptr(args[0], function), args[1:]), ir.IntType(64))
 
-    return types.int64(*[types.intp] * 5), codegen
+def _calling(bits: int) -> Callable:
+    """Return a compiled function that calls the C function at an address, whose status has so many bits."""
+
+    @intrinsic
+    def call(typingctx, address, inputs, parameters, memory, outputs):
+        def codegen(context, builder, signature, args):
+            function = ir.FunctionType(ir.IntType(bits), [ir.IntType(64)] * 4).as_pointer()
+            status = builder.call(builder.inttoptr(args[0], function), args[1:])
+            return builder.sext(status, ir.IntType(64)) if bits < 64 else status
+
+        return types.int64(*[types.intp] * 5), codegen
+
+    return call
+
+
+call = _calling(64)  # (address, inputs, parameters, memory, outputs) -> status
+call_int = _calling(32)  # the same for a C function that returns an int: the register's upper half is undefined
 
 
 @intrinsic

@@ -19,12 +19,12 @@ import mujoco
 
 CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 
-_lock = threading.RLock()  # whoever has replaced the callback
-_free = threading.RLock()  # whoever compiles where no Python callback is; held shortly, and nothing waited for under it
+_lock = threading.RLock()  # held while callbacks are replaced
+_free = threading.RLock()  # held briefly, to compile while no Python callback is installed; nothing waits under it
 
 
 def _after_fork() -> None:
-    """A child has none of its parent's threads: neither who holds a lock, nor the run whose callback is installed."""
+    """Free the locks and remove the callback: a child process has none of its parent's threads."""
     global _lock, _free
     _lock, _free = threading.RLock(), threading.RLock()
     mujoco.set_mjcb_control(None)
@@ -35,14 +35,13 @@ if hasattr(os, "register_at_fork"):
 
 
 @contextlib.contextmanager
-def held(control: Any) -> Iterator[None]:
-    """That control callback, None for none, and no other callback for the length of a with block.
+def installed(control: Any) -> Iterator[None]:
+    """Install this control callback, or None, and no other callback, for the length of a with block.
 
-    Then all are again what they were before. Other threads, whose runs would go on without their laws, are waited for,
-    and wait.
+    Afterwards all are what they were before. One thread at a time: the runs of others would go on without their laws.
     """
     with _lock:
-        before = _installed()
+        before = _callbacks()
         try:
             _put(dict.fromkeys(CALLBACKS) | {"control": control})
             yield
@@ -50,34 +49,29 @@ def held(control: Any) -> Iterator[None]:
             _put(before)
 
 
-def uninstalled() -> contextlib.AbstractContextManager[None]:
-    """No callback for the length of a with block."""
-    return held(None)
-
-
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The spec's model.
+    """Compile a spec.
 
-    Where a Python callback is installed, it is taken away meanwhile: by the thread whose run it is, as where a policy
-    makes an environment, at once; by others once that run is over. Native ones are not waited for.
+    A Python callback is removed meanwhile. The thread whose run installed it does so at once, as when a policy makes an
+    environment; other threads wait until that run is over. They do not wait for native callbacks.
 
     Raises:
       ValueError: MuJoCo cannot compile it.
     """
     with _free:
-        if not any(map(_python, _installed().values())):
+        if not any(map(_python, _callbacks().values())):
             return spec.compile()
-    with uninstalled():
+    with installed(None):
         return spec.compile()
 
 
-def _installed() -> dict[str, Any]:
-    """Every callback by its name, None where there is none."""
+def _callbacks() -> dict[str, Any]:
+    """Return every installed callback by its name, None for none."""
     return {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
 
 
 def _put(callbacks: dict[str, Any]) -> None:
-    """Install callbacks, as `_installed` gives them, where they are not there yet."""
+    """Install callbacks, as `_callbacks` returns them, that are not installed yet."""
     with _free if any(map(_python, callbacks.values())) else contextlib.nullcontext():
         for name, callback in callbacks.items():
             if getattr(mujoco, f"get_mjcb_{name}")() is not callback:

@@ -14,12 +14,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.envs.core import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
-from smc_mujoco.simulation import callback
+from smc_mujoco.simulation import callback  # noqa: F401  # imports mujoco.batch without a callback
 from smc_mujoco.simulation.run import cores
 
 # isort: split
@@ -138,7 +139,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
         """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
         ids = np.flatnonzero(mask)
-        with callback.uninstalled():
+        with mjcb.installed(None):
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
@@ -149,9 +150,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.stretches(self.ctrl, commands, self.first):
             try:
-                with (
-                    callback.uninstalled()
-                ):  # a Batch refuses Python callbacks, and runs of other threads may have set one
+                with mjcb.installed(None):  # a Batch refuses Python callbacks, and runs of other threads may have set one
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True

@@ -18,14 +18,14 @@ from pathlib import Path
 import mujoco
 from numba import types
 
+from smc_mujoco.common import mjcb
 from smc_mujoco.common.jit import compiled, integers, pointer
-from smc_mujoco.common.mjcb import held, uninstalled
 from smc_mujoco.simulation import offsets
 from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.state import simulation_at
 
-with uninstalled():  # this import compiles a model: done here, before a run of ours that it would have to wait for
+with mjcb.installed(None):  # this import compiles a model: here, before it would have to wait for a run of ours
     import mujoco.batch
 
 USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simulation's record
@@ -88,10 +88,10 @@ def silence():
 @contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
     """Install our control callback, or another, for the length of a with block; other threads wait."""
-    with uninstalled():
+    with mjcb.installed(None):
         function, silent = callback().ctypes if control is None else control, silence().ctypes
         before = mujoco.get_mju_user_warning()
-        with held(function):
+        with mjcb.installed(function):
             try:
                 mujoco.set_mju_user_warning(silent)
                 yield

@@ -17,7 +17,7 @@ import wild
 
 import smc_mujoco as smc
 from smc_mujoco.common import arguments
-from smc_mujoco.common.annotations import kind_of
+from smc_mujoco.common.arguments import kind_of
 from smc_mujoco.common.errors import shown
 
 

@@ -148,7 +148,7 @@ def test_no_python_callback_comes_while_a_model_compiles(python):
     native = callback.callback().ctypes
 
     def enter():
-        with mjcb.held((lambda model, data: None) if python else native):
+        with mjcb.installed((lambda model, data: None) if python else native):
             entered.set()
 
     compiled = in_thread(lambda: mjcb.compiled(slow))  # pyright: ignore[reportArgumentType]
@@ -166,7 +166,7 @@ def test_a_model_that_does_not_compile_leaves_the_callback():
 
     broken = mujoco.MjSpec()
     broken.worldbody.add_geom(size=(-1.0, 0.0, 0.0))
-    with mjcb.held(control):
+    with mjcb.installed(control):
         with pytest.raises(ValueError, match="size"):
             mjcb.compiled(broken)
         assert mujoco.get_mjcb_control() is control
@@ -205,7 +205,7 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
     if child == 0:
         signal.alarm(30)  # ends it where it hangs
         mjcb.compiled(mujoco.MjSpec())
-        with mjcb.held(lambda model, data: None):
+        with mjcb.installed(lambda model, data: None):
             mjcb.compiled(mujoco.MjSpec())
         os._exit(7 if mujoco.get_mjcb_control() is None else 8)
     leave.set()
