@@ -17,9 +17,9 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.hardware.contact import Contact
+from smc_mujoco.mechanisms.hardware.drives import Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
-from smc_mujoco.mechanisms.hardware.tandem import Tandem, tandem
 from smc_mujoco.mechanisms.plant import Plant, plant
 from smc_mujoco.simulation import coerce, consistency
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors

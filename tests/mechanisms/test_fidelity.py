@@ -6,7 +6,7 @@ import pytest
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.fidelity import deviation
-from smc_mujoco.mechanisms.geometry.pendulum_row import HOOK
+from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 

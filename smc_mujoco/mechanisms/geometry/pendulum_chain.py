@@ -3,11 +3,21 @@
 Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs are fixed
 tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the shaft that
 carries the pendulums transmits nothing.
+
+Contact `bobs` puts the pivots side by side in the plane of motion: bobs that hang touch nearly, as in Newton's cradle.
+The torsion springs act all the same, their torques carried from pivot to pivot.
+
+Mechanism `springs` joins neighbouring rods by a real spring at `HOOK` from their pivots: k = kc / HOOK^2. Where the
+pivots are one behind the other its rest length is 0 and its torque kc sin(x_j - x_i); where they are side by side its
+rest length is the pitch.
 """
+
+import itertools
 
 import mujoco
 
 from smc_mujoco.mechanisms.geometry import coil
+from smc_mujoco.mechanisms.hardware.contact import bar, box, hit
 from smc_mujoco.mechanisms.plant import Field, model_path
 
 PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass freely
@@ -15,6 +25,11 @@ HEIGHT = 0.8  # m, the shaft above the floor: as the single pendulum's
 HUB = 0.02  # m, half a hub: where a spring's wire ends
 KC = 0.5  # N m/rad: chosen for the paper study
 DRAWN = 50  # pendulums up to which springs are drawn: each has a thousand vertices to move a frame
+HOOK = 0.25  # m from pivot to real spring: chosen, half a rod
+
+ROW = 0.16  # m between pivots side by side: bobs of 0.13 m that hang leave a gap of 0.03 m, chosen
+CLACK = 0.95  # restitution of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
+BEAM = (0.085, 0.125)  # m, where the beam that carries the pivots side by side lies, behind the bobs
 
 
 def compose(single, n, x0):
@@ -34,13 +49,13 @@ def compose(single, n, x0):
         copy = machine.add_frame(pos=(0.0, i * PITCH, HEIGHT)).attach_body(pendulum, f"p{i}/", "")
         for geom in copy.geoms:
             geom.material = material[geom.name.removeprefix(f"p{i}/")]
+    spec.add_key(name="home", qpos=[x0[i % len(x0)] for i in range(n)])
     for i in range(n - 1):
         spring = spec.add_tendon(name=f"coupling{i}", stiffness=KC, springlength=(0.0, 0.0))
         spring.wrap_joint(f"p{i}/hinge", -1.0)
         spring.wrap_joint(f"p{i + 1}/hinge", 1.0)
-        if n <= DRAWN:
-            draw_spring(spec, i)
-    spec.add_key(name="home", qpos=[x0[i % len(x0)] for i in range(n)])
+        near, far = pivot(spec, i), pivot(spec, i + 1)
+        draw_spring(spec, i, (0.0, near[1] + HUB, HEIGHT), (0.0, far[1] - HUB, HEIGHT), radius=0.022, turns=8)
     return spec
 
 
@@ -81,41 +96,41 @@ def stand(spec, n):
             f"{end}_bearing": ((0.0, y - 0.03, HEIGHT), (0.0, y + 0.03, HEIGHT), 0.042, "steel"),
         }
     for name, (bottom, top, radius, material) in rods.items():
-        machine.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            fromto=(*bottom, *top),
-            size=(radius, 0.0, 0.0),
-            material=material,
-        )
+        bar(machine, name, (bottom, top), radius, material)
     return machine
 
 
-def draw_spring(spec, i):
-    """Draw the spring between pendulums i and i + 1: a coil round the shaft, wound by their difference."""
-    near, far = (0.0, i * PITCH, HEIGHT), (0.0, (i + 1) * PITCH, HEIGHT)
+def pivot(spec, i):
+    """Return where pendulum i hangs or stands, m."""
+    return tuple(spec.body(f"p{i}/pendulum").frame.pos)
+
+
+def draw_spring(spec, i, start, end, radius, turns):
+    """Draw the spring between pendulums i and i + 1, from `start` to `end` in m, unless there are too many."""
+    if len(spec.keys[0].qpos) > DRAWN:
+        return
     coil.draw(
         spec,
         f"spring{i}",
-        start=(f"p{i}/pendulum", near, (0.0, near[1] + HUB, HEIGHT)),
-        end=(f"p{i + 1}/pendulum", far, (0.0, far[1] - HUB, HEIGHT)),
-        radius=0.022,
-        turns=8,
+        start=(f"p{i}/pendulum", pivot(spec, i), start),
+        end=(f"p{i + 1}/pendulum", pivot(spec, i + 1), end),
+        radius=radius,
+        turns=turns,
         wire=0.0045,
         material="brass",
     )
 
 
-def fields(model, p, side):
-    """Yield the fields that p sets; side: +1 where the bobs stand above the shaft, -1 where they hang."""
+def fields(model, p):
+    """Yield the fields that p sets where torsion springs join the pendulums."""
     springs = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
-    yield from pendulum_fields(model, p, side)
+    yield from pendulum_fields(model, p)
     yield Field("tendon_stiffness", springs, p.kc)
 
 
-def pendulum_fields(model, p, side):
+def pendulum_fields(model, p):
     """Yield the fields of the pendulums alone, without the springs between them."""
-    n = size(model)
+    n, side = size(model), above(model.geom("p0/bob"))
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
     rods = [model.geom(f"p{i}/rod").id for i in range(n)]
     bobs = [model.geom(f"p{i}/bob").id for i in range(n)]
@@ -131,3 +146,76 @@ def pendulum_fields(model, p, side):
 def size(model):
     """Return how many pendulums a chain's model has; actuators may have added joints of their own."""
     return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))
+
+
+def above(bob):
+    """Return +1 where a bob stands above its pivot, -1 where it hangs."""
+    return 1.0 if bob.pos[2] > 0.0 else -1.0
+
+
+def bobs(spec):
+    """Put the pivots side by side and let neighbouring bobs hit each other."""
+    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob"))
+    width = (n - 1) * ROW
+    for i in range(n):
+        spec.body(f"p{i}/pendulum").frame.pos = (i * ROW - width / 2, 0.0, HEIGHT)
+    for geom in [g for g in spec.body("machine").geoms if not g.name.startswith("p")]:
+        spec.delete(geom)
+    stand_row(spec, n, width)
+    hooked = bool(spec.sites)
+    for skin in list(spec.skins):
+        spec.delete(skin)
+    for i in range(n - 1):
+        for pair in itertools.product((f"p{i}/bob", f"p{i}/rod"), (f"p{i + 1}/bob", f"p{i + 1}/rod")):
+            hit(spec, pair, CLACK, both_move=True)  # beyond 54 degrees bobs pass each other, and meet rods
+        draw_between_rods(spec, i, side * (HOOK if hooked else 0.10))
+
+
+def springs(spec):
+    """Replace the torsion springs by real springs between the rods."""
+    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob"))
+    for item in [*spec.tendons, *spec.skins]:
+        spec.delete(item)
+    for i in range(n):
+        body = spec.body(f"p{i}/pendulum")
+        body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK), group=5, rgba=(0, 0, 0, 0))
+    for i in range(n - 1):
+        spring = spec.add_tendon(name=f"coupling{i}", springlength=(0.0, 0.0), group=5, rgba=(0, 0, 0, 0))
+        spring.wrap_site(f"p{i}/hook")
+        spring.wrap_site(f"p{i + 1}/hook")
+        draw_between_rods(spec, i, side * HOOK)
+
+
+def spring_fields(model, p):
+    """Yield the fields that p sets where the springs are real ones."""
+    couplings = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
+    pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
+    yield from pendulum_fields(model, p)
+    yield Field("tendon_stiffness", couplings, p.kc / HOOK**2)
+    yield Field("tendon_lengthspring", couplings, pitch)
+
+
+def draw_between_rods(spec, i, up):
+    """Draw the spring between rods i and i + 1, `up` metres above their pivots."""
+    start, end = ((x, y, z + up) for x, y, z in (pivot(spec, i), pivot(spec, i + 1)))
+    draw_spring(spec, i, start, end, radius=0.020, turns=9)
+
+
+def stand_row(spec, n, width):
+    """Add a beam behind the row between two posts, and a camera that looks at the row from the front."""
+    machine, end = spec.body("machine"), width / 2 + 0.20
+    box(machine, "beam", (-end, BEAM[0], HEIGHT - 0.030), (end, BEAM[1], HEIGHT + 0.030), "graphite")
+    for i in range(n):
+        x = i * ROW - width / 2
+        bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM[0], HEIGHT)), 0.010, "steel")
+    for side, x in (("left", -end), ("right", end)):
+        y = sum(BEAM) / 2
+        bar(machine, f"{side}_foot", ((x, y, 0), (x, y, 0.028)), 0.15, "graphite")
+        bar(machine, f"{side}_step", ((x, y, 0.028), (x, y, 0.040)), 0.055, "steel")
+        bar(machine, f"{side}_post", ((x, y, 0.028), (x, y, HEIGHT + 0.045)), 0.024, "graphite")
+    shown = min(width, 8 * ROW)  # as the chain's camera, nine pendulums at most
+    spec.stat.center, spec.stat.extent = (0.0, 0.0, HEIGHT), 1.6 + shown
+    away = 2.2 + 0.9 * shown
+    camera = spec.camera("look")
+    camera.pos = (-0.245 * away, -0.953 * away, HEIGHT - 0.05 + 0.176 * away)
+    camera.alt.xyaxes = (0.969, -0.248, 0.0, 0.046, 0.181, 0.982)

@@ -7,13 +7,19 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import number
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR, Actuator, driven, driven_ids, drives
-from smc_mujoco.mechanisms.plant import LARGEST, Field
+from smc_mujoco.mechanisms.hardware.part import (
+    HARD_SOLIMP,
+    HARD_SOLREF,
+    PLAY,
+    ROTOR,
+    Actuator,
+    driven,
+    driven_ids,
+    drives,
+)
+from smc_mujoco.mechanisms.plant import Field
 
-SOLREF = (1e-9, 1.0)  # of its limit, s and damping ratio: less than two steps means two steps, MuJoCo's hardest
-SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # as hard, at all depths
 BRASS = (0.80, 0.62, 0.28, 1.0)
 LEAST_INERTIA = 1e-9  # kg m^2 (kg): below, the rotor is lighter than rounding
 
@@ -40,9 +46,9 @@ class Backlash(Actuator):
     rotor_damping: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, least in (("gap", 0.0), ("rotor_inertia", LEAST_INERTIA), ("rotor_damping", 0.0)):
-            value = number(f"Backlash's {name}", getattr(self, name), least=least, most=LARGEST)
-            object.__setattr__(self, name, value)
+        self.check_numbers("gap", least=0.0)
+        self.check_numbers("rotor_inertia", least=LEAST_INERTIA)
+        self.check_numbers("rotor_damping", least=0.0)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         rigid = compiled(spec.copy())
@@ -50,9 +56,8 @@ class Backlash(Actuator):
         mujoco.mj_kinematics(rigid, pose)
         for actuator, joint in list(zip(drives(spec), driven(spec), strict=True)):
             _add_rotor(spec, joint, rigid, pose)
-            play = spec.add_tendon(
-                name=PLAY + joint.name, limited=True, range=(-1.0, 1.0), solref_limit=SOLREF, solimp_limit=SOLIMP
-            )
+            play = spec.add_tendon(name=PLAY + joint.name, limited=True, range=(-1.0, 1.0))
+            play.solref_limit, play.solimp_limit = HARD_SOLREF, HARD_SOLIMP
             play.wrap_joint(ROTOR + joint.name, 1.0)
             play.wrap_joint(joint.name, -1.0)
             actuator.target = ROTOR + joint.name

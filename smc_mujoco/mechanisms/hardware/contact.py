@@ -27,7 +27,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
 
@@ -70,10 +70,8 @@ class Contact(Part):
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str):
             raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
-        for name, most in (("friction", MOST_FRICTION), ("restitution", LIVELIEST)):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, number(f"Contact's {name}", value, least=0.0, most=most))
+        self.check_numbers("friction", least=0.0, most=MOST_FRICTION)
+        self.check_numbers("restitution", least=0.0, most=LIVELIEST)
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError where the plant does not offer it, or takes no such numbers.

@@ -2,15 +2,23 @@
 
 A scenario takes one, or a Lag and another in series (`tandem`), and a Backlash after them. Numbers are for
 implicitfast, whose steps integrate the drives' states exactly for a held u.
+
+Of two in series the second is MuJoCo's own, and the first one's output a is what it is asked for. The first is a lag,
+tau1 a' = u - a from a = 0, which the callback moves on step by step. In between, MuJoCo holds what the second is asked
+for over a physics step of length h, while a moves. It holds the mean of a with the weights exp(-(h - t)/tau2) that the
+second's own lag gives it: this brings the second to where the moving a would. So the output of two lags is exact at the
+end of each step for a held u, as that of one lag is.
 """
 
 import dataclasses
 import math
 from collections.abc import Hashable, Iterator
+from typing import NamedTuple
 
 import mujoco
+import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import Actuator, drive_ids, drives
 from smc_mujoco.mechanisms.plant import LARGEST, Field
 
@@ -18,16 +26,10 @@ from smc_mujoco.mechanisms.plant import LARGEST, Field
 RESISTANCE, CONSTANT = 0, 1  # of actuator_gainprm: ohm, and N m/A at the joint
 SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
 LEAST_RESISTANCE = 1e-9  # ohm: with less, a command is hardly a voltage that a number can hold
+LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this one, as in MuJoCo
 LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COGGING, POLES = 0, 1  # of actuator_biasprm: N m at the joint, and periods a radian of it
-
-
-def _check(part: Actuator, name: str, *, above=-math.inf, least=-math.inf, most=LARGEST) -> None:
-    """Replace a part's number by the float it stands for, or raise ScenarioError."""
-    what = f"{type(part).__name__}'s {name}"
-    value = number(what, getattr(part, name), above=above, least=least, most=most, infinite=most == math.inf)
-    object.__setattr__(part, name, value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Lag(Drive):
     tau: float
 
     def __post_init__(self) -> None:
-        _check(self, "tau", least=0.0)
+        self.check_numbers("tau", least=0.0)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec) if self.tau else ():
@@ -89,7 +91,7 @@ class RateLimit(Drive):
     rate: float
 
     def __post_init__(self) -> None:
-        _check(self, "rate", above=0.0, most=math.inf)
+        self.check_numbers("rate", above=0.0, most=math.inf, infinite=True)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec):
@@ -145,13 +147,10 @@ class DCMotor(Drive):
     current: float = 30.0
 
     def __post_init__(self) -> None:
-        _check(self, "resistance", above=0.0, least=LEAST_RESISTANCE)
-        for name in ("torque_constant", "gear"):
-            _check(self, name, above=0.0)
-        for name in ("inductance", "rotor_inertia", "cogging", "poles"):
-            _check(self, name, least=0.0)
-        for name in ("voltage", "current"):
-            _check(self, name, above=0.0, most=math.inf)
+        self.check_numbers("resistance", above=0.0, least=LEAST_RESISTANCE)
+        self.check_numbers("torque_constant", "gear", above=0.0)
+        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", least=0.0)
+        self.check_numbers("voltage", "current", above=0.0, most=math.inf, infinite=True)
         if not self.constant >= LEAST_CONSTANT or not self.scale <= LARGEST:
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
@@ -204,3 +203,31 @@ class DCMotor(Drive):
     def delay(self) -> float:
         """L/R in s, the winding's time constant; below SUDDEN it counts as 0."""
         return self.inductance / self.resistance if self.inductance > SUDDEN * self.resistance else 0.0
+
+
+class Tandem(NamedTuple):
+    """What a physics step does to the first drive's output a under a command u: numbers in 0 .. 1.
+
+    Attributes:
+      held: share of a in what the second drive is asked for, u + held (a - u).
+      left: share of a in a at the end of the step, u + left (a - u).
+    """
+
+    held: float
+    left: float
+
+    def __call__(self, u: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the second drive is asked for over a step, and a at its end, of the same shape as u and a."""
+        return u + self.held * (a - u), u + self.left * (a - u)
+
+
+def tandem(actuator: tuple[Actuator, ...], step: float) -> Tandem | None:
+    """Return what two drives in series do in a physics step of `step` s; None without a second drive."""
+    both = [part for part in actuator if part.drives]
+    if len(both) < 2:
+        return None
+    first, second = (step / max(drive.delay, LEAST_LAG) for drive in both)  # in their time constants
+    apart = abs(second - first)
+    mean = -math.expm1(-apart) / apart if apart else 1.0
+    held = second * math.exp(-min(first, second)) * mean / -math.expm1(-second)
+    return Tandem(held=held, left=math.exp(-first))

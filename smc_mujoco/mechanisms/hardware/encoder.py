@@ -47,11 +47,10 @@ class Encoder(Part):
     def __post_init__(self):
         if not (isinstance(self.counts, float) and self.counts == math.inf):
             object.__setattr__(self, "counts", whole("Encoder's counts", self.counts, 2, 2**32))
-        object.__setattr__(self, "bias", number("Encoder's bias", self.bias))
-        object.__setattr__(self, "dropout", number("Encoder's dropout", self.dropout, least=0.0, most=1.0))
-        if self.period is not None:
-            object.__setattr__(self, "period", number("Encoder's period", self.period, above=0.0))
-        object.__setattr__(self, "delay", number("Encoder's delay", self.delay, least=0.0))
+        self.check_numbers("bias", most=math.inf)
+        self.check_numbers("dropout", least=0.0, most=1.0)
+        self.check_numbers("period", above=0.0, most=math.inf)
+        self.check_numbers("delay", least=0.0, most=math.inf)
 
     def quantum(self, hinge: bool) -> float:
         """One count in rad of a hinge, or m of a slide; 0 without quantisation."""

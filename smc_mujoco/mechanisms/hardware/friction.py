@@ -9,14 +9,9 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, dof_ids, joint_ids, joints
-from smc_mujoco.mechanisms.plant import LARGEST, Field
-
-# MuJoCo's friction is a soft constraint: a stuck joint creeps at (1 - d) tc/2 a0, where a0 is the acceleration that
-# friction holds back. d is the largest that MuJoCo takes, tc the shortest: it reads less than two steps as two steps.
-SOLREF = (1e-9, 1.0)  # tc in s, damping ratio
-SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # d at and away from zero; the width, midpoint and power then have no effect
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, PASSIVE, Friction, dof_ids, joint_ids, joints
+from smc_mujoco.mechanisms.plant import Field
 
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
@@ -35,7 +30,7 @@ class Viscous(Friction):
     b: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "b", number("Viscous's b", self.b, least=0.0, most=LARGEST))
+        self.check_numbers("b", least=0.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         yield Field("dof_damping", dof_ids(model), self.b, adds=True)
@@ -45,8 +40,9 @@ class Viscous(Friction):
 class Coulomb(Friction):
     """Dry friction: -level sign(v) where the joint slides, at rest whatever up to level holds it.
 
-    A stuck joint creeps, as friction in MuJoCo is soft: at 1e-4 h a0 with physics step h and a0 the acceleration that
-    is held back. That is 2e-7 rad/s where the pendulum of 0.125 kg m^2 holds 1 N m at h = 0.25 ms.
+    A stuck joint creeps, as friction in MuJoCo is a soft constraint: at (1 - d) tc/2 a0, with impedance d, time
+    constant tc, and a0 the acceleration that friction holds back. The hardest ones make it 1e-4 h a0 for a physics step
+    h: 2e-7 rad/s where the pendulum of 0.125 kg m^2 holds 1 N m at h = 0.25 ms.
 
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
@@ -55,13 +51,13 @@ class Coulomb(Friction):
     level: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "level", number("Coulomb's level", self.level, least=0.0, most=LARGEST))
+        self.check_numbers("level", least=0.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         dofs = dof_ids(model)
         yield Field("dof_frictionloss", dofs, self.level)
-        yield Field("dof_solref", dofs, SOLREF)
-        yield Field("dof_solimp", dofs, SOLIMP)
+        yield Field("dof_solref", dofs, HARD_SOLREF)
+        yield Field("dof_solimp", dofs, HARD_SOLIMP)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,11 +97,8 @@ class LuGre(Friction):
     damping: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("coulomb", "static", "stribeck", "stiffness"):
-            value = number(f"LuGre's {name}", getattr(self, name), above=0.0, most=LARGEST)
-            object.__setattr__(self, name, value)
-        if self.damping is not None:
-            object.__setattr__(self, "damping", number("LuGre's damping", self.damping, least=0.0, most=LARGEST))
+        self.check_numbers("coulomb", "static", "stribeck", "stiffness", above=0.0)
+        self.check_numbers("damping", least=0.0)
         if self.static < self.coulomb:
             raise ScenarioError(
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"

@@ -15,10 +15,14 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.mechanisms.plant import Field
+from smc_mujoco.common.errors import number
+from smc_mujoco.mechanisms.plant import LARGEST, Field
 
 PASSIVE, ROTOR = "passive:", "rotor:"
 PLAY = "play:"  # the tendon of length rotor - joint
+# The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two steps.
+HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
+HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; the rest then has no effect
 START = "smc:start"  # a keyframe in which the joints without a channel start
 
 
@@ -27,6 +31,21 @@ class Part:
     """Base of all parts."""
 
     stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
+
+    def check_numbers(self, *names: str, **bounds: float) -> None:
+        """Replace fields by the floats that they stand for. None stays where it is the field's default.
+
+        Args:
+          bounds: as those of `errors.number`; `most` is LARGEST by default.
+
+        Raises:
+          ScenarioError: a field is no number within these bounds.
+        """
+        for name in names:
+            value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
+            if value is not None or not optional:
+                value = number(f"{type(self).__name__}'s {name}", value, **{"most": LARGEST} | bounds)
+                object.__setattr__(self, name, value)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Add what the part is made of to a mechanism, once for every channel."""

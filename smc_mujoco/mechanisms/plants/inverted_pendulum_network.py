@@ -6,7 +6,7 @@ the path graph's Laplacian. Numbers: chosen for the paper study.
 
 from math import sin
 
-from smc_mujoco.mechanisms.geometry import pendulum_chain, pendulum_row
+from smc_mujoco.mechanisms.geometry import pendulum_chain
 from smc_mujoco.mechanisms.plant import Plant, Variant
 
 X0 = (0.8, -0.4, 0.6, -0.2, 0.5)  # rad
@@ -14,14 +14,6 @@ X0 = (0.8, -0.4, 0.6, -0.2, 0.5)  # rad
 
 def build(n):
     return pendulum_chain.compose("inverted_pendulum.xml", n, X0)
-
-
-def fields(model, p):
-    return pendulum_chain.fields(model, p, side=1.0)
-
-
-def spring_fields(model, p):
-    return pendulum_row.spring_fields(model, p, side=1.0)
 
 
 def nominal(x, v, i, p):
@@ -43,10 +35,10 @@ INVERTED_PENDULUM_NETWORK = Plant(
     n=5,
     sizes=(2, 1000),
     build=build,
-    fields=fields,
+    fields=pendulum_chain.fields,
     nominal=nominal,
     lane=(1.15, 0.96, 0.0),  # across the view of `look`
     jumps={"mild": {"mass": 2.0}, "hard": {"mass": 22.681}},
-    contacts={"bobs": pendulum_row.bobs},
-    mechanisms={"springs": Variant(pendulum_row.springs, spring_fields)},
+    contacts={"bobs": pendulum_chain.bobs},
+    mechanisms={"springs": Variant(pendulum_chain.springs, pendulum_chain.spring_fields)},
 )

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import smc_mujoco as smc
 from smc_mujoco.analysis import margin_kinds
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.tandem import tandem
+from smc_mujoco.mechanisms.hardware.drives import tandem
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.state import LOGGED
 
