@@ -4,9 +4,12 @@ The cart carries rubber buffers at its ends, above the two rails: blows go strai
 wheels: its block lies on a lining, pressed by its weight through the joint `lift`, and slides by Coulomb's law.
 """
 
+from collections.abc import Iterator
+
 import mujoco
 
 from smc_mujoco.mechanisms.hardware.contact import SOLREF_RUB, SPRINGY, bar, box, hit, rub, solid
+from smc_mujoco.mechanisms.plant import Field, Values
 
 STOPPING = 0.5  # restitution of rubber buffers: chosen
 FRICTION = 0.1  # of the block on its bed: chosen, so that 1 N stands against springs of 1 to 3 N and commands of 6 N
@@ -23,7 +26,14 @@ PIN = 0.020  # m, radius of the post
 SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, the block in its bed at rest, on the four corners of a box
 
 
-def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
+def mass_fields(model: mujoco.MjModel, p: Values) -> Iterator[Field]:
+    """Yield the fields that the mass M of a cart that moves by itself sets."""
+    body = model.body("cart").id
+    yield Field("body_mass", body, p.M)
+    yield Field("dof_M0", model.dof_bodyid == body, p.M)  # MuJoCo reads a lone slide's inertia here
+
+
+def stops(spec: mujoco.MjSpec, x: float) -> None:
     """Add end stops that let the cart's middle reach -x and x."""
     machine = spec.body("machine")
     for side, sign in (("left", -1), ("right", 1)):
@@ -37,32 +47,27 @@ def stops(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
             box(machine, f"{name}_stop", (near, y - 0.042, 0.224), (far, y + 0.042, 0.390), "graphite")
             near, far = sorted((sign * face, sign * (face + DEEP)))
             solid(machine, f"{name}_solid", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384))
-            hit(spec, (f"{name}_solid", f"{name}_buffer"), restitution)
+            hit(spec, (f"{name}_solid", f"{name}_buffer"), STOPPING)
 
 
-def peg(spec: mujoco.MjSpec, x: float, restitution: float = STOPPING) -> None:
+def peg(spec: mujoco.MjSpec, x: float) -> None:
     """Add a post on the front rail that stops a cart coming from the right at x."""
     machine, place, y = spec.body("machine"), x - REACH - PIN, SIDES["front"]
     buffers(spec, "left", -1)
     box(machine, "peg_clamp", (place - 0.045, y - 0.042, 0.224), (place + 0.020, y + 0.042, 0.300), "graphite")
     bar(machine, "peg", ((place, y, 0.29), (place, y, 0.43)), PIN, "brass", round_ends=True)
-    hit(spec, ("peg", "left_front_buffer"), restitution)
+    hit(spec, ("peg", "left_front_buffer"), STOPPING)
 
 
 def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
     """Add two rubber buffers at one end of the cart."""
     cart = spec.body("cart")
     for rail, y in SIDES.items():
-        cart.add_geom(
-            name=f"{side}_{rail}_buffer",
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            pos=(sign * END, y, MIDDLE - RAIL),
-            size=(BUFFER, 0, 0),
-            material="ink",
-        )
+        buffer = cart.add_geom(name=f"{side}_{rail}_buffer", type=mujoco.mjtGeom.mjGEOM_SPHERE, material="ink")
+        buffer.pos, buffer.size = (sign * END, y, MIDDLE - RAIL), (BUFFER, 0, 0)
 
 
-def bed(spec: mujoco.MjSpec, length: float, friction: float = FRICTION) -> None:
+def bed(spec: mujoco.MjSpec, length: float) -> None:
     """Replace the rails by a rough bed of half that length, m, on which the block lies."""
     for geom in [g for g in spec.geoms if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")]:
         spec.delete(geom)
@@ -73,4 +78,4 @@ def bed(spec: mujoco.MjSpec, length: float, friction: float = FRICTION) -> None:
     for key in spec.keys:
         key.qpos = [*key.qpos, 0.0]
     spec.option.gravity = (0.0, 0.0, -GRAVITY)
-    rub(spec, ("lining", "block"), friction)
+    rub(spec, ("lining", "block"), FRICTION)

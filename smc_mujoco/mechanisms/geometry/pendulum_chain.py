@@ -178,7 +178,7 @@ def springs(spec):
         spec.delete(item)
     for i in range(n):
         body = spec.body(f"p{i}/pendulum")
-        body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK), group=5, rgba=(0, 0, 0, 0))
+        body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK))
     for i in range(n - 1):
         spring = spec.add_tendon(name=f"coupling{i}", springlength=(0.0, 0.0), group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"p{i}/hook")

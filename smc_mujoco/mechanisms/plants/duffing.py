@@ -34,9 +34,7 @@ def fields(model, p):
 
 
 def body_fields(model, p):
-    body = model.body("cart")
-    yield Field("body_mass", body.id, p.M)
-    yield Field("dof_M0", model.dof_bodyid == body.id, p.M)  # MuJoCo reads a lone slide's inertia here
+    yield from cart.mass_fields(model, p)
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.delta)
 
 
@@ -62,11 +60,11 @@ def add_springs(spec):
     joint, up = spec.joint("slide"), HEIGHT - body.pos[2]
     joint.stiffness = [0.0, 0.0, 0.0]
     bar(body, "spring_post", ((0, 0, 0.13), (0, 0, up + 0.03)), 0.022, "steel")
-    body.add_site(name="snap", pos=(0, 0, up), group=5, rgba=(0, 0, 0, 0))
+    body.add_site(name="snap", pos=(0, 0, up))
     for side, y in (("front", -ASIDE), ("back", ASIDE)):
         bar(machine, f"{side}_anchor_foot", ((0, y, 0), (0, y, 0.028)), 0.13, "graphite")
         bar(machine, f"{side}_anchor", ((0, y, 0.028), (0, y, HEIGHT + 0.03)), 0.028, "graphite")
-        machine.add_site(name=f"{side}_anchor", pos=(0, y, HEIGHT), group=5, rgba=(0, 0, 0, 0))
+        machine.add_site(name=f"{side}_anchor", pos=(0, y, HEIGHT))
         spring = spec.add_tendon(name=f"{side}_spring", group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"{side}_anchor")
         spring.wrap_site("snap")
@@ -106,10 +104,6 @@ DUFFING = Plant(
     nominal=nominal,
     lane=(0.0, 1.0, 0.0),
     jumps={"mild": {"alpha": 3.0}, "hard": {"alpha": 27.684}},
-    contacts={
-        "floor": on_floor,
-        "stops": stops,
-        "peg": peg,
-    },
+    contacts={"floor": on_floor, "stops": stops, "peg": peg},
     mechanisms={"springs": Variant(add_springs, spring_fields)},
 )

@@ -44,16 +44,10 @@ def draw_springs(spec, height, radius):
 
 def fields(model, p):
     far = model.site("far")
-    yield from body_fields(model, p)
+    yield from cart.mass_fields(model, p)
     yield Field("jnt_stiffness", model.joint("slide").id, p.k)
     yield Field("dof_damping", model.joint("slide").dofadr[0], -p.mu)
     yield Field("tendon_damping", model.tendon("across").id, p.mu * model.site_pos[far.id, 1] ** 2)
-
-
-def body_fields(model, p):
-    body = model.body("cart")
-    yield Field("body_mass", body.id, p.M)
-    yield Field("dof_M0", model.dof_bodyid == body.id, p.M)  # MuJoCo reads a lone slide's inertia here
 
 
 def nominal(x, v, i, p):
@@ -80,8 +74,8 @@ def add_springs(spec):
     machine, body, joint = spec.body("machine"), spec.body("cart"), spec.joint("slide")
     joint.stiffness, joint.damping = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     for name, side in SPRINGS:
-        machine.add_site(name=f"{name}_post", pos=(side * ENDS, 0, cart.RAIL), group=5, rgba=(0, 0, 0, 0))
-        body.add_site(name=f"{name}_cart", pos=(side * EDGE, 0, 0), group=5, rgba=(0, 0, 0, 0))
+        machine.add_site(name=f"{name}_post", pos=(side * ENDS, 0, cart.RAIL))
+        body.add_site(name=f"{name}_cart", pos=(side * EDGE, 0, 0))
         spring = spec.add_tendon(name=name, springlength=(RELAXED, RELAXED), group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"{name}_post")
         spring.wrap_site(f"{name}_cart")
@@ -104,7 +98,7 @@ def add_springs(spec):
 
 def spring_fields(model, p):
     springs = [model.tendon(name).id for name, _ in SPRINGS]
-    yield from body_fields(model, p)
+    yield from cart.mass_fields(model, p)
     yield Field("tendon_stiffness", springs, 0.5 * p.k)
     yield Field("tendon_damping", model.tendon("across").id, p.mu * (1.0 + ASIDE**2))
     yield Field("actuator_biasprm", (model.actuator("passive:active_damper").id, 2), p.mu)
@@ -123,10 +117,6 @@ VAN_DER_POL = Plant(
     nominal=nominal,
     lane=(0.0, 0.9, 0.0),
     jumps={"mild": {"mu": 3.0}, "hard": {"mu": 9.0}},
-    contacts={
-        "floor": on_floor,
-        "stops": stops,
-        "peg": peg,
-    },
+    contacts={"floor": on_floor, "stops": stops, "peg": peg},
     mechanisms={"springs": Variant(add_springs, spring_fields)},
 )
