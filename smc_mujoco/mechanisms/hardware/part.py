@@ -10,7 +10,7 @@ joint that a channel's actuator drives where that is not the channel's own.
 
 import dataclasses
 from collections.abc import Hashable, Iterator
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -32,7 +32,7 @@ class Part:
 
     stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
 
-    def check_numbers(self, *names: str, **bounds: float) -> None:
+    def check_numbers(self, *names: str, **bounds: Any) -> None:
         """Replace fields by the floats that they stand for. None stays where it is the field's default.
 
         Args:
