@@ -38,8 +38,8 @@ class Channel:
     partner_x0: float | None = None
 
 
-def given(channels: object) -> tuple[tuple[str, Channel], ...]:
-    """Coerce what the user gave to joints with their Channels."""
+def coerce(channels: object) -> tuple[tuple[str, Channel], ...]:
+    """Return a user's channels as pairs of joint and Channel."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
     items = (
@@ -52,8 +52,14 @@ def given(channels: object) -> tuple[tuple[str, Channel], ...]:
     return tuple((joint, channel(joint, value)) for joint, value in items)
 
 
+def joints_of(channels: tuple[tuple[str, Channel], ...]) -> list[str]:
+    """Return the names of the driven joints, then those of their partners."""
+    partners = [channel.partner for _, channel in channels if channel.partner is not None]
+    return [*(joint for joint, _ in channels), *partners]
+
+
 def channel(joint: object, value: object) -> Channel:
-    """Coerce a Channel, a dict of its fields, or None to a Channel."""
+    """Return a Channel, a dict of its fields, or None as a Channel."""
     if isinstance(value, Mapping):
         for key in value:
             find("field of a Channel", key, {field.name: None for field in dataclasses.fields(Channel)})
@@ -72,19 +78,19 @@ def channel(joint: object, value: object) -> Channel:
     return dataclasses.replace(made, **starts)
 
 
-def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...], partners: list[str]) -> None:
+def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...]) -> None:
     """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that forbid control."""
-    joints = [*(joint for joint, _ in asked), *partners]
-    there = {model.joint(i).name: i for i in range(model.njnt) if model.joint(i).name}
+    joints = joints_of(asked)
+    names = [model.joint(i).name for i in range(model.njnt)]
     for joint in joints:
-        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, there)])
+        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
         if kind not in SIMPLE:
             raise ScenarioError(
                 f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
             )
         if joints.count(joint) > 1:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
-    if partners and len(partners) < len(asked):
+    if len(asked) < len(joints) < 2 * len(asked):
         bare = next(joint for joint, channel in asked if channel.partner is None)
         raise ScenarioError(f"channel {bare!r} has no partner and others have: give each one, or none")
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION.value:
@@ -96,16 +102,15 @@ def starts(
 ) -> tuple[float, ...]:
     """Return x0: from the channels, else from the keyframe, else from the model.
 
-    The last alone may be outside a range, for nobody asked for it, and a scenario can have another.
+    Only the model's may be outside a range: nobody asked for it, and a scenario can have another.
     """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
-    held = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints}
-    said = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
-    said |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
-    found = held | said
-    told = [one for one in ranges(model, joints) if keyframe is not None or one[0] in said]
-    within(plant, told, [found[joint] for joint, _, _ in told])
-    return tuple(found.values())
+    asked_for = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
+    asked_for |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
+    x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | asked_for
+    checked = [one for one in ranges(model, joints) if keyframe is not None or one[0] in asked_for]
+    within(plant, checked, [x0[joint] for joint, _, _ in checked])
+    return tuple(x0.values())
 
 
 def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:

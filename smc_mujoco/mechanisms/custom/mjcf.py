@@ -15,7 +15,7 @@ import sys
 import tempfile
 import threading
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -25,12 +25,20 @@ import numpy as np
 from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.custom import mjcf_trial
+from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR
+from smc_mujoco.mechanisms.plant import LARGEST
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
 MEMORY = 4 * 2**30  # bytes of address space that a model may take where it is tried: chosen
 DIGITS = 17  # of numbers in a text made of an MjSpec: all
 SAME = 1e-12  # how far numbers of a model may move when it is written and read: rounding
+
+RESERVED = ("smc:", PLAY, ROTOR)  # beginnings of the names of our own parts
+NAMED = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # the kinds that our own parts are of
+UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")  # in fields that set no motion, or follow
+KINDS = {"body": "BODY", "jnt": "JOINT", "geom": "GEOM", "site": "SITE"}  # how a field's name begins -> what it is of
+KINDS |= {"actuator": "ACTUATOR", "tendon": "TENDON", "eq": "EQUALITY"}
 
 _tried: set[str] = set()  # hashes of models that did no harm
 _lock = threading.Lock()  # who has changed how many digits MuJoCo writes
@@ -268,8 +276,9 @@ def broken(where: str, error: str) -> ScenarioError:
     return ScenarioError(f"MuJoCo cannot read {where} ({text}{place}): mend the file")
 
 
-def pick(label: str, kind: str, name: object, there: Mapping[str, int]) -> int:
-    """Return the number of what has that name in a model, or raise ScenarioError with the names that exist."""
+def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
+    """Return the index of a name among those of a model, or raise ScenarioError with the names that exist."""
+    there = {known: i for i, known in enumerate(names) if known}
     if not there:
         raise ScenarioError(f"unknown {kind} of {label} {shown(name)}: none has a name there, so give it one")
     return find(f"{kind} of {label}", name, there)
@@ -317,3 +326,43 @@ def _modelname(text: str) -> str:
     """Return the name that a model's text gives it, or "model"."""
     root = next(iter(_elements(text)), None)
     return (root is not None and root.get("model")) or "model"
+
+
+def check_model(label: str, model: mujoco.MjModel) -> None:
+    """Raise ScenarioError for NaN or enormous numbers, and for names that plants use themselves."""
+    check_numbers(label, model)
+    for name in [text.decode() for text in model.names.split(b"\0")]:
+        for start in filter(name.startswith, RESERVED):
+            for kind in NAMED:
+                if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
+                    raise ScenarioError(
+                        f"{label} has a {kind.lower()} {name!r}, and names that begin with {start!r} are "
+                        "smc_mujoco's own: give it another"
+                    )
+
+
+def check_numbers(label: str, model: mujoco.MjModel) -> None:
+    """Raise ScenarioError for a number that is NaN, infinite or beyond 1e15 SI units; ranges may be infinite."""
+    named = sorted(fields(model), key=lambda name: name.partition("_")[0] not in KINDS)  # what has names first
+    arrays = [(name, getattr(model, name)) for name in named]
+    arrays += [(f"opt.{name}", np.atleast_1d(getattr(model.opt, name))) for name in ("gravity", "wind", "density")]
+    for field, values in arrays:
+        if values.dtype.kind != "f" or any(part in field for part in UNUSED):
+            continue
+        wrong = np.isnan(values) if field.endswith("range") else ~(np.abs(values) <= LARGEST)
+        if wrong.any():
+            place = tuple(np.argwhere(wrong)[0])
+            raise ScenarioError(
+                f"{field} of {label} is {values[place]:g}{_where(model, field, int(place[0]))}: "
+                f"give finite numbers of at most {LARGEST:g} in its MJCF"
+            )
+
+
+def _where(model: mujoco.MjModel, field: str, i: int) -> str:
+    """Return the body, joint, ... to which a number in a field belongs."""
+    owner = field.partition("_")[0]
+    if owner == "dof":
+        owner, i = "jnt", int(model.dof_jntid[i])
+    kind = KINDS.get(owner, "")
+    name = kind and mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), i)
+    return f" at {kind.lower()} {name!r}" if name else ""

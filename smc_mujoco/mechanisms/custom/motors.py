@@ -7,6 +7,7 @@ from typing import NamedTuple
 import mujoco
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.mechanisms.custom.channels import Channel
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
 
@@ -18,29 +19,37 @@ CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
 class Motor(NamedTuple):
-    """The motor of a channel: the bound on its force, N m or N, and the actuators that it replaces."""
+    """The motor of a channel.
 
+    Attributes:
+      joint: its name.
+      limit: the bound on its force, N m or N.
+      replaced: numbers of the actuators that it replaces.
+    """
+
+    joint: str
     limit: float
     replaced: tuple[int, ...]
 
 
-def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, ideal: bool) -> Motor:
+def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
     """Return the motor that drives a joint.
 
     Raises:
       ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
     """
-    number = model.joint(joint).id
+    number, wanted = model.joint(joint).id, channel.actuator
     held = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
     own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
     own = [i for i in own if model.actuator_trnid[i, 0] == number]
-    if ideal:
+    if channel.motor:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
-        return Motor(_limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *held), tuple(own))
+        return Motor(
+            joint, _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *held), tuple(own)
+        )
     if wanted is not None:
-        every = {model.actuator(i).name: i for i in range(model.nactuator) if model.actuator(i).name}
-        chosen = pick(label, "actuator", wanted, every)
+        chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
         if chosen not in own:
             raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
         own = [chosen]
@@ -54,7 +63,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, wanted: str | None, 
     if why := _no_motor(model, own[0]):
         raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
     gives = f"actuator {names[0]!r} gives joint {joint!r} of {label}"
-    return Motor(_limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
+    return Motor(joint, _limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
@@ -94,16 +103,16 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
     return low, high
 
 
-def put(spec: mujoco.MjSpec, motors: Sequence[tuple[str, Motor]]) -> None:
+def put(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
     """Add the channels' motors, in this order, and keep the model's other actuators as passive parts."""
-    replaced = {i for _, motor in motors for i in motor.replaced}
+    replaced = {i for motor in motors for i in motor.replaced}
     for i, actuator in enumerate(list(spec.actuators)):
         if i in replaced:
             spec.delete(actuator)
         else:
             actuator.name = f"{PASSIVE}smc:{i}"  # no joint is called so
-    for joint, motor in motors:  # named by joints, as actuators' names may be anything
-        made = spec.add_actuator(name=f"u:{joint}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    for motor in motors:  # named by joints, as actuators' names may be anything
+        made = spec.add_actuator(name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         made.set_to_motor()
         limit = motor.limit if math.isfinite(motor.limit) else 0.0
         made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0

@@ -33,7 +33,6 @@ from smc_mujoco.mechanisms.plant import Coupled, Field, Native, Values, ready, w
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
-_FUNCTIONS = ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM")
 _lock = threading.Lock()
 
 
@@ -46,7 +45,7 @@ class Places(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Believed(Coupled):
+class NominalModel(Coupled):
     """The nominal model of a user's plant: f and g computed by MuJoCo from the model without mismatch."""
 
     build: Callable[[int], mujoco.MjSpec]
@@ -79,8 +78,11 @@ class Believed(Coupled):
         if self.why_not:
             return Native(unknown().address, (), ())
         model, places, _, spare = prepared(self, frozen(parameters))
-        lent = lend(model, spare)
-        data, seen = lent.data, np.full(2 * len(places.qpos), np.nan)
+        try:
+            data = spare.pop()  # each simulation writes whatever it reads before it reads it
+        except IndexError:
+            data = mujoco.MjData(model)
+        lent, seen = Lent(data, spare), np.full(2 * len(places.qpos), np.nan)
         table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
         solved = np.zeros(2 * model.nv)
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
@@ -100,18 +102,9 @@ class Lent:
         self.spare.append(self.data)
 
 
-def lend(model: mujoco.MjModel, spare: list[mujoco.MjData]) -> Lent:
-    """Return an MjData from the pool, or a new one. Each simulation writes whatever it reads before it reads it."""
-    try:
-        data = spare.pop()
-    except IndexError:
-        data = mujoco.MjData(model)
-    return Lent(data, spare)
-
-
 @functools.lru_cache(maxsize=32)
 def prepared(
-    nominal: Believed, parameters: Mapping[str, float]
+    nominal: NominalModel, parameters: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
     """Return the model with nominal parameters, its channels' addresses, an MjData for Python, and the pool."""
     model = ready(nominal.build(0), 0)
@@ -124,16 +117,6 @@ def prepared(
     joints = joint_ids(model)
     places = Places(model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)])
     return model, places, data, []
-
-
-@functools.cache
-def functions() -> tuple:
-    """Return MuJoCo's C functions that the nominal model calls, in the order of _FUNCTIONS."""
-    found = [getattr(libmujoco.library(), name) for name in _FUNCTIONS]
-    for name, function in zip(_FUNCTIONS, found, strict=True):
-        function.restype = None
-        function.argtypes = [ctypes.c_int64] * 2 if name != "mj_solveM" else [ctypes.c_int64] * 4 + [ctypes.c_int]
-    return tuple(found)
 
 
 @functools.cache
@@ -151,7 +134,12 @@ def unknown() -> Function:
 @functools.cache
 def native() -> Function:
     """inputs: i, n, x, v, acceleration (unused) and u, (n,) each -> outputs: f and g of channel i."""
-    positions, velocities, actuation, accelerations, solve = functions()
+    library = libmujoco.library()
+    positions, velocities, solve = library.mj_fwdPosition, library.mj_fwdVelocity, library.mj_solveM
+    actuation, accelerations = library.mj_fwdActuation, library.mj_fwdAcceleration
+    for function in (positions, velocities, actuation, accelerations, solve):
+        function.restype, function.argtypes = None, [ctypes.c_int64] * 2
+    solve.argtypes = [ctypes.c_int64] * 4 + [ctypes.c_int]
 
     def native(y, p, m, out):
         head, own = carray(pointer(y), (2,)), carray(pointer(p), (12,))

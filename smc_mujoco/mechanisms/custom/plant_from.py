@@ -18,7 +18,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -26,11 +26,10 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.channels import RECORDED, SIMPLE, Channel, check, given, ranges, starts
+from smc_mujoco.mechanisms.custom.channels import RECORDED, SIMPLE, Channel, check, coerce, joints_of, ranges, starts
 from smc_mujoco.mechanisms.custom.mjcf import Source
-from smc_mujoco.mechanisms.custom.model_check import check_model
 from smc_mujoco.mechanisms.custom.motors import MOTOR, Motor, motor_of, put
-from smc_mujoco.mechanisms.custom.nominal_model import Believed
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECTLY, Field, Plant, catalogue
 
@@ -43,14 +42,6 @@ WITHOUT = "give a law without a model"
 CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
 
 
-class Drive(NamedTuple):
-    """A channel as found in the model."""
-
-    joint: str
-    motor: Motor
-    partner: str | None
-
-
 @dataclasses.dataclass(frozen=True)
 class OwnModel:
     """The builder of a user's mechanism. It ignores n, which the channels decide."""
@@ -58,7 +49,7 @@ class OwnModel:
     source: Source
     keyframe: str | None
     channels: tuple[tuple[str, Channel], ...]
-    drives: tuple[Drive, ...]
+    motors: tuple[Motor, ...]
 
     def __call__(self, n: int) -> mujoco.MjSpec:
         """The model with a motor and two sensors a channel.
@@ -69,9 +60,8 @@ class OwnModel:
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that go
             spec.delete(named[0])  # from MuJoCo 4 on with the tuples that name it: ask again for what is left
-        put(spec, [(drive.joint, drive.motor) for drive in self.drives])
-        partners = [drive.partner for drive in self.drives if drive.partner]
-        for joint in [*(drive.joint for drive in self.drives), *partners]:
+        put(spec, self.motors)
+        for joint in joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
                 spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
         for key in list(spec.keys):
@@ -151,20 +141,19 @@ def plant_from(
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
     label, model = source.label, source.compiled(source.read())
     if not RECORDED.get():
-        check_model(label, model)
-    asked = given(channels)
-    partners = [channel.partner for _, channel in asked if channel.partner is not None]
-    check(label, model, asked, partners)
+        mjcf.check_model(label, model)
+    asked = coerce(channels)
+    joints = joints_of(asked)
+    check(label, model, asked)
     if keyframe is not None:
-        mjcf.pick(label, "keyframe", keyframe, {model.key(i).name: i for i in range(model.nkey) if model.key(i).name})
-    drives = tuple(Drive(joint, motor_of(label, model, joint, c.actuator, c.motor), c.partner) for joint, c in asked)
-    build = OwnModel(source, keyframe, asked, drives)
-    joints = [*(joint for joint, _ in asked), *partners]
+        mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
+    motors = tuple(motor_of(label, model, joint, channel) for joint, channel in asked)
+    build = OwnModel(source, keyframe, asked, motors)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
-    fields, limits = OwnFields(mass, gravity), tuple(drive.motor.limit for drive in drives)
+    fields, limits = OwnFields(mass, gravity), tuple(motor.limit for motor in motors)
     units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not, called = missing(model, joints, drives), named(name, label)
+    why_not, called = missing(model, joints, motors), named(name, label)
     return Plant(
         name=called,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -176,9 +165,9 @@ def plant_from(
         sizes=(len(joints), len(joints)),
         build=build,
         fields=fields,
-        nominal=Believed(build, fields, why_not),
+        nominal=NominalModel(build, fields, why_not),
         lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
-        underactuated=bool(partners),
+        underactuated=len(joints) > len(asked),
         direct=True,
         smooth=smooth(model),
         unmodelled=why_not,
@@ -215,7 +204,7 @@ def smooth(model: mujoco.MjModel) -> bool:
     )
 
 
-def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...]) -> str:
+def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
         return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT
@@ -223,17 +212,17 @@ def missing(model: mujoco.MjModel, joints: list[str], drives: tuple[Drive, ...])
         return "it has plugins or flexible bodies: " + WITHOUT
     ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
     idle = np.ones(model.nactuator, bool)
-    idle[[a for drive in drives for a in drive.motor.replaced]] = False
+    idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == CURRENT):
         return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT
     across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
     near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
     loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in ours))
-    return unmeasured(model, loose, drives) if loose else ""
+    return unmeasured(model, loose, len(motors), len(joints) - len(motors)) if loose else ""
 
 
-def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...]) -> str:
-    """Return what to say about joints, by number, that move with the channels but are not channels."""
+def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: int) -> str:
+    """Return what to say about joints, by number, that move with driven joints and their partners, and are neither."""
     for number in loose:
         kind = mujoco.mjtJoint(model.jnt_type[number])
         if kind not in SIMPLE:
@@ -242,8 +231,8 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], drives: tuple[Drive, ...
             return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
     moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, MOTOR), 0].tolist())
     bare = [number for number in loose if number not in moved]
-    partners = len(bare) + sum(drive.partner is not None for drive in drives)
-    driven = len(drives) + len(loose) - len(bare)
+    partners += len(bare)
+    driven += len(loose) - len(bare)
     first = model.joint(loose[0]).name
     said = f"joint {first!r} moves with its channels and is not measured"
     if partners not in (0, driven):

@@ -20,7 +20,7 @@ from smc_mujoco.control import design
 from smc_mujoco.envs import core, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.nominal_model import Believed, prepared
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel
 from smc_mujoco.simulation import consistency
 from smc_mujoco.simulation import model as assembly
@@ -112,7 +112,7 @@ def arm(tmp_path):
 def joints_of(plant: smc.Plant, raw: mujoco.MjModel) -> list:
     """The plant's channels in the model as its file has it."""
     assert isinstance(plant.build, OwnModel)
-    names = [d.joint for d in plant.build.drives] + [d.partner for d in plant.build.drives if d.partner]
+    names = own_channels.joints_of(plant.build.channels)
     return [raw.joint(name) for name in names]
 
 
@@ -253,7 +253,7 @@ def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
     first, _, _, again = smc.run(base), smc.run(many), smc.run(many), smc.run(base)
     np.testing.assert_array_equal(again.x, first.x)
     gc.collect()
-    assert isinstance(plant.nominal, Believed)
+    assert isinstance(plant.nominal, NominalModel)
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
@@ -265,13 +265,13 @@ def test_what_the_nominal_model_of_a_run_gone_astray_worked_on_does_as_well(arm)
     assert astray.failure is not None
     np.testing.assert_array_equal(again.x, first.x)
     gc.collect()
-    assert isinstance(plant.nominal, Believed)
+    assert isinstance(plant.nominal, NominalModel)
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == 1
 
 
 def test_no_room_for_what_a_nominal_model_works_on_is_said_once(arm, monkeypatch):
     nominal, parameters = (plant := arm()).nominal, frozen(plant.parameters)
-    assert isinstance(nominal, Believed)
+    assert isinstance(nominal, NominalModel)
     spare = prepared(nominal, parameters)[3]
 
     def full(model):
