@@ -34,7 +34,7 @@ _KNOWN: set[type] = set()  # classes whose methods explain themselves
 
 
 def explained(value: Any) -> Any:
-    """A public name as users get it: a function, a class or a module whose calls name the argument that does not fit.
+    """Return a public function, class or module whose calls name the argument that does not fit.
 
     Classes and modules are changed in place, and so are the classes of what the functions return.
     """
@@ -67,7 +67,7 @@ def _open(kind: type) -> None:
 
 
 def _explained(function: Callable, home: type | None = None) -> Callable:
-    """The function, or the method of a class, with its exceptions explained."""
+    """Return a function, or a method of the class `home`, with its exceptions explained."""
 
     @functools.wraps(function)
     def call(*args: Any, **named: Any) -> Any:
@@ -101,7 +101,7 @@ def _explaining(function: Callable, home: type | None, args: tuple, named: dict[
 
 
 def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str, Any]) -> ScenarioError | None:
-    """The error that names the first argument that a call should not have, or lacks, or that does not fit."""
+    """Return the error that names the first argument that is unknown, missing, or does not fit; None if all fit."""
     signature = inspect.signature(function)
     try:
         given = signature.bind(*args, **named).arguments
@@ -124,7 +124,7 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
 def _unbound(
     function: Callable, home: type | None, signature: inspect.Signature, args: tuple, named: dict[str, Any]
 ) -> ScenarioError:
-    """The error for arguments that a signature does not take."""
+    """Return the error for arguments that a signature does not take."""
     parameters, name, what = list(signature.parameters.values()), function.__name__, "argument"
     if home is not None:
         name, what = (home.__name__, "field") if name == "__init__" else (f"{home.__name__}.{name}", what)
@@ -145,7 +145,7 @@ def _unbound(
 
 
 class _Names(dict):
-    """The names that annotations use: a module's own, then public ones, then those of any module that is loaded."""
+    """Names in annotations: those of the function's module, then public ones, then those of any loaded module."""
 
     def __missing__(self, name: str) -> Any:
         if hasattr(builtins, name):
@@ -156,7 +156,7 @@ class _Names(dict):
         for module in [module for key, module in list(sys.modules.items()) if key.startswith(f"{OURS}.")]:
             if name in vars(module):
                 return vars(module)[name]
-        return type(name, (), {})  # of a module that nobody has loaded: no value is of it
+        return type(name, (), {})  # of a module that is not loaded, so that no value is of this type
 
 
 class Kind(NamedTuple):
@@ -167,7 +167,7 @@ class Kind(NamedTuple):
     several: str
 
     def takes(self, value: Any) -> bool:
-        """Whether a value is of this kind; of an iterator the items are not looked at."""
+        """Return whether a value is of this kind; the items of an iterator are not looked at."""
         try:
             return self.fits(value)
         except Exception:  # whatever `number`, `whole` and the value's own methods raise
@@ -209,16 +209,16 @@ KINDS: dict[Any, Kind] = {
 
 
 def kind_of(hint: Any) -> Kind:
-    """What an annotation asks for."""
+    """Return what an annotation asks for."""
     origin, args = typing.get_origin(hint) or hint, typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         found = _either([kind_of(arm) for arm in args])
     elif origin in KINDS or not isinstance(origin, type):
         found = KINDS.get(origin, KINDS[Any])
     elif getattr(origin, "_is_protocol", False):
-        asked = sorted(name for name in vars(origin) if not name.startswith("_"))
-        words = f"something that has {' and '.join(asked)}"
-        found = Kind(lambda value: all(hasattr(value, name) for name in asked), words, words)
+        names = sorted(name for name in vars(origin) if not name.startswith("_"))
+        words = f"something that has {' and '.join(names)}"
+        found = Kind(lambda value: all(hasattr(value, name) for name in names), words, words)
     elif issubclass(origin, Mapping):
         found = _mapping([kind_of(arg) for arg in args or (Any, Any)])
     elif issubclass(origin, Iterable) and origin.__module__ in ("builtins", "collections.abc"):
@@ -232,7 +232,7 @@ def kind_of(hint: Any) -> Kind:
 
 
 def _either(arms: Sequence[Kind]) -> Kind:
-    """What fits one of the arms."""
+    """Return the kind of what is of one of these kinds."""
     if KINDS[os.PathLike] in arms:  # which takes texts too, if they are paths
         arms = [arm for arm in arms if arm is not KINDS[str]]
     one, several = _joined([arm.one for arm in arms]), _joined([arm.several for arm in arms])
@@ -240,14 +240,14 @@ def _either(arms: Sequence[Kind]) -> Kind:
 
 
 def _joined(words: Sequence[str]) -> str:
-    """Words with "or" before the last."""
+    """Join words with commas, and "or" before the last."""
     *most, last = dict.fromkeys(words)
     return f"{', '.join(most)} or {last}" if most else last
 
 
-def _mapping(held: Sequence[Kind]) -> Kind:
-    """A dict from the first kind to the second."""
-    keys, values = held
+def _mapping(kinds: Sequence[Kind]) -> Kind:
+    """Return the kind of dicts from the first kind to the second."""
+    keys, values = kinds
 
     def test(value: Any) -> bool:
         items = value.items() if isinstance(value, Mapping) else [(keys, None)]
@@ -258,7 +258,7 @@ def _mapping(held: Sequence[Kind]) -> Kind:
 
 
 def _several(origin: type, held: list[Kind], count: int | None) -> Kind:
-    """A list or an iterator of a kind, or of `count` values each of its own."""
+    """Return the kind of lists or iterators of one kind, or of `count` values with a kind each."""
 
     def test(value: Any) -> bool:
         if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):

@@ -1,4 +1,4 @@
-"""Old names that a package hands on for one release."""
+"""Old names in a package, kept for one release."""
 
 import importlib
 import warnings
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 
 def old_names(package: str, places: Mapping[str, str]) -> Callable[[str], object]:
-    """Return the `__getattr__` of a package whose names are in other modules now.
+    """Return a `__getattr__` for a package whose names have moved to other modules.
 
     Args:
       package: its name.

@@ -25,16 +25,16 @@ class ScenarioError(ValueError):
 
 
 class ScenarioWarning(UserWarning):
-    """A scenario that can be run, and is hardly what its author means. The message is one sentence, as an error's."""
+    """A scenario that runs, but is probably not what its author means. The message is one sentence, as an error's."""
 
 
 def printable(text: str) -> str:
-    """The text on one line: characters that a terminal would act on, such as a newline in a file's name, escaped."""
+    """Return the text with escapes for characters that a terminal would act on, such as a newline in a file's name."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(value: object) -> str:
-    """A value on one line, cut where it is long; its class in <> where its repr fails."""
+    """Return a value's repr on one line of at most 60 characters; its class in <> if the repr fails."""
     try:
         text = " ".join(_brief(value).split())
     except Exception:  # of a user's class, in a list too; RecursionError where lists nest deep
@@ -44,7 +44,7 @@ def shown(value: object) -> str:
 
 
 def _brief(value: object) -> str:
-    """repr, of long texts, lists and dicts that of their beginning."""
+    """Return the repr; of long texts, lists and dicts that of their beginning."""
     if isinstance(value, str | bytes | list | tuple):
         value = value[:60]
     elif isinstance(value, dict):
@@ -53,7 +53,7 @@ def _brief(value: object) -> str:
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
-    """The error for a name that is not among `known`, with the nearest that is."""
+    """Return the error for a name that is not among `known`, with the nearest that is."""
     names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
     hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}" if names else "there are none"
@@ -61,7 +61,7 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
 
 
 def _nearest(name: str, names: list[str]) -> list[str]:
-    """The nearest of names in spelling, whatever the case, or the first that contains the name."""
+    """Return the name nearest in spelling, ignoring case, or the first that contains the name; [] for none."""
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
     close = difflib.get_close_matches(wanted, list(plain), n=1)
@@ -69,13 +69,13 @@ def _nearest(name: str, names: list[str]) -> list[str]:
 
 
 def one_line(text: str, most: int = 200) -> str:
-    """Text on one line: a ? for each character that cannot be printed, cut where it is longer than `most`."""
+    """Return text on one line of at most `most` characters, with a ? for each that cannot be printed."""
     text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * most].split()))
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:
-    """known[name], or the error that says what is known."""
+    """Return known[name], or raise the error of `unknown`."""
     if not isinstance(name, str) or name not in known:
         raise unknown(kind, name, known)
     return known[name]
@@ -90,7 +90,7 @@ def number(
     most: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """`value` as a float in (above, inf) and [least, most], or ScenarioError naming `what`."""
+    """Return `value` as a float in (above, inf) and [least, most], or raise ScenarioError naming `what`."""
     real = _real(value)
     if real is None:
         raise ScenarioError(f"{what} is {shown(value)}: give a number")
@@ -110,7 +110,7 @@ def number(
 
 
 def whole(what: str, value: object, least: int, most: int) -> int:
-    """`value` as an int in [least, most], or ScenarioError naming `what`."""
+    """Return `value` as an int in [least, most], or raise ScenarioError naming `what`."""
     real = _real(value)
     if real is None or not least <= real <= most or real != real // 1:
         raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
@@ -118,7 +118,7 @@ def whole(what: str, value: object, least: int, most: int) -> int:
 
 
 def _real(value: Any) -> Any:
-    """The real number that a value is, also in an array without axes; None for another value, flag or duration."""
+    """Return a real number, also from an array without axes; None for all else, flags and durations included."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
@@ -126,19 +126,19 @@ def _real(value: Any) -> Any:
 
 
 def taken(what: str, values: Iterable[T]) -> list[T]:
-    """The items of a user's list, or ScenarioError naming `what` where there are more than MOST, or no end of them."""
+    """Return the items of a user's list, or raise ScenarioError naming `what` if there are more than MOST or no end."""
     try:
         items = iter(values)
     except Exception:  # an array without axes, or a user's object that fails
         raise ScenarioError(f"{what} is {shown(values)}: give a list") from None
-    found = list(itertools.islice(items, MOST + 1))
-    if len(found) > MOST:
+    first = list(itertools.islice(items, MOST + 1))
+    if len(first) > MOST:
         raise ScenarioError(f"{what} has more than {MOST:,} items: give fewer")
-    return found
+    return first
 
 
 def attribute(value: object, name: str) -> Any:
-    """An attribute of a user's value; None where it has none, or fails where it is asked for one."""
+    """Return an attribute of a user's object; None if there is none, or if reading it raises."""
     try:
         return getattr(value, name, None)
     except Exception:
@@ -146,7 +146,7 @@ def attribute(value: object, name: str) -> Any:
 
 
 def name(what: str, value: object) -> str:
-    """`value` if it is a name: one line of 1 to 100 printable characters; else ScenarioError naming `what`."""
+    """Return `value` if it is a name, 1 to 100 printable characters, else raise ScenarioError naming `what`."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
     if len(value) > LONGEST_NAME:
@@ -155,9 +155,9 @@ def name(what: str, value: object) -> str:
 
 
 def users_frame() -> int:
-    """The stacklevel of a warning for which it points to the user's line: the nearest that is not in this package.
+    """Return the stacklevel with which a warning points to the user's line.
 
-    Nor in `dataclasses`, whose `replace` makes scenarios.
+    That is the nearest outside this package, and outside `dataclasses`, whose `replace` makes scenarios.
     """
     frame, level = sys._getframe(1), 1
     inner = "smc_mujoco", "dataclasses"

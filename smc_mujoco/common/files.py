@@ -1,4 +1,4 @@
-"""Files: the shipped ones, written ones that are there whole or not at all, JSON with NaN and infinity."""
+"""Files: those of the package, atomic writing, reading what may be damaged, JSON with NaN and infinity."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbe
 
 
 def shipped(folder: str) -> Path:
-    """The folder models/ or scenes/, from a checkout or from an installed wheel."""
+    """Return the folder models/ or scenes/, of a checkout or of an installed wheel."""
     here = Path(__file__).parents[1]
     for place in (here / folder, here.parent / folder):
         if place.is_dir():
@@ -25,7 +25,7 @@ def shipped(folder: str) -> Path:
 
 
 def ended(path: str | os.PathLike, ending: str) -> Path:
-    """The path, if a file can have its name and the ending, such as ".json"; else a ScenarioError."""
+    """Return the path if its name ends in `ending`, such as ".json", else raise ScenarioError."""
     path = Path(path)
     if path.suffix != ending or "\0" in path.name:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {ending}")
@@ -79,10 +79,7 @@ def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
 
 
 def plain(data: Any) -> Any:
-    """The data as JSON holds it without loss: NaN and the infinities become the words of WORDS.
-
-    A text that is such a word gets a ' before it.
-    """
+    """Return the data with words for NaN and the infinities, which JSON lacks; a text that is such a word gets a '."""
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
@@ -94,28 +91,28 @@ def plain(data: Any) -> Any:
     return data
 
 
-def _found(data: Any) -> Any:
-    """What `plain` was given; tuples are lists."""
+def _restored(data: Any) -> Any:
+    """Undo `plain`, but for tuples, which become lists."""
     if isinstance(data, dict):
-        return {name: _found(value) for name, value in data.items()}
+        return {name: _restored(value) for name, value in data.items()}
     if isinstance(data, list):
-        return [_found(value) for value in data]
+        return [_restored(value) for value in data]
     if isinstance(data, str) and data.lstrip("'") in WORDS:
         return data[1:] if data.startswith("'") else WORDS[data]
     return data
 
 
 def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> str:
-    """The data as strict JSON; numbers that JSON lacks are words, see `plain`."""
+    """Return the data as strict JSON, see `plain`."""
     return json.dumps(plain(data), indent=indent, sort_keys=sort_keys, allow_nan=False)
 
 
 def from_json(text: str) -> Any:
-    """The data in a JSON text, with numbers for the words "NaN", "Infinity" and "-Infinity".
+    """Return the data in a JSON text, with numbers for the words of `plain`.
 
-    Bare NaN and Infinity, which older files have, are read, too.
+    It also reads bare NaN and Infinity, which older files have.
     """
-    return _found(json.loads(text))
+    return _restored(json.loads(text))
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
@@ -131,13 +128,13 @@ def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
 
 
 def read_json(path: Path) -> Any:
-    """The data in a JSON file, see `from_json`."""
+    """Return the data in a JSON file, see `from_json`."""
     return from_json(path.read_text(encoding="utf-8"))
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, with its ending, that takes its place when the block ends well, else goes away.
+    """Yield a temporary file beside `path`, which replaces it if the block ends well, and else is deleted.
 
     Raises:
       ScenarioError: the folder cannot be made or written.

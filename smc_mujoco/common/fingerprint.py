@@ -26,6 +26,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.jit import AtAddress
+from smc_mujoco.common.remade import names_in
 
 PACKAGE = Path(__file__).parents[1]
 BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
@@ -149,7 +150,7 @@ def _versioned(thing: Any) -> bool:
 
 
 def _function_contents(function: FunctionType) -> list[Any]:
-    names = _names(function.__code__)
+    names = names_in(function.__code__)
     closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
     return [
         function.__code__,
@@ -178,11 +179,6 @@ def _cell_contents(cell: Any) -> Any:
         return cell.cell_contents
     except ValueError:  # not filled yet
         return None
-
-
-def _names(code: CodeType) -> set[str]:
-    """Return the names that code uses, with those of the functions within it."""
-    return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
 def _class_contents(kind: type) -> list[Any]:

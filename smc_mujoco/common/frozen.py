@@ -1,4 +1,4 @@
-"""A dict that cannot change: what plain data are made of, so that what was checked stays as it was."""
+"""A dict that cannot change, so that checked data stay as they were checked."""
 
 from collections.abc import Mapping
 from typing import NoReturn, TypeVar
@@ -22,5 +22,5 @@ class Frozen(dict[str, V]):
 
 
 def frozen(mapping: Mapping[str, V]) -> Frozen[V]:
-    """A frozen copy."""
+    """Return a frozen copy."""
     return Frozen(mapping)

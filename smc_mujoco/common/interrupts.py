@@ -1,4 +1,4 @@
-"""Ctrl-C held back while something must not stop halfway: libraries while they load, numba while it compiles."""
+"""Ctrl-C, delayed while something must not stop halfway: libraries as they load, numba as it compiles."""
 
 import contextlib
 import signal
@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def held_back() -> Iterator[None]:
-    """Hold Ctrl-C back for the length of a with block; what was pressed meanwhile is heard at its end.
+    """Delay Ctrl-C to the end of a with block.
 
-    Python hears it in the main thread alone, so other threads need not hold it back.
+    Python receives it in the main thread only, so other threads need not delay it.
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):

@@ -37,7 +37,7 @@ if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread 
 
 
 class NotCompilable(Exception):
-    """Why a function runs in the reference loop instead."""
+    """A function cannot be compiled, and runs in the reference loop. The message says why."""
 
 
 def _at(kind: types.Type) -> Callable:
@@ -83,7 +83,7 @@ call_int = _calling(32)  # the same for a C function that returns an int: the re
 
 @intrinsic
 def attempt(typingctx, body, arguments):
-    """(whether body(*arguments) returned, what it returned): an exception ends as False, not in Python."""
+    """Return whether body(*arguments) returned, and its result. An exception gives False and does not reach Python."""
     resolved = body.get_call_type(typingctx, tuple(arguments), {})
     returned = resolved.return_type
     for item in returned.types if isinstance(returned, types.BaseTuple) else (returned,):
@@ -102,13 +102,13 @@ def attempt(typingctx, body, arguments):
 
 @functools.cache
 def named(names: tuple[str, ...]) -> type:
-    """The NamedTuple type with these fields; one unused field where there is none."""
+    """Return the NamedTuple type with these fields; with one unused field if there are none."""
     return namedtuple("Parameters", names or ("unused",))
 
 
 @functools.cache
 def loader(kind: type) -> Callable:
-    """A compiled function that reads a NamedTuple of floats from an address."""
+    """Return a compiled function that reads a NamedTuple of floats from an address."""
     record = types.NamedUniTuple(types.float64, len(kind._fields), kind)
 
     @intrinsic
@@ -123,10 +123,10 @@ def loader(kind: type) -> Callable:
 
 
 def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
-    """A C function of numba's, compiled; Ctrl-C is heard once that is done, as numba may lose it.
+    """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
     Args:
-      cache: whether to keep it on disk, where there is a place for it, and to take it from there.
+      cache: whether to keep it on disk, if that can be written, and to load it from there.
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
@@ -169,16 +169,16 @@ class Sealed(IndexDataCacheFile):
 
 
 def _whole(path: str) -> bool:
-    """Whether a file of the cache is there and as it was written."""
+    """Return whether a file of the cache is there and as it was written."""
     try:
-        held = Path(path).read_bytes()
+        content = Path(path).read_bytes()
     except OSError:
         return False
-    return hashlib.sha256(held[:-DIGEST]).digest() == held[-DIGEST:]
+    return hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]
 
 
 class Function:
-    """A compiled C function, kept alive; `address` is where it lies."""
+    """A compiled C function, kept alive, and its `address`."""
 
     def __init__(self, body: Callable):
         try:
@@ -189,10 +189,10 @@ class Function:
 
 
 class AtAddress:
-    """What is a C function of the callback's type already.
+    """Base of laws that are C functions of the callback's type already.
 
     Attributes:
-      address: where it lies, as long as this lives.
+      address: of the function, valid as long as this object lives.
       digest: a hash of its machine code.
     """
 
@@ -201,12 +201,12 @@ class AtAddress:
 
 
 class Uncompiled:
-    """What is Python by its nature; `why` says so of a law, after its name."""
+    """Base of laws that only run in Python; `why` is the reason, to be put after the law's name."""
 
     why: str
 
 
-# How the lines of numba's errors begin that say where it was, not what it did not like.
+# Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
     r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
@@ -214,7 +214,7 @@ WHEREABOUTS = re.compile(
 
 
 def reason(error: Exception) -> str:
-    """The line of a compiler's error that says what it did not like."""
+    """Return the line of a compiler's error that says what is wrong."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~.")]
     telling = [line for line in lines if not WHEREABOUTS.match(line)]
     return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
@@ -222,7 +222,7 @@ def reason(error: Exception) -> str:
 
 @functools.cache
 def jit(function: Callable) -> Callable:
-    """`function`, and whatever compiled functions it calls, compiled to raise out of bounds and at division by zero."""
+    """Compile a function, and the compiled functions that it calls, to raise out of bounds and at division by zero."""
     try:
         return remade(function, njit(error_model="python", boundscheck=True))
     except Exception as error:

@@ -1,4 +1,4 @@
-"""The MuJoCo library that this process runs, for what its Python package does not offer."""
+"""MuJoCo's shared library, for C functions that its Python package does not offer."""
 
 import ctypes
 import functools
@@ -10,10 +10,10 @@ from smc_mujoco.common.errors import ScenarioError
 
 
 def path() -> Path:
-    """The library's file.
+    """Return the path of the library's file.
 
     Raises:
-      ScenarioError: it is not where the package has it.
+      ScenarioError: it is not in the package's folder.
     """
     folder = Path(mujoco.__file__).parent
     names = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
@@ -23,12 +23,12 @@ def path() -> Path:
 
 
 def plugins() -> list[Path]:
-    """The plugins that the package loads when it is imported."""
+    """Return the paths of the plugins that the package loads when it is imported."""
     folder = Path(mujoco.__file__).parent / "plugin"
     return sorted(path for path in folder.glob("*") if path.suffix in (".so", ".dylib", ".dll"))
 
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """The library, for its C functions."""
+    """Return the library, for its C functions."""
     return ctypes.CDLL(str(path()))

@@ -1,4 +1,4 @@
-"""Commands that end in time."""
+"""Commands with a time limit."""
 
 import contextlib
 import os
@@ -8,31 +8,33 @@ from collections.abc import Sequence
 
 
 class Late(Exception):
-    """A command was ended after its time."""
+    """A command was stopped because its time was up."""
 
 
-def timed(command: Sequence[str], timeout: float, heard: bool = True) -> subprocess.CompletedProcess[str]:
-    """A command that ends in time, with every process that it started.
+def timed(command: Sequence[str], timeout: float, output: bool = True) -> subprocess.CompletedProcess[str]:
+    """Run a command, and stop it and every process that it started when its time is up.
 
     Args:
-      heard: whether to keep what it prints; what user's code prints without end would fill the memory.
+      timeout: s.
+      output: whether to keep what it prints. A user's code may print without end and fill the memory.
 
     Raises:
-      Late: it did not.
+      Late: its time was up.
       OSError: there is no such program.
     """
+    pipe = subprocess.PIPE if output else subprocess.DEVNULL
     process = subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE if heard else subprocess.DEVNULL,
-        stderr=subprocess.PIPE if heard else subprocess.DEVNULL,
+        stdout=pipe,
+        stderr=pipe,
         text=True,
         errors="replace",
         env=os.environ | {"LC_ALL": "C"},
         start_new_session=True,
     )
     try:
-        said = process.communicate(timeout=timeout)
+        printed = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
         raise Late from None
     finally:
@@ -40,4 +42,4 @@ def timed(command: Sequence[str], timeout: float, heard: bool = True) -> subproc
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-    return subprocess.CompletedProcess(command, process.returncode, *said)
+    return subprocess.CompletedProcess(command, process.returncode, *printed)

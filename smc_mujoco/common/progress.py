@@ -6,27 +6,27 @@ from collections.abc import Iterator
 
 
 class Bar:
-    """What is told how far a piece of work is. This one shows nothing; `bar` gives those that do."""
+    """Receiver of a piece of work's progress. This one shows nothing; `bar` yields those that do."""
 
     def advance(self, work: float) -> None:
-        """Some more work is done."""
+        """Add work that is done."""
 
     def reached(self, done: float, whole: float) -> None:
-        """So much of the whole is done, for work whose whole is only known as it goes."""
+        """Set the work done and the whole, where the whole is only known as it goes."""
 
     def says(self, text: str) -> None:
-        """Another text beside the bar."""
+        """Change the text beside the bar."""
 
 
 @contextlib.contextmanager
 def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """A bar while the block lasts.
+    """Show a bar while the block lasts.
 
     Args:
       what: the text beside it.
-      whole: the work; None where `reached` will say it.
+      whole: the work; None if `reached` sets it.
       shown: False for a Bar that shows nothing.
-      counted: whether "3/60" stands there instead of a percentage.
+      counted: whether to show "3/60" instead of a percentage.
     """
     if not shown:
         yield Bar()
@@ -54,7 +54,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
 
 
 class Counter:
-    """Counts a study's runs and steps, and has a bar say so: runs done, runs a second."""
+    """Count of a study's runs and steps, shown beside a bar: runs done, runs a second."""
 
     def __init__(self, runs: int, steps: int, bar: Bar):
         self.total, self.all_steps, self.bar = runs, steps, bar
@@ -62,13 +62,13 @@ class Counter:
         self.start = time.monotonic()
 
     def stepped(self, steps: int) -> None:
-        """Some more simulated steps."""
+        """Add simulated steps."""
         self.steps += steps
         self.bar.advance(steps)
         self.bar.says(str(self))
 
     def finished(self, runs: int) -> None:
-        """Some more runs, scored and written."""
+        """Add runs that are scored and written."""
         self.runs += runs
         self.bar.says(str(self))
 
@@ -80,7 +80,7 @@ class Counter:
 
 @contextlib.contextmanager
 def counter(runs: int, steps: int, shown: bool) -> Iterator[Counter]:
-    """A Counter, with a bar on the terminal if that is wanted and there is something to do."""
+    """Yield a Counter, with a bar on the terminal if `shown` and if there is something to do."""
     with bar("", steps, shown=shown and runs > 0) as drawn:
         counts = Counter(runs, steps, drawn)
         drawn.says(str(counts))

@@ -1,7 +1,7 @@
-"""Functions remade: copies in which every numba-compiled function that they reach is compiled anew, or not at all.
+"""Copies of functions in which every numba-compiled function that they call is compiled anew, or not at all.
 
-numba checks array bounds only where it was asked to. A law's own helpers were compiled as their author liked, so a
-law is run with copies of them: compiled with checks or, in the reference loop, as the Python functions they are.
+numba checks array bounds only on request. The functions that a law calls were compiled as its author chose, so a law
+runs with copies of them: compiled with checks or, in the reference loop, as plain Python functions.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from numba.core.dispatcher import Dispatcher
 
 
 def remade(function: Any, finish: Callable[[Any], Any]) -> Any:
-    """`finish` of `function` as it was written, with what it calls finished likewise."""
+    """Return `finish` of a function as it was written, after doing the same to the compiled functions that it calls."""
     return _remade(getattr(function, "py_func", function), finish, {})
 
 
@@ -20,7 +20,7 @@ def _remade(function: Any, finish: Callable, made: dict) -> Any:
     if not isinstance(function, FunctionType) or not _reaches(function):
         return finish(function)
     if function not in made:
-        space, names = dict(function.__globals__), _names(function.__code__)
+        space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
         made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))
         # only now what it calls, which may be itself
@@ -43,7 +43,7 @@ def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
 
 
 def _reaches(function: FunctionType) -> bool:
-    names = _names(function.__code__)
+    names = names_in(function.__code__)
     values = [function.__globals__[name] for name in names if name in function.__globals__]
     values += [cell.cell_contents for cell in function.__closure__ or ()]
     return any(isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names)) for v in values)
@@ -53,6 +53,6 @@ def _holds(module: ModuleType, names: set[str]) -> bool:
     return any(isinstance(vars(module).get(name), Dispatcher) for name in names)
 
 
-def _names(code: CodeType) -> set[str]:
-    """The names that a function uses, and the functions within it."""
-    return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
+def names_in(code: CodeType) -> set[str]:
+    """Return the names that code uses, with those of the functions within it."""
+    return set(code.co_names).union(*(names_in(c) for c in code.co_consts if isinstance(c, CodeType)))

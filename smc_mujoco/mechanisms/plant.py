@@ -237,10 +237,8 @@ def model_path(name: str) -> Path:
 @functools.cache
 def catalogue() -> dict[str, Plant]:
     """Return every plant found in smc_mujoco.mechanisms.plants, by name."""
-    found: list[Plant] = []
-    for module in modules("smc_mujoco.mechanisms.plants"):
-        found += [value for value in vars(module).values() if isinstance(value, Plant)]
-    return {p.name: p for p in sorted(found, key=lambda p: p.name)}
+    values = [value for module in modules("smc_mujoco.mechanisms.plants") for value in vars(module).values()]
+    return {p.name: p for p in sorted((p for p in values if isinstance(p, Plant)), key=lambda p: p.name)}
 
 
 def plant(name: str, **parameters: float) -> Plant:

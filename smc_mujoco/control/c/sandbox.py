@@ -110,7 +110,7 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
     order.write_text(json.dumps(words))
     command = [sys.executable, "-I", "-S", __file__, str(order)]
     try:
-        code = timed(command, library.timeout, heard=False).returncode
+        code = timed(command, library.timeout, output=False).returncode
     except Late:
         code = None
     lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]

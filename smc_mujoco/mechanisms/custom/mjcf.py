@@ -1,6 +1,6 @@
-"""Models of others: read from a file, a text, an MjSpec or PyMJCF, tried in a process of their own, told apart by hash.
+"""Users' models: read from a file, a text, an MjSpec or PyMJCF, tried in a child process, checked, identified by hash.
 
-What MuJoCo compiles it compiles in this process, where a model may end it, or take all its memory. So `tried` compiles
+MuJoCo compiles a model in its own process, which a model may crash, or whose memory it may fill. So `tried` compiles
 each model once in a child process first, with bounds on time and memory. That takes some hundredths of a second.
 """
 
@@ -17,7 +17,6 @@ import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -40,8 +39,8 @@ UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")  # in f
 KINDS = {"body": "BODY", "jnt": "JOINT", "geom": "GEOM", "site": "SITE"}  # how a field's name begins -> what it is of
 KINDS |= {"actuator": "ACTUATOR", "tendon": "TENDON", "eq": "EQUALITY"}
 
-_tried: set[str] = set()  # hashes of models that did no harm
-_lock = threading.Lock()  # who has changed how many digits MuJoCo writes
+_tried: set[str] = set()  # hashes of models that passed
+_lock = threading.Lock()  # held while MuJoCo writes another number of digits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,24 +215,24 @@ def tried(source: Source, timeout: float) -> None:
     """
     if source.sha256 in _tried:
         return
-    with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as name:
-        folder = Path(name)
-        order: dict[str, Any] = {"library": str(libmujoco.path()), "plugins": [*map(str, libmujoco.plugins())]}
-        order |= {"path": source.path, "text": str(folder / "text"), "told": str(folder / "told"), "memory": MEMORY}
-        (folder / "text").write_text(source.text, errors="surrogatepass")
-        order["assets"] = {name: str(folder / str(i)) for i, (name, _) in enumerate(source.assets)}
-        for place, (_, content) in zip(order["assets"].values(), source.assets, strict=True):
-            Path(place).write_bytes(content)
-        (folder / "order").write_text(json.dumps(order))
-        command = [sys.executable, "-I", "-S", mjcf_trial.__file__, str(folder / "order")]
+    with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as temporary:
+        folder, copies = Path(temporary), {}
+        text, report, order = folder / "text", folder / "report", folder / "order"
+        text.write_text(source.text, errors="surrogatepass")
+        for i, (name, content) in enumerate(source.assets):
+            copies[name] = str(folder / str(i))
+            Path(copies[name]).write_bytes(content)
+        files = {"path": source.path, "text": str(text), "assets": copies, "report": str(report), "memory": MEMORY}
+        plugins = [*map(str, libmujoco.plugins())]
+        order.write_text(json.dumps(files | {"library": str(libmujoco.path()), "plugins": plugins}))
+        command = [sys.executable, "-I", "-S", mjcf_trial.__file__, str(order)]
         try:
-            code = process.timed(command, timeout, heard=False).returncode
+            code = process.timed(command, timeout, output=False).returncode
         except process.Late:
             code = None
         except OSError:  # this process may start none
             return
-        told = folder / "told"
-        last = (told.read_text(errors="replace") if told.exists() else "").splitlines() or ["loading"]
+        last = (report.read_text(errors="replace") if report.exists() else "").splitlines() or ["loading"]
     if last[-1].startswith("error") and "plugin" in last[-1]:  # one that its user has loaded here, perhaps
         return
     if last[-1] not in ("fine", "loading"):  # of the latter no model is to blame

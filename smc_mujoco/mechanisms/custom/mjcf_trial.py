@@ -1,8 +1,8 @@
-"""A model compiled in a process of its own, which it may take down: read, compiled, and put into motion's first place.
+"""Script that reads and compiles a model, and computes its first accelerations, in a process that it may crash.
 
-It runs as a script and imports nothing but Python's own: MuJoCo is called through ctypes, so that all of it takes some
-hundredths of a second. It tells how far it came by lines in a file. The last one is what was going on when the process
-died, or "fine", or "error" and MuJoCo's words.
+It imports only the standard library and calls MuJoCo through ctypes, so that it takes some hundredths of a second. It
+reports its progress as lines in a file. The last line is the stage at which the process died, or "fine", or "error" and
+MuJoCo's message.
 """
 
 import contextlib
@@ -13,13 +13,13 @@ import sys
 from pathlib import Path
 from typing import Any, TextIO
 
-WORDS = 4000  # bytes of MuJoCo's complaint
+MESSAGE = 4000  # bytes of MuJoCo's error message, at most
 VFS = 1024  # bytes, more than any version's mjVFS has
 HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_char_p)
 
 
 def limit(memory: int) -> None:
-    """Bound this process's memory, where the system has such bounds, and leave no core dumps."""
+    """Bound this process's memory, where the system can, and write no core dumps."""
     try:
         import resource
     except ImportError:  # Windows
@@ -30,10 +30,10 @@ def limit(memory: int) -> None:
 
 
 class Trial:
-    """MuJoCo in this process, and the file that is told how far it gets."""
+    """MuJoCo in this process, and its report file."""
 
-    def __init__(self, order: dict[str, Any], told: TextIO):
-        self.told = told
+    def __init__(self, order: dict[str, Any], report: TextIO):
+        self.report = report
         self.say("loading")
         self.library = ctypes.CDLL(order["library"])
         for name in ("mj_parseXML", "mj_parseXMLString", "mj_compile", "mj_makeData"):
@@ -47,38 +47,38 @@ class Trial:
 
     def say(self, line: str) -> None:
         """Write a line to the report file."""
-        print(line, file=self.told, flush=True)
+        print(line, file=self.report, flush=True)
 
-    def fail(self, words: bytes | None) -> None:
-        """Report what is wrong, and end."""
-        self.say("error " + " ".join((words or b"").decode(errors="replace").split()))
+    def fail(self, message: bytes | None) -> None:
+        """Report an error, and end the process."""
+        self.say("error " + " ".join((message or b"").decode(errors="replace").split()))
         os._exit(0)
 
-    def warned(self, words: bytes) -> None:
-        """End where MuJoCo warns that the file holds a NaN; its other warnings concern runs."""
-        if b"NaN" in words and b"XML" in words:
+    def warned(self, message: bytes) -> None:
+        """End the process if MuJoCo warns that the file holds a NaN; its other warnings concern runs."""
+        if b"NaN" in message and b"XML" in message:
             self.fail(b"it holds a NaN")
 
     def run(self, order: dict[str, Any]) -> None:
         """Read the model, compile it, make its data, and compute its first accelerations."""
         self.say("reading")
-        said, files = ctypes.create_string_buffer(WORDS), None
+        error, files = ctypes.create_string_buffer(MESSAGE), None
         if order["path"]:
-            spec = self.library.mj_parseXML(os.fsencode(order["path"]), None, said, WORDS)
+            spec = self.library.mj_parseXML(os.fsencode(order["path"]), None, error, MESSAGE)
         else:
             files = ctypes.create_string_buffer(VFS)
             self.library.mj_defaultVFS(files)
             for name, place in order["assets"].items():
                 content = Path(place).read_bytes()
                 self.library.mj_addBufferVFS(files, name.encode(), content, len(content))
-            spec = self.library.mj_parseXMLString(Path(order["text"]).read_bytes(), files, said, WORDS)
+            spec = self.library.mj_parseXMLString(Path(order["text"]).read_bytes(), files, error, MESSAGE)
         if not spec:
-            self.fail(said.value)
+            self.fail(error.value)
         self.say("compiling")
-        held = ctypes.c_void_p(spec)
-        model = self.library.mj_compile(held, files)
+        pointer = ctypes.c_void_p(spec)
+        model = self.library.mj_compile(pointer, files)
         if not model:
-            self.fail(self.library.mjs_getError(held))
+            self.fail(self.library.mjs_getError(pointer))
         self.say("starting")
         data = self.library.mj_makeData(ctypes.c_void_p(model))
         if not data:
@@ -91,10 +91,9 @@ def main(place: str) -> None:
     """Try the model that a JSON file describes: libraries, plugins, path or text with assets, memory, report file."""
     order = json.loads(Path(place).read_text())
     limit(order["memory"])
-    with Path(order["told"]).open("w") as told:
-        Trial(order, told).run(order)
-        told.flush()
-        os._exit(0)  # what it has built need not be torn down
+    with Path(order["report"]).open("w") as report:
+        Trial(order, report).run(order)
+        os._exit(0)  # without freeing what it has built
 
 
 if __name__ == "__main__":
