@@ -2,7 +2,7 @@
 
 A plant file states the mechanism's parameters once, in three readings that tests hold together:
 the MJCF beside it (what MuJoCo simulates), `fields` (which model fields a parameter sets) and
-`nominal` (the f and g that a model-based law believes). A channel is one actuated degree of
+`nominal` (the f and g that a model-based law uses). A channel is one actuated degree of
 freedom: its actuator, its two sensors and its body are read off the compiled model.
 """
 
@@ -54,7 +54,7 @@ class Nominal(Protocol):
 
 
 class Native(NamedTuple):
-    """A nominal model as a C function; what lies at the addresses among its values is kept alive."""
+    """A nominal model as a C function. `kept` holds the objects whose addresses are among its values."""
 
     address: int
     values: tuple[float, ...]
@@ -211,7 +211,7 @@ class Plant:
 def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
-    # MuJoCo's answer to divergence, starting again from the initial state, is no run's true story
+    # otherwise MuJoCo would start a run that diverges again, from the initial state
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
     return compiled(spec)
 
@@ -219,8 +219,8 @@ def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
     for name, at, value, adds in fields:
-        held = array(model, name)
-        held[at] = held[at] + value if adds else value
+        values = array(model, name)
+        values[at] = values[at] + value if adds else value
 
 
 def array(model: mujoco.MjModel, name: str) -> np.ndarray:

@@ -38,7 +38,10 @@ class Channel:
     partner_x0: float | None = None
 
 
-def coerce(channels: object) -> tuple[tuple[str, Channel], ...]:
+Pairs = tuple[tuple[str, Channel], ...]  # a joint and its Channel, each
+
+
+def coerce(channels: object) -> Pairs:
     """Return a user's channels as pairs of joint and Channel."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
@@ -52,7 +55,7 @@ def coerce(channels: object) -> tuple[tuple[str, Channel], ...]:
     return tuple((joint, channel(joint, value)) for joint, value in items)
 
 
-def joints_of(channels: tuple[tuple[str, Channel], ...]) -> list[str]:
+def joints_of(channels: Pairs) -> list[str]:
     """Return the names of the driven joints, then those of their partners."""
     partners = [channel.partner for _, channel in channels if channel.partner is not None]
     return [*(joint for joint, _ in channels), *partners]
@@ -78,9 +81,9 @@ def channel(joint: object, value: object) -> Channel:
     return dataclasses.replace(made, **starts)
 
 
-def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], ...]) -> None:
+def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that forbid control."""
-    joints = joints_of(asked)
+    joints = joints_of(channels)
     names = [model.joint(i).name for i in range(model.njnt)]
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
@@ -90,23 +93,27 @@ def check(label: str, model: mujoco.MjModel, asked: tuple[tuple[str, Channel], .
             )
         if joints.count(joint) > 1:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
-    if len(asked) < len(joints) < 2 * len(asked):
-        bare = next(joint for joint, channel in asked if channel.partner is None)
+    if len(channels) < len(joints) < 2 * len(channels):
+        bare = next(joint for joint, channel in channels if channel.partner is None)
         raise ScenarioError(f"channel {bare!r} has no partner and others have: give each one, or none")
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION.value:
         raise ScenarioError(f'{label} has <flag actuation="disable"/>, so that nothing drives it: take it out')
 
 
 def starts(
-    plant: str, model: mujoco.MjModel, joints: list[str], asked: tuple[tuple[str, Channel], ...], keyframe: str | None
+    plant: str,
+    model: mujoco.MjModel,
+    joints: list[str],
+    channels: Pairs,
+    keyframe: str | None,
 ) -> tuple[float, ...]:
     """Return x0: from the channels, else from the keyframe, else from the model.
 
     Only the model's may be outside a range: nobody asked for it, and a scenario can have another.
     """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
-    asked_for = {joint: channel.x0 for joint, channel in asked if channel.x0 is not None}
-    asked_for |= {c.partner: c.partner_x0 for _, c in asked if c.partner is not None and c.partner_x0 is not None}
+    asked_for = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
+    asked_for |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
     x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | asked_for
     checked = [one for one in ranges(model, joints) if keyframe is not None or one[0] in asked_for]
     within(plant, checked, [x0[joint] for joint, _, _ in checked])

@@ -39,14 +39,14 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
       ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
     """
     number, wanted = model.joint(joint).id, channel.actuator
-    held = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
+    bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
     own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
     own = [i for i in own if model.actuator_trnid[i, 0] == number]
     if channel.motor:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
         return Motor(
-            joint, _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *held), tuple(own)
+            joint, _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds), tuple(own)
         )
     if wanted is not None:
         chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
@@ -63,7 +63,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     if why := _no_motor(model, own[0]):
         raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
     gives = f"actuator {names[0]!r} gives joint {joint!r} of {label}"
-    return Motor(joint, _limit(gives, CURE, *held, _of_actuator(model, own[0])), tuple(own))
+    return Motor(joint, _limit(gives, CURE, *bounds, _of_actuator(model, own[0])), tuple(own))
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:

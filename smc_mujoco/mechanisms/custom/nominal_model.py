@@ -1,17 +1,17 @@
 """The nominal model of a user's own MJCF: f and g of every channel from MuJoCo itself, at the measured state.
 
 With M the mass matrix and tau what gravity, gyration, springs, dampers and the model's other actuators exert, MuJoCo's
-x'' = M^-1 (tau + u), and channel i believes
+x'' = M^-1 (tau + u). The nominal model of channel i is
 
     x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
 
-with u_j the command that channel j was told last: in this sample where j < i, in the one before where j > i. So laws of
-single channels, run one after the other, solve M u = v - ... by the sweeps of Gauss and Seidel, a sweep a sample, which
-converge for every positive definite M. Of a joint that moves with channel i without an actuator, the g is (M^-1)_qi.
+with u_j the latest command of channel j: of this sample for j < i, of the one before for j > i. So laws of single
+channels, run one after the other, solve M u = v - ... by one Gauss-Seidel sweep per sample, and these converge for
+every positive definite M. A joint q without an actuator that moves with channel i has g = (M^-1)_qi.
 
-MuJoCo's own functions do it, called by address from the compiled path, on a copy of the model with the nominal
-parameters and on an mjData which each simulation has for itself. Constraints are left out: contacts, limits, dry
-friction. A state that is not measured, in another kinematic tree, is taken to be the model's initial one.
+The compiled path calls MuJoCo's own functions by address, with a copy of the model that has the nominal parameters and
+an mjData for each simulation. Constraints are left out: contacts, limits, dry friction. A state that is not measured,
+in another kinematic tree, is taken to be the model's initial one.
 """
 
 import ctypes
@@ -74,7 +74,7 @@ class NominalModel(Coupled):
             return float(data.qacc_smooth[places.qvel[i]]), float(moved[0, places.qvel[i]])
 
     def native(self, parameters: Mapping[str, float]) -> Native:
-        """The C function, and for one simulation the addresses of what it works on."""
+        """Return the C function, and the addresses of one simulation's model, data and arrays."""
         if self.why_not:
             return Native(unknown().address, (), ())
         model, places, _, spare = prepared(self, frozen(parameters))
@@ -82,17 +82,17 @@ class NominalModel(Coupled):
             data = spare.pop()  # each simulation writes whatever it reads before it reads it
         except IndexError:
             data = mujoco.MjData(model)
-        lent, seen = Lent(data, spare), np.full(2 * len(places.qpos), np.nan)
+        borrowed, seen = BorrowedData(data, spare), np.full(2 * len(places.qpos), np.nan)
         table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
         solved = np.zeros(2 * model.nv)
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places.qpos), len(places.ctrl), model.nv
-        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, lent, *arrays))
+        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays))
 
 
 @dataclasses.dataclass(eq=False)
-class Lent:
+class BorrowedData:
     """An MjData borrowed from a pool. Pooling avoids memory fragmentation."""
 
     data: mujoco.MjData
@@ -121,7 +121,7 @@ def prepared(
 
 @functools.cache
 def unknown() -> Function:
-    """Return NaN for f and g: there is no nominal model."""
+    """Return the C function for plants without a nominal model: f and g are NaN."""
 
     def native(y, p, m, out):
         output = carray(pointer(out), (2,))
@@ -133,7 +133,10 @@ def unknown() -> Function:
 
 @functools.cache
 def native() -> Function:
-    """inputs: i, n, x, v, acceleration (unused) and u, (n,) each -> outputs: f and g of channel i."""
+    """Return the C function of the nominal model.
+
+    Its inputs are i, n, and x, v, acceleration (unused) and u, (n,) each; its outputs f and g of channel i.
+    """
     library = libmujoco.library()
     positions, velocities, solve = library.mj_fwdPosition, library.mj_fwdVelocity, library.mj_solveM
     actuation, accelerations = library.mj_fwdActuation, library.mj_fwdAcceleration
@@ -152,7 +155,7 @@ def native() -> Function:
         solved = carray(pointer(int(own[11])), (2 * nv,))
         fresh = False
         for j in range(2 * n):
-            if seen[j] != state[j]:  # so that NaN is never known already
+            if seen[j] != state[j]:  # always true of NaN
                 fresh, seen[j] = True, state[j]
         if fresh:  # the same for all channels of a sample
             for j in range(n):

@@ -142,13 +142,13 @@ def plant_from(
     label, model = source.label, source.compiled(source.read())
     if not RECORDED.get():
         mjcf.check_model(label, model)
-    asked = coerce(channels)
-    joints = joints_of(asked)
-    check(label, model, asked)
+    pairs = coerce(channels)
+    joints = joints_of(pairs)
+    check(label, model, pairs)
     if keyframe is not None:
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
-    motors = tuple(motor_of(label, model, joint, channel) for joint, channel in asked)
-    build = OwnModel(source, keyframe, asked, motors)
+    motors = tuple(motor_of(label, model, joint, channel) for joint, channel in pairs)
+    build = OwnModel(source, keyframe, pairs, motors)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = OwnFields(mass, gravity), tuple(motor.limit for motor in motors)
@@ -160,14 +160,14 @@ def plant_from(
         mass="m",
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
-        x0=starts(called, model, joints, asked, keyframe),
+        x0=starts(called, model, joints, pairs, keyframe),
         n=len(joints),
         sizes=(len(joints), len(joints)),
         build=build,
         fields=fields,
         nominal=NominalModel(build, fields, why_not),
         lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
-        underactuated=len(joints) > len(asked),
+        underactuated=len(joints) > len(pairs),
         direct=True,
         smooth=smooth(model),
         unmodelled=why_not,

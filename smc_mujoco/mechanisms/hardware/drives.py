@@ -23,13 +23,13 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, drive_ids, drives
 from smc_mujoco.mechanisms.plant import LARGEST, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
-RESISTANCE, CONSTANT = 0, 1  # of actuator_gainprm: ohm, and N m/A at the joint
+WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
 SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
 LEAST_RESISTANCE = 1e-9  # ohm: with less, a command is hardly a voltage that a number can hold
 LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this one, as in MuJoCo
 LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
-COGGING, POLES = 0, 1  # of actuator_biasprm: N m at the joint, and periods a radian of it
+COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,11 +186,9 @@ class DCMotor(Drive):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        yield Field("actuator_gainprm", (ids, RESISTANCE), self.resistance)
-        yield Field("actuator_gainprm", (ids, CONSTANT), self.constant)
+        yield Field("actuator_gainprm", (ids, WINDING), (self.resistance, self.constant))
         yield Field("actuator_dynprm", (ids, TIME_CONSTANT), self.delay)
-        yield Field("actuator_biasprm", (ids, COGGING), self.gear * self.cogging)
-        yield Field("actuator_biasprm", (ids, POLES), self.gear * self.poles)
+        yield Field("actuator_biasprm", (ids, COGGING), (self.gear * self.cogging, self.gear * self.poles))
         yield Field("actuator_ctrlrange", ids, (-self.voltage, self.voltage))
         yield Field("actuator_forcerange", ids, (-torque, torque))
         driven = model.jnt_dofadr[model.actuator_trnid[ids, 0]]
@@ -206,18 +204,18 @@ class DCMotor(Drive):
 
 
 class Tandem(NamedTuple):
-    """What a physics step does to the first drive's output a under a command u: numbers in 0 .. 1.
+    """Effect of a physics step on two drives in series, with output a of the first under a command u.
 
     Attributes:
-      held: share of a in what the second drive is asked for, u + held (a - u).
-      left: share of a in a at the end of the step, u + left (a - u).
+      held: share of a in the second drive's command, u + held (a - u); 0 .. 1.
+      left: share of a in its value at the end of the step, u + left (a - u); 0 .. 1.
     """
 
     held: float
     left: float
 
     def __call__(self, u: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the second drive is asked for over a step, and a at its end, of the same shape as u and a."""
+        """Return the second drive's command over a step, and a at its end; both have the shape of u and a."""
         return u + self.held * (a - u), u + self.left * (a - u)
 
 

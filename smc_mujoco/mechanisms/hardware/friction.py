@@ -15,7 +15,7 @@ from smc_mujoco.mechanisms.plant import Field
 
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
-COULOMB, STATIC, STRIBECK = 3, 4, 5  # of actuator_biasprm
+LEVELS = slice(3, 6)  # of actuator_biasprm: coulomb, static, stribeck
 DAMPED = 0.2  # of bristles, their damping over sqrt(stiffness inertia)
 
 
@@ -121,6 +121,4 @@ class LuGre(Friction):
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
         damping = DAMPED * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)])
         yield Field("actuator_dynprm", (bristles, DAMPING), damping if self.damping is None else self.damping)
-        yield Field("actuator_biasprm", (bristles, COULOMB), self.coulomb)
-        yield Field("actuator_biasprm", (bristles, STATIC), self.static)
-        yield Field("actuator_biasprm", (bristles, STRIBECK), self.stribeck)
+        yield Field("actuator_biasprm", (bristles, LEVELS), (self.coulomb, self.static, self.stribeck))
