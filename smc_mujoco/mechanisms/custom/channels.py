@@ -45,14 +45,11 @@ def coerce(channels: object) -> Pairs:
     """Return a user's channels as pairs of joint and Channel."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
-    items = (
-        list(channels.items())
-        if isinstance(channels, Mapping)
-        else [(joint, None) for joint in taken("channels", channels)]
-    )
-    if not items:
+    named = isinstance(channels, Mapping)
+    pairs = list(channels.items()) if named else [(joint, None) for joint in taken("channels", channels)]
+    if not pairs:
         raise ScenarioError("channels is empty: give at least one joint's name")
-    return tuple((joint, channel(joint, value)) for joint, value in items)
+    return tuple((joint, channel(joint, value)) for joint, value in pairs)
 
 
 def joints_of(channels: Pairs) -> list[str]:
@@ -101,11 +98,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 
 
 def starts(
-    plant: str,
-    model: mujoco.MjModel,
-    joints: list[str],
-    channels: Pairs,
-    keyframe: str | None,
+    plant: str, model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[float, ...]:
     """Return x0: from the channels, else from the keyframe, else from the model.
 

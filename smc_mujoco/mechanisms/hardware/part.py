@@ -41,10 +41,11 @@ class Part:
         Raises:
           ScenarioError: a field is no number within these bounds.
         """
+        limits: dict[str, Any] = {"most": LARGEST} | bounds
         for name in names:
             value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
             if value is not None or not optional:
-                value = number(f"{type(self).__name__}'s {name}", value, **{"most": LARGEST} | bounds)
+                value = number(f"{type(self).__name__}'s {name}", value, **limits)
                 object.__setattr__(self, name, value)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
