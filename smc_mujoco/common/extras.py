@@ -1,4 +1,4 @@
-"""Packages that an extra brings, as in `pip install 'smc-mujoco[film]'`: one sentence where one is missing."""
+"""Optional packages, which an extra installs, as in `pip install 'smc-mujoco[film]'`, and errors if one is missing."""
 
 import contextlib
 import importlib.util
@@ -11,7 +11,7 @@ LAST = {"dm": (3, 12)}  # the last Python for which pip can install an extra
 
 
 class MissingPackageError(ScenarioError, ImportError):
-    """An optional package is not installed, or does not fit. The message says what brings one that fits."""
+    """An optional package is missing, or is of another version. The message says how to install one that fits."""
 
 
 @contextlib.contextmanager
@@ -32,7 +32,7 @@ def extra(name: str, what: str) -> Iterator[None]:
 
 
 def missing(name: str, what: str, *packages: str) -> str | None:
-    """None when packages of an extra are installed, else a sentence that says which are not.
+    """Return None if packages of an extra are installed, else a sentence that says which are not.
 
     Args:
       name: the extra, such as "film".
@@ -44,7 +44,7 @@ def missing(name: str, what: str, *packages: str) -> str | None:
 
 
 def cure(name: str) -> str:
-    """How to install an extra."""
+    """Return how to install an extra."""
     last = LAST.get(name, sys.version_info[:2])
     if sys.version_info[:2] > last:
         return f"take Python {'.'.join(map(str, last))}, the last one that pip can install it on"

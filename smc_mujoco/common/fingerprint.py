@@ -94,10 +94,7 @@ _cached = functools.cache(_hash)  # a compiled law keeps the globals that it was
 
 
 class _CodePickler(pickle._Pickler):
-    """Pickles functions and classes by what is in them, where pickle would write their names.
-
-    The result is only hashed, never loaded.
-    """
+    """Pickler that writes the contents of functions and classes, not their names. The result is never loaded."""
 
     def memoize(self, obj: Any) -> None:
         """Note an object as written, unless equal ones may or may not be the same object, as constants."""

@@ -7,12 +7,12 @@ from types import ModuleType
 
 
 def modules(package: str) -> Iterator[ModuleType]:
-    """Every module of a package, imported."""
+    """Import and yield every module of a package."""
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         yield importlib.import_module(f"{package}.{info.name}")
 
 
-# Where the modules of this package that files name were when the files were written -> where they are.
+# Former name of a module, as files of recorded runs have it -> its present name.
 FORMER_PLACES = {
     "smc_mujoco.actuators": "smc_mujoco.mechanisms.hardware.drives",
     "smc_mujoco.backlash": "smc_mujoco.mechanisms.hardware.backlash",
@@ -30,7 +30,7 @@ FORMER_PLACES = {
 
 
 def present_place(module: str) -> str:
-    """The name that a module, named in a file, has now."""
+    """Return the present name of a module that a file names."""
     for former, present in FORMER_PLACES.items():
         if module == former or module.startswith(f"{former}."):
             return present + module.removeprefix(former)

@@ -4,9 +4,9 @@ Of a channel's position x the controller reads, j counting the readings,
 
     x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
 
-every `period`, each `delay` later; a reading that gets lost leaves the one before it in place. MuJoCo's sensors do the
-period and the delay; what a lost reading and the rounding do to the control is the controller's side of the wire, and
-the callback's. An encoder gives no velocity: without another choice the controller differentiates what it reads.
+every `period`, each `delay` later; a reading that gets lost leaves the one before it in place. MuJoCo's sensors have
+the period and the delay; the callback rounds readings and loses them. An encoder measures no velocity: by default the
+controller differentiates what it reads.
 """
 
 import dataclasses
@@ -19,9 +19,9 @@ from smc_mujoco.common.errors import ScenarioError, number, whole
 from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
-# Of a physics step, by which readings are due and taken early: MuJoCo compares sums of steps, which drift by rounding.
+# Share of a physics step by which readings are taken early: MuJoCo compares sums of steps, which drift by rounding.
 EARLY = 0.5
-MOST_READINGS = 100_000  # under way at once: chosen, 6 MB a channel
+MOST_READINGS = 100_000  # not yet arrived: chosen, 6 MB a channel
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """Parts: what makes a mechanism realistic, as edits of its model and numbers in its fields.
 
 A part is frozen data. `edit` adds to an MjSpec what it is made of - a rotor, a stop, an actuator that is a friction -
-and `fields` says which fields of the compiled model its numbers set, so that simulations with other numbers share one
-model in a Batch. What the parts do in motion, MuJoCo does.
+and `fields` yields the fields of the compiled model that its numbers set, so that simulations with other numbers share
+one model in a Batch. MuJoCo simulates the parts; they have no code of their own.
 
-Names that parts go by: an actuator `passive:<joint>` belongs to a part and takes no command; `rotor:<joint>` is the
-joint that a channel's actuator drives where that is not the channel's own.
+Names of parts: an actuator `passive:<joint>` belongs to a part and takes no command; `rotor:<joint>` is the joint that
+a channel's actuator drives if that is not the channel's own.
 """
 
 import dataclasses
@@ -57,7 +57,7 @@ class Part:
         yield from ()
 
     def structure(self) -> Hashable:
-        """What simulations must have in common to share a model: equal where `edit` does the same."""
+        """Return what simulations must have in common to share a model: equal if `edit` does the same."""
         return type(self)
 
 
@@ -74,12 +74,12 @@ class Actuator(Part):
 
     @property
     def scale(self) -> float:
-        """What the model's actuator takes per unit of u."""
+        """Control of the model's actuator per unit of u."""
         return 1.0
 
     @property
     def delay(self) -> float:
-        """The time constant in s with which the force follows a held u; 0: at once."""
+        """Time constant with which the force follows a held u, s; 0: at once."""
         return 0.0
 
 
