@@ -150,7 +150,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.stretches(self.ctrl, commands, self.first):
             try:
-                with mjcb.installed(None):  # a Batch refuses Python callbacks, and runs of other threads may have set one
+                with mjcb.installed(None):  # a Batch refuses Python callbacks, which runs of other threads may have set
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
