@@ -112,26 +112,6 @@ def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: fl
     return float(h * min(periods))
 
 
-def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: int = 0) -> float:
-    """Return the growth per period of the loop with a delay of whole control periods, in the end: stable below 1.
-
-    The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode: what `critical_delay` answers in closed form.
-    """
-    at, largest = linear(plant), 0.0
-    for stiffness in at.modes:
-        e, gamma = sampled(at, stiffness, control_period)
-        whole = np.zeros((2 + periods, 2 + periods))
-        whole[:2, :2] = np.eye(2) + e
-        if periods:
-            whole[:2, -1] = gamma
-            whole[2, :2] = -lam * k1, -lam
-            whole[3:, 2:-1] = np.eye(periods - 1)
-        else:
-            whole -= lam * np.outer(gamma, (k1, 1.0))
-        largest = max(largest, float(np.abs(np.linalg.eigvals(whole)).max()))
-    return largest
-
-
 def _roots(a: float, b: float, c: float) -> list[float]:
     """Return the real roots of a z^2 + b z + c."""
     return [float(z.real) for z in np.roots([a, b, c]) if abs(z.imag) <= 1e-9 * abs(z)]

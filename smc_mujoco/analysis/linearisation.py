@@ -4,8 +4,7 @@
     at.inertia, at.damping, at.modes        # kg m^2, N m s/rad, (n,) N m/rad
 
 x is (n,); M = 1/g, K = -(df/dx)/g (n, n) and D = -(df/dv)/g come from the plant's nominal f and g. M and D are the same
-on every channel and K is symmetric, so its eigenvectors part the plant into n modes that differ in their stiffness
-alone.
+on every channel and K is symmetric. So its eigenvectors divide the plant into n modes that differ only in stiffness.
 """
 
 import dataclasses
@@ -24,7 +23,7 @@ from smc_mujoco.mechanisms.plant import Plant
 
 SAME = 1e-6  # relative: what differs by less is called the same
 MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first summit of every restoring force here
-DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # where a force at rest is looked at: each 0.5 % further out
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # of a force at rest: each 0.5 % further out
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,12 +67,8 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
-        found = np.empty((n, n))
-        for j in range(n):
-            moved = rest.copy()
-            moved[j] = STEP
-            found[:, j] = [(at(-moved, i) - at(moved, i)) / (2.0 * STEP * g[i]) for i in range(n)]
-        return found
+        steps = STEP * np.eye(n)
+        return np.array([[(at(-z, i) - at(z, i)) / (2.0 * STEP * g[i]) for z in steps] for i in range(n)])
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
@@ -89,22 +84,18 @@ def local(law: Law) -> tuple[float, float] | None:
     return rest.linear(SimpleNamespace(**law.gains)) if rest else None
 
 
+@functools.lru_cache(maxsize=1024)
 def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
     """Return E (2, 2) and Gamma (2,) of a mode sampled with period h, z+ = z + E z + Gamma u, z = (x, x'): exact.
 
-    E is what a sample changes, not the usual Phi = 1 + E: for short h all that there is to know is in the difference.
+    E is the change over a sample, not the usual Phi = 1 + E, in which rounding would hide the change of a short h.
     """
-    return _moved(stiffness / at.inertia, at.damping / at.inertia, h, at.inertia)
-
-
-@functools.lru_cache(maxsize=1024)
-def _moved(k: float, d: float, h: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
     from scipy.linalg import expm
 
-    rates, whole = np.array([[0.0, 1.0], [-k, -d]]), np.zeros((4, 4))
-    whole[:2, :2], whole[:2, 2:] = rates * h, np.eye(2) * h
-    summed = expm(whole)[:2, 2:]  # the integral of exp(rates t) over h
-    return rates @ summed, summed[:, 1] / inertia
+    rates, block = np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]]), np.zeros((4, 4))
+    block[:2, :2], block[:2, 2:] = rates * h, np.eye(2) * h
+    integral = expm(block)[:2, 2:]  # of exp(rates t) over h
+    return rates @ integral, integral[:, 1] / at.inertia
 
 
 def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:

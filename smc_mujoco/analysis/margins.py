@@ -6,41 +6,241 @@
 
 A run tolerates a level if it does not fail and its ultimate bound is at most 5 % of its scale (`conventions`): what is
 left after 10 s. (The envelope is then below its start too, as the paper's claim on delay asks: it starts at the scale.)
-The search runs nine levels from small to large. Then it halves the interval below the FIRST level that is not
+The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
 tolerated, until it is within one control period of delay, or 2 % of anything else. The tolerated levels need not be one
-interval: above a level that is not tolerated there may be larger ones that are, and between two that are one that is
-not. Noise is one realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel.
-Theory says from which delay rest is unstable: a smooth law then swings with an amplitude that grows from 0, and so
-tolerates a little more. It also says from where a push, or friction that sticks, holds the plant 5 % off: the plant may
-still stick further in. All pairs and kinds advance together, one batch of runs a round.
+interval: there may be larger ones above a level that is not tolerated, and one that is not between two that are. Noise
+is one realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel. Theory says
+from which delay rest is unstable: a smooth law then swings with an amplitude that grows from 0, and so tolerates a
+little more. It also says from where a push, or friction that sticks, holds the plant 5 % off: the plant may still stick
+further in. All searches advance together, one batch of runs a round.
 """
 
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from smc_mujoco.analysis.margin_kinds import MARGIN_KINDS, tolerates
+import numpy as np
+
+from smc_mujoco.analysis import linear_theory as theory
+from smc_mujoco.analysis import linearisation
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.metrics.conventions import parts, refuse, scale
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import DURATION, case, listed
 from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Constant
+from smc_mujoco.simulation.trace import Trace
 
-KINDS = tuple(MARGIN_KINDS)
+TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
+RATE = 5.0  # 1/s: noise of the velocity over that of the position, as of the study's sensor
+LARGEST = 6.0  # N or N m: the study's u_max, beyond which no actuator of it holds anything
+HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, well beyond what is tolerated
+DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # of the level: where a search ends, in full and quick
 PERIODS = {FINE: 1, COARSE: 5}  # of control, likewise for a delay
 QUICK = 5.0  # s, of a quick search's runs
+HALVINGS = 6  # of an interval between two levels, about: for the progress bar
 
-Report = Callable[[float, float], None]  # told the work done and the whole, as far as it is known
+Key = TypeVar("Key")
+
+
+# the search
+
+
+@dataclasses.dataclass(kw_only=True)
+class Search:
+    """The search for the largest tolerated level below the smallest one that is not.
+
+    Attributes:
+      levels: those tried first, from small to large, up to the first that is not tolerated.
+      resolution: from the largest tolerated level to the interval at which the search ends.
+      rounded: from a level to the nearest one that a run can have.
+      low: the largest level known to be tolerated; at first the level at which there is nothing to tolerate.
+      high: the smallest level known not to be; inf until there is one.
+    """
+
+    levels: Sequence[float]
+    resolution: Callable[[float], float]
+    rounded: Callable[[float], float] = float
+    low: float = 0.0
+    high: float = math.inf
+
+    @property
+    def next(self) -> float | None:
+        """The level to try next; None when the search is done."""
+        if self.high == math.inf:
+            return next((level for level in self.levels if level > self.low), None)
+        if self.high - self.low <= self.resolution(self.low) * (1.0 + 1e-9):
+            return None
+        return self.rounded((self.low + self.high) / 2.0)
+
+    @property
+    def left(self) -> int:
+        """About how many runs are still to come."""
+        if self.high == math.inf:
+            return sum(level > self.low for level in self.levels) + HALVINGS
+        return math.ceil(max(0.0, math.log2((self.high - self.low) / self.resolution(self.low))))
+
+
+def find_boundaries(
+    searches: Mapping[Key, Search], tolerated: Callable[[list[tuple[Key, float]]], Iterable[bool]]
+) -> None:
+    """Advance searches together until all are done.
+
+    Args:
+      tolerated: from the searches that go on, with the level that each tries, to whether these are tolerated.
+    """
+    while tried := [(key, level) for key, search in searches.items() if (level := search.next) is not None]:
+        for (key, level), good in zip(tried, tolerated(tried), strict=True):
+            setattr(searches[key], "low" if good else "high", level)
+
+
+# the kinds of margins
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A kind of margin: something that a law tolerates up to some level.
+
+    Attributes:
+      label: its name in tables and figures.
+      unit: {x} stands for the unit of x, {u} for that of u.
+      levels: those tried first, from small to large.
+      put: a scenario with a level of it.
+      none: the level at which there is none.
+      periods: whether a level is a whole number of control periods.
+      theory: the largest level by linear theory, or None if there is none; it may refuse the plant.
+    """
+
+    label: str = ""
+    unit: str
+    levels: tuple[float, ...]
+    put: Callable[[Scenario, float], Scenario]
+    none: float = 0.0
+    periods: bool = False
+    theory: Callable[[Scenario], float | None] = lambda base: None
+
+    def unit_for(self, x: str) -> str:
+        """Return the unit for positions in x, "rad" or "m"."""
+        return self.unit.format(x=x, u=EFFORT[x])
+
+    def search(self, base: Scenario, resolution: float) -> Search:
+        """Return the search for the margin of a scenario."""
+        if self.periods:
+            h = base.control_period
+
+            def rounded(level: float) -> float:
+                return max(1, round(level / h)) * h
+
+            step = PERIODS[resolution] * h
+            levels = [rounded(level) for level in self.levels]
+            return Search(levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none)
+        least = self.levels[0]
+        return Search(levels=self.levels, resolution=lambda low: resolution * max(low, least), low=self.none)
+
+    def expected(self, base: Scenario) -> float | None:
+        """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
+        if base.disturbance or base.friction or base.mismatch or base.jump:  # theory does not know these
+            return None
+        try:
+            return self.theory(base)
+        except ScenarioError:
+            return None
+
+
+def tolerates(trace: Trace) -> bool:
+    """Return whether a run did not fail and ended within 5 % of its scale, in every group of its channels."""
+    try:
+        refuse(trace)
+    except ScenarioError:  # it failed, or diverged
+        return False
+    bound = catalogue.CATALOGUE["ultimate_bound"].formula
+    return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in parts(trace).values())
+
+
+def _doubled(largest: float) -> tuple[float, ...]:
+    """Return nine levels, each twice the one before."""
+    return tuple(largest * 2.0 ** (i - 8) for i in range(9))
+
+
+def _critical_delay(base: Scenario) -> float | None:
+    lam_k1 = None if base.actuator else linearisation.local(base.law)  # theory knows no drive
+    return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
+
+
+def _at_rest(base: Scenario) -> float | None:
+    most = TOLERATED_ERROR * (max(map(abs, base.x0)) or 1.0)
+    return theory.tolerated_force(base.plant, base.law, most, min(base.limits))
+
+
+def _rougher(base: Scenario, level: float) -> Scenario:
+    """Return the scenario with that much more dry friction."""
+    others = tuple(part for part in base.friction if not isinstance(part, Coulomb))
+    before = sum(part.level for part in base.friction if isinstance(part, Coulomb))
+    return dataclasses.replace(base, friction=(*others, Coulomb(before + level)))
+
+
+def _heavier(base: Scenario, level: float) -> Scenario:
+    """Return the scenario with that multiple of the nominal mass, whichever of its two names the mismatch has."""
+    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
+    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
+
+
+MARGIN_KINDS: dict[str, Kind] = {
+    "delay": Kind(
+        label="input delay",
+        unit="s",
+        levels=DELAYS,
+        put=lambda base, level: dataclasses.replace(base, input_delay=level),
+        periods=True,
+        theory=_critical_delay,
+    ),
+    "disturbance": Kind(
+        label="constant disturbance",
+        unit="{u}",
+        levels=_doubled(LARGEST),
+        put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
+        theory=_at_rest,
+    ),
+    "friction": Kind(
+        label="dry friction",
+        unit="{u}",
+        levels=_doubled(LARGEST),
+        put=_rougher,
+        theory=_at_rest,
+    ),
+    "mass": Kind(
+        label="mass",
+        unit="1",
+        levels=tuple(float(factor) for factor in np.geomspace(1.0, HEAVIEST, 10)[1:]),
+        put=_heavier,
+        none=1.0,
+    ),
+    "noise": Kind(
+        label="position noise",
+        unit="{x}",
+        levels=_doubled(NOISIEST),
+        put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),
+    ),
+}
+KINDS = tuple(MARGIN_KINDS)
+
+
+# margins of laws on plants
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -126,107 +326,38 @@ def of(
     for kind in kinds:
         find("kind of margin", kind, MARGIN_KINDS)
     find("resolution", str(resolution), {str(known): known for known in PERIODS})
-    searches = [_Search(base, kind, resolution) for base in bases for kind in kinds]
-    work = _Work(searches, threads, report)
-    plain = work.tolerated(bases)
-    for i, search in enumerate(searches):
-        search.fine = plain[i // len(kinds)]
-    while asked := [(search, level) for search in searches for level in search.asks()]:
-        found = work.tolerated([search.scenario(level) for search, level in asked])
-        for (search, level), tolerated in zip(asked, found, strict=True):
-            search.known[level] = tolerated
-    return [search.margin() for search in searches]
+    cells = [(base, MARGIN_KINDS[kind]) for base in bases for kind in kinds]
+    searches = [kind.search(base, resolution) for base, kind in cells]
+    going = dict(enumerate(searches))
+    done = 0
 
-
-class _Search:
-    """The search for one margin: the largest tolerated level below the smallest one that is not."""
-
-    def __init__(self, base: Scenario, kind: str, resolution: float):
-        self.base, self.name, self.kind, self.resolution = base, kind, MARGIN_KINDS[kind], resolution
-        self.fine: bool | None = None  # whether the scenario itself is tolerated
-        self.known: dict[float, bool] = {}  # level -> whether it is tolerated
-        self.levels = self.kind.scan(base)
-
-    def scenario(self, level: float) -> Scenario:
-        """Return the base with a level of the disturbance, delay, ... that is searched."""
-        return self.kind.put(self.base, level)
-
-    @property
-    def steps(self) -> int:
-        """Simulated steps of a run, as `run` reports them."""
-        return self.scenario(self.levels[0]).work
-
-    @property
-    def bracket(self) -> tuple[float, float]:
-        """The largest tolerated level below the first that is not, and that one; inf where none is known."""
-        first = min((level for level, tolerated in self.known.items() if not tolerated), default=math.inf)
-        return max((level for level in self.known if level < first), default=self.kind.none), first
-
-    @property
-    def step(self) -> float:
-        """The distance between the two at which the search ends."""
-        if self.kind.periods:
-            return PERIODS[self.resolution] * self.base.control_period
-        return self.resolution * max(self.bracket[0], self.levels[0])
-
-    @property
-    def left(self) -> float:
-        """About how many runs are still to come."""
-        if not self.fine:
-            return 0 if self.fine is False else len(self.levels) + 6
-        if not self.known:
-            return len(self.levels) + 6
-        low, high = self.bracket
-        return math.ceil(max(0.0, math.log2((high - low) / self.step))) if high < math.inf else 0
-
-    def asks(self) -> list[float]:
-        """Return the levels to run next; none when the search is done."""
-        if not self.fine:
-            return []
-        if not self.known:
-            return self.levels
-        low, high = self.bracket
-        if high == math.inf or high - low <= self.step * (1.0 + 1e-9):
-            return []
-        return [self.kind.rounded(self.base, (low + high) / 2.0)]
-
-    def margin(self) -> Margin:
-        """Return the result."""
-        low, high = self.bracket
-        return Margin(
-            plant=self.base.plant.name,
-            law=self.base.law.name,
-            kind=self.name,
-            value=low if self.fine else math.nan,
-            unit=self.kind.unit_for(self.base.plant.unit),
-            resolution=high - low if self.fine and high < math.inf else 0.0,
-            searched=self.levels[-1],
-            theory=self.kind.expected(self.base),
-        )
-
-
-class _Work:
-    """The runs of all searches, and how much of them is done."""
-
-    def __init__(self, searches: Sequence[_Search], threads: int | None, report: Report):
-        self.searches, self.threads, self.report = searches, threads, report
-        self.done = 0.0
-
-    def tolerated(self, scenarios: Sequence[Scenario]) -> list[bool]:
+    def tolerated(scenarios: Sequence[Scenario]) -> list[bool]:
         """Run scenarios, and return whether each is tolerated; their traces are dropped at once."""
-        start = self.done
-        now = sum(s.work for s in scenarios)
-        later = sum(s.left * s.steps for s in self.searches)
+        nonlocal done
+        now = sum(scenario.work for scenario in scenarios)
+        later = sum(search.left * cells[i][0].work for i, search in going.items())
+        results = [False] * len(scenarios)
+        for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, later))):
+            results[i] = tolerates(trace)
+        done += now
+        return results
 
-        def told(steps: int) -> None:
-            self.done += steps
-            self.report(self.done, max(start + later, start + now))
-
-        found = dict.fromkeys(range(len(scenarios)), False)
-        for i, trace in stream(scenarios, self.threads, told):
-            found[i] = tolerates(trace)
-        self.done = start + now
-        return list(found.values())
+    without = tolerated(bases)
+    going = {i: search for i, search in going.items() if without[i // len(kinds)]}
+    find_boundaries(going, lambda tried: tolerated([cells[i][1].put(cells[i][0], level) for i, level in tried]))
+    return [
+        Margin(
+            plant=base.plant.name,
+            law=base.law.name,
+            kind=kinds[i % len(kinds)],
+            value=search.low if i in going else math.nan,
+            unit=kind.unit_for(base.plant.unit),
+            resolution=search.high - search.low if search.high < math.inf else 0.0,
+            searched=search.levels[-1],
+            theory=kind.expected(base),
+        )
+        for i, ((base, kind), search) in enumerate(zip(cells, searches, strict=True))
+    ]
 
 
 def save(found: Sequence[Margin], path: str | os.PathLike) -> Path:

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from smc_mujoco.analysis.differences import OF_SCALE, coarse
+from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
@@ -210,15 +211,8 @@ def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray
         places=places,
         seeds=tuple(there.sum(axis=1).tolist()),
         outcome=outcome,
-        repeats=np.stack([_repeats(outcome[:, k], there[k]) for k in range(shape[1])]),
+        repeats=there & ~first_of_kind(outcome, there),
     )
-
-
-def _repeats(outcome: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Return where a column of (laws, seeds) equals an earlier one, (seeds,)."""
-    found, seeds = there.copy(), np.flatnonzero(there)
-    found[seeds[np.unique(outcome[:, there], axis=1, return_index=True)[1]]] = False
-    return found
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:

@@ -25,16 +25,15 @@ fiftieth of a cell.
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.linearisation import DISPLACEMENTS
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -54,8 +53,6 @@ TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plan
 PACE = 3.0  # 1/s, V over X: chosen, about how fast the study's plants swing
 LEAST_SAMPLES = 10  # of the shortest runs: two halves of the last fifth of them have one each
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
-
-Report = Callable[[float, float], None]  # told the work done and the most that there can be
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -166,7 +163,7 @@ def of(
         for begin in range(0, len(open_), size):
             some = open_[begin : begin + size]
             cases = [dataclasses.replace(first, x0=x[k], v0=v[j]) for j, k in some]
-            for index, trace in stream(cases, threads, _summed(report, done, most)):
+            for index, trace in stream(cases, threads, summed(report, done, most)):
                 verdict = judge(trace, x, v, final=part == HORIZONS[-1])
                 if verdict is None:
                     left.append(some[index])
@@ -207,20 +204,6 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     return DOES_NOT if (moved <= limits).all() and not home.any() else None
 
 
-def holdable(plant: Plant, u_max: float) -> float:
-    """Return the smallest x > 0 at which |u| <= u_max cannot hold a joint against its own force; inf if it always can.
-
-    Where f(x, 0) / g exceeds u_max: for the inverted pendulum m grav l sin x = u_max. A joint at rest further out falls
-    on, until that force is smaller again, whatever the law.
-    """
-    p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
-    for x in DISPLACEMENTS:
-        f, g = plant.nominal(np.full(plant.n, x), still, 0, p)
-        if f / g > u_max:
-            return float(x)
-    return math.inf
-
-
 def load(path: str | os.PathLike) -> Basin:
     """Read the map that `Basin.save` wrote.
 
@@ -239,14 +222,3 @@ def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all():
         raise ScenarioError(f"{name} is {shown(values)}: give one or more finite numbers")
     return axis
-
-
-def _summed(report: Report, done: float, most: float) -> Callable[[int], None]:
-    """Return a report that adds the steps done before."""
-
-    def told(steps: int) -> None:
-        nonlocal done
-        done += steps
-        report(done, most)
-
-    return told

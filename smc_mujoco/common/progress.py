@@ -2,7 +2,9 @@
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+
+Report = Callable[[float, float], None]  # called with the work done and the whole, as far as it is known
 
 
 class Bar:
@@ -51,6 +53,17 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
         drawn.says = lambda text: progress.update(task, description=text)
         yield drawn
+
+
+def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
+    """Return a function of single pieces of work, which adds them to the work done before and reports the sum."""
+
+    def add(work: float) -> None:
+        nonlocal done
+        done += work
+        report(done, whole)
+
+    return add
 
 
 class Counter:

@@ -1,8 +1,8 @@
 """Metrics: numbers that say how well a run went, each a function Trace -> float.
 
 Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
-`measure.py`. A metric is one decorated function here; `score` and every table find it by themselves. Each is of the
-driven channels, and refuses a trace that diverged or holds NaN (ScenarioError); "never" is inf.
+`conventions`. A metric is one decorated function here; `score` and every table find it by themselves. Each refuses a
+trace that diverged or has a NaN (ScenarioError); "never" is inf.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def settling_time(trace: Trace) -> float:
 def rise_time(trace: Trace) -> float:
     """Time from 10 % to 90 % of the way to the reference, slowest channel.
 
-    On a channel's first approach with e != 0 at its begin b: first sample with 1 - e/e_b >= 0.9 minus first
+    On a channel's first approach that starts with e_b != 0: first sample with 1 - e/e_b >= 0.9 minus first
     with >= 0.1 (Ogata, Modern Control Engineering, transient response); inf if it does not get there. A
     channel without such an approach is left out; 0 if all are.
     """
@@ -94,8 +94,8 @@ def rise_time(trace: Trace) -> float:
 def overshoot(trace: Trace) -> float:
     """How far a channel goes beyond its reference, in percent of the scale.
 
-    100 max(0, -sign(e_b) e) / scale over all channels and approaches, b an approach's begin: only the far
-    side from where it began counts. An approach that begins with e_b = 0 has no near side: there it is |e|.
+    100 max(0, -sign(e_b) e) / scale over all channels and approaches, e_b the e at an approach's start: only the
+    opposite side counts. For an approach that starts with e_b = 0 both sides count, |e|.
     """
     e, worst = error(trace), 0.0
     for i, parts in enumerate(approaches(trace)):
@@ -252,7 +252,7 @@ def mean_settling_time(trace: Trace) -> float:
 @metric("s", network=True)
 def spread_settling_time(trace: Trace) -> float:
     """Time from which max_i x_i - min_i x_i stays within 2 % of the scale."""
-    return last_exit(trace.t, conventions.largest(trace.x) - conventions.smallest(trace.x), BAND * scale(trace))
+    return last_exit(trace.t, np.ptp(trace.x, axis=1), BAND * scale(trace))
 
 
 @metric("{x}", network=True)

@@ -1,7 +1,7 @@
-"""Groups: the channels of a plant of which one number can be told.
+"""Groups: the channels of a plant that can share one number.
 
-The driven channels are one group, the free joints, which are only measured, another; each is divided further where its
-units differ. A cart's metres and its pole's radians have no largest among them, and no sum.
+The driven channels are one group, the free joints, which are only measured, another. Each is divided further if its
+units differ: a cart's metres and its pole's radians have no maximum and no sum.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class Group:
     """Channels of one kind and one unit.
 
     Attributes:
-      name: "driven" or "free", with the unit behind it, "driven rad", where there are several of that kind.
+      name: "driven" or "free"; "driven rad" if several groups are driven.
       unit: of their x, "rad" or "m".
       driven: whether they have actuators.
-      channels: which they are, ascending.
+      channels: their indices, ascending.
     """
 
     name: str
@@ -34,11 +34,11 @@ class Group:
 
 
 def groups(plant: Plant) -> tuple[Group, ...]:
-    """The plant's groups: first the driven ones, in each kind as their units come first."""
-    found: dict[tuple[bool, str], list[int]] = {}
+    """The plant's groups: first the driven ones, in each kind by the first channel."""
+    members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
-        found.setdefault((i < plant.driven, unit), []).append(i)
-    kinds = [driven for driven, _ in found]
+        members.setdefault((i < plant.driven, unit), []).append(i)
+    kinds = [driven for driven, _ in members]
     return tuple(
         Group(
             name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
@@ -46,12 +46,12 @@ def groups(plant: Plant) -> tuple[Group, ...]:
             driven=driven,
             channels=tuple(channels),
         )
-        for (driven, unit), channels in found.items()
+        for (driven, unit), channels in members.items()
     )
 
 
 def cut(trace: Trace, group: Group) -> Trace:
-    """The trace with the channels of a group alone; the same one where these are all. Its scenario stays whole."""
+    """The trace with the channels of a group alone; the same trace if these are all. Its scenario stays whole."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
     columns = list(group.channels)

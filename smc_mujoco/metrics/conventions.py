@@ -1,23 +1,23 @@
 """What every metric shares: the conventions, the refusal of broken traces, and `@metric`.
 
 Groups: a metric is of channels that are alike, those of one of the plant's `groups`. Driven channels and free
-joints, which no actuator drives, are scored apart, even where their units agree: what the one is told to do, the other
-only suffers. Of several groups, `score` and each metric tell a time, a percentage or a share of the motion as the worst
-of them: a law that drops the pole has settled nothing. What has x's unit, or is of the command, they tell of the driven
-channels; where these have several units, a metric with x's or u's unit is refused. `scores` has every group by itself.
+joints, which no actuator drives, are scored apart, even if their units agree. With several groups, `score` and each
+metric take the worst of them for a time, a percentage or a share of the motion: a law that drops the pole has settled
+nothing. A metric that has x's unit, or is of the command, is that of the driven channels; if these have several units,
+a metric with x's or u's unit is refused. `scores` has every group by itself.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
 
 - scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over them
-  where that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
+  if that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
 - settling band: |e| <= 2 % of the scale.
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
   signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
   sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
-- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s where that is larger. Coulomb friction and
+- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Coulomb friction and
   contacts creep by 1e-6 or less while they hold; LuGre friction bends its bristles meanwhile.
 - channels: errors and efforts that are integrals over time are summed over the group's channels; every other
   metric takes its worst channel, so that it does not grow with n.
@@ -57,23 +57,23 @@ class Metric:
 
     Attributes:
       name: the function's name.
-      label: its name in tables and figures.
-      unit: may contain {x} and {u}, see `unit_for`.
+      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u, see `unit_for`.
       summary: first line of the docstring.
-      network: True if it compares channels and so needs several of a kind.
-      realistic: True if it says something of a mechanism that is more than its plant's equation.
-      command: True if it says something of u or s, which free joints have none of.
       formula: Trace of one group's channels -> float, without the checks.
+      label: its name in tables and figures.
+      network: whether it compares channels and so needs several of a kind.
+      realistic: whether it is only about mechanisms that are more than their plant's equation.
+      command: whether it is of u or s, which free joints do not have.
     """
 
     name: str
-    label: str
     unit: str
     summary: str
-    network: bool
-    realistic: bool
-    command: bool
     formula: Callable[[Trace], float]
+    label: str
+    network: bool = False
+    realistic: bool = False
+    command: bool = False
 
     def refusal(self, plant: Plant) -> str:
         """Why this has no one value for the plant, or ""."""
@@ -91,10 +91,10 @@ class Metric:
         return not self.command and "{" not in self.unit
 
     def of(self, trace: Trace) -> float:
-        """The one value of a trace that `refuse` and `refusal` let pass: the worst of the groups that count."""
+        """The one value of a trace that `refuse` and `refusal` accept: the worst of the groups that count."""
         plant = trace.scenario.plant
-        found = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
-        return max(float(self.formula(cut(trace, group))) for group in found)
+        counted = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
+        return max(float(self.formula(cut(trace, group))) for group in counted)
 
     def fits(self, group: Group) -> bool:
         """Whether this is a metric of a group by itself."""
@@ -107,20 +107,20 @@ class Metric:
 
 
 def metric(
-    unit: str, *, label: str = "", network: bool = False, realistic: bool = False, command: bool = False
+    unit: str, *, label: str = "", **flags: bool
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
 
-    Args:
-      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u.
-      label: its name in tables and figures. Default: the function's name with spaces.
-      network: True if the metric compares channels.
-      realistic: True if it is told only of realistic mechanisms.
-      command: True if it is of the command or the sliding variable.
+    Arguments are fields of `Metric`; the label is by default the function's name with spaces.
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, doc = formula.__name__, inspect.getdoc(formula) or ""
+        summary = doc.partition("\n")[0]
+        entry = Metric(
+            name=name, unit=unit, summary=summary, formula=formula, label=label or name.replace("_", " "), **flags
+        )
+        CATALOGUE[name] = entry
 
         @functools.wraps(formula)
         def checked(trace: Trace) -> float:
@@ -129,24 +129,9 @@ def metric(
                 raise ScenarioError(why)
             return entry.of(trace)
 
-        entry = CATALOGUE[name] = Metric(
-            name=name,
-            label=label or name.replace("_", " "),
-            unit=unit,
-            summary=doc.partition("\n")[0],
-            network=network,
-            realistic=realistic,
-            command=command,
-            formula=formula,
-        )
         return checked
 
     return enter
-
-
-def label(trace: Trace) -> str:
-    """Plant and law, for messages."""
-    return f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
 
 
 def refuse(trace: Trace) -> None:
@@ -166,7 +151,8 @@ def refuse(trace: Trace) -> None:
         return
     fault = trace.failure is not None and "left the finite world" not in trace.failure  # of a law or a signal
     cure = "mend that" if fault else "change the gains or u_max, or end the run earlier"
-    raise ScenarioError(f"{label(trace)} has no score, {why}: {cure}")
+    run = f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
+    raise ScenarioError(f"{run} has no score, {why}: {cure}")
 
 
 def error(trace: Trace) -> np.ndarray:
@@ -180,7 +166,7 @@ def parts(trace: Trace) -> dict[Group, Trace]:
 
 
 def scale(trace: Trace) -> float:
-    """The yardstick of a group's trace in x's unit, never zero; see the module's conventions."""
+    """The scale of a group's trace in x's unit, never zero; see the module's conventions."""
     start, travel = np.abs(trace.x[0] - trace.r[0]).max(), max(np.ptp(r) for r in trace.r.T)
     return float(max(start, travel)) or 1.0
 
@@ -220,11 +206,6 @@ def approaches(trace: Trace) -> list[list[slice]]:
 def largest(a: np.ndarray) -> np.ndarray:
     """The largest channel at each sample: a.max(axis=1) of (K, n), much faster for few channels."""
     return functools.reduce(np.maximum, a.T)
-
-
-def smallest(a: np.ndarray) -> np.ndarray:
-    """The smallest channel at each sample, as `largest`."""
-    return functools.reduce(np.minimum, a.T)
 
 
 def turns(y: np.ndarray, least: float) -> int:

@@ -19,9 +19,8 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
-from smc_mujoco.analysis.friedman import Friedman, friedman
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
-from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank, compare, ranks
+from smc_mujoco.analysis.ranking import SEEDS, Comparison, Friedman, Rank, compare, friedman, ranks
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.metrics.catalogue import CATALOGUE
 

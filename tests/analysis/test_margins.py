@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import margin_kinds
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.analysis import QUICK
@@ -33,50 +32,50 @@ def found():
 
 
 def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
-    return margin_kinds.Kind(unit="{u}", levels=levels, put=put, none=none)
+    return margins.Kind(unit="{u}", levels=levels, put=put, none=none)
 
 
 def pushed(level):
-    """A scenario that bears what it is asked to: a push of more than the law has, or none."""
+    """A scenario that tolerates the level or not: without a push, or with one of more than the law has."""
     return dataclasses.replace(BASE, duration=0.5, x0=0.0, disturbance=smc.Constant(0.0 if level else 50.0))
 
 
 # what a margin is
 
 
-def test_it_is_the_boundary_between_what_is_borne_and_what_is_not(found):
+def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
     bases = {"observer_free": BASE, "classical": scenarios.scenario("duffing", "classical", duration=4.0)}
     closed = [margin for margin in found if not margin.open]
     assert len(closed) > 5
     for margin in closed:
-        kind = margin_kinds.MARGIN_KINDS[margin.kind]
+        kind = margins.MARGIN_KINDS[margin.kind]
         levels = margin.value, margin.value + margin.resolution
         assert margin.resolution > 0.0
         runs = smc.run([kind.put(bases[margin.law], level) for level in levels])
-        assert [margin_kinds.tolerates(trace) for trace in runs] == [True, False]
+        assert [margins.tolerates(trace) for trace in runs] == [True, False]
 
 
-def test_a_run_bears_what_leaves_it_within_five_percent_of_its_start():
+def test_a_run_tolerates_what_leaves_it_within_five_percent_of_its_start():
     held = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.2)))
     carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))
     assert abs(held.x[-1, 0]) < 0.05 * 1.5 < abs(carried.x[-1, 0])
-    assert (margin_kinds.tolerates(held), margin_kinds.tolerates(carried)) == (True, False)
+    assert (margins.tolerates(held), margins.tolerates(carried)) == (True, False)
 
 
-def test_a_run_bears_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
+def test_a_run_tolerates_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
     trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 0.0), duration=1.0))
     fallen = trace.x.copy()
-    assert margin_kinds.tolerates(trace)
+    assert margins.tolerates(trace)
     fallen[:, 1] = np.linspace(0.0, 3.0, len(fallen))
-    assert not margin_kinds.tolerates(dataclasses.replace(trace, x=fallen))
+    assert not margins.tolerates(dataclasses.replace(trace, x=fallen))
 
 
-def test_a_run_that_fails_bears_nothing():
+def test_a_run_that_fails_tolerates_nothing():
     @smc.law_function
     def broken(y, gains, memory):
         return math.nan, 0.0
 
-    assert not margin_kinds.tolerates(smc.run(dataclasses.replace(BASE, law=broken())))
+    assert not margins.tolerates(smc.run(dataclasses.replace(BASE, law=broken())))
 
 
 def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_for(found):
@@ -97,22 +96,22 @@ def test_it_does_not_depend_on_company_or_threads(found):
 # the search
 
 
-def test_it_stops_at_the_first_level_that_is_not_borne(monkeypatch):
+def test_it_stops_at_the_first_level_that_is_not_tolerated(monkeypatch):
     island = kind_of(lambda base, level: pushed(not 1.3 < level < 2.5))
-    monkeypatch.setitem(margin_kinds.MARGIN_KINDS, "island", island)
+    monkeypatch.setitem(margins.MARGIN_KINDS, "island", island)
     (margin,) = margins.of([pushed(True)], ["island"])
     assert margin.value == pytest.approx(1.3, rel=FINE)
     assert margin.searched == 4.0
 
 
 def test_an_island_between_two_levels_goes_unseen(monkeypatch):
-    monkeypatch.setitem(margin_kinds.MARGIN_KINDS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
+    monkeypatch.setitem(margins.MARGIN_KINDS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
     (margin,) = margins.of([pushed(True)], ["island"])
     assert margin.open
 
 
 def test_what_never_fails_is_told_by_value_and_searched_alike(monkeypatch):
-    monkeypatch.setitem(margin_kinds.MARGIN_KINDS, "nothing", kind_of(lambda base, level: pushed(True)))
+    monkeypatch.setitem(margins.MARGIN_KINDS, "nothing", kind_of(lambda base, level: pushed(True)))
     (margin,) = margins.of([pushed(True)], ["nothing"])
     assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
 
@@ -124,7 +123,7 @@ def test_a_law_that_fails_anyway_has_no_margin():
 
 
 def test_a_margin_below_the_smallest_level_is_found_too(monkeypatch):
-    monkeypatch.setitem(margin_kinds.MARGIN_KINDS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
+    monkeypatch.setitem(margins.MARGIN_KINDS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
     (margin,) = margins.of([pushed(True)], ["tiny"])
     assert margin.value == pytest.approx(0.3, abs=FINE)
 
@@ -149,42 +148,42 @@ def test_it_tells_how_far_it_is():
 
 
 @pytest.mark.parametrize("plant", scenarios.PLANTS)
-def test_the_disturbance_borne_is_the_one_of_theory(plant):
+def test_the_disturbance_tolerated_is_the_one_of_theory(plant):
     (margin,) = margins.margins([plant], ["observer_free"], ["disturbance"], "study", quick=True)
     assert margin.theory is not None
     assert margin.value <= margin.theory * 1.001
     assert margin.value + margin.resolution >= margin.theory * 0.999
 
 
-def test_a_delay_may_be_borne_beyond_where_rest_turns_unstable_in_a_small_oscillation():
+def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_oscillation():
     (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
     assert margin.theory is not None
     assert margin.theory - BASE.control_period < margin.value < 1.25 * margin.theory
     ringing = scenarios.scenario("inverted_pendulum", "observer_free", changes={"input_delay": margin.value})
     x = abs(smc.run(ringing).x[:, 0])
     assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)  # neither grows nor decays
-    assert 0.01 < x[-1000:].max() / 0.5 <= margin_kinds.TOLERATED_ERROR
+    assert 0.01 < x[-1000:].max() / 0.5 <= margins.TOLERATED_ERROR
 
 
-def test_dry_friction_up_to_theory_is_borne(found):
+def test_dry_friction_up_to_theory_is_tolerated(found):
     friction = next(margin for margin in found if margin.kind == "friction")
     assert friction.theory is not None
     assert friction.value >= friction.theory - friction.resolution
 
 
-def test_dry_friction_is_borne_beside_what_a_condition_has():
+def test_dry_friction_is_tolerated_beside_what_a_condition_has():
     rough = smc.Scenario(plant="duffing", law="pid", friction=(smc.Viscous(0.1), smc.Coulomb(0.1)))
-    put = margin_kinds.MARGIN_KINDS["friction"].put(rough, 0.2)
+    put = margins.MARGIN_KINDS["friction"].put(rough, 0.2)
     assert set(put.friction) == {smc.Viscous(0.1), smc.Coulomb(0.1 + 0.2)}
     none = smc.Scenario(plant="duffing", law="pid")
-    assert margin_kinds.MARGIN_KINDS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
+    assert margins.MARGIN_KINDS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
 
 
 def test_theory_says_nothing_of_a_plant_that_a_condition_pushes_or_changes():
     for condition, told in (("nominal", True), ("noise", True), ("constant", False), ("heavy", False)):
         base = smc.grid("duffing", "observer_free", condition)[0]
         for kind in ("delay", "disturbance", "friction"):
-            assert (margin_kinds.MARGIN_KINDS[kind].expected(base) is not None) == told
+            assert (margins.MARGIN_KINDS[kind].expected(base) is not None) == told
 
 
 def test_only_laws_with_a_linear_part_have_theory(found):
@@ -215,7 +214,7 @@ def test_theory_knows_the_weakest_motor(poles):
     strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
     base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
     at = 15.0 / (30.0 * 5.0 / 0.01)  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
-    expected = margin_kinds.MARGIN_KINDS["disturbance"].expected(base)
+    expected = margins.MARGIN_KINDS["disturbance"].expected(base)
     assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
 
 
@@ -235,7 +234,7 @@ def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
 
 
 def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
-    heavier = margin_kinds.MARGIN_KINDS["mass"].put
+    heavier = margins.MARGIN_KINDS["mass"].put
     for name in ("mass", "M"):
         known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
         assert heavier(known, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
@@ -296,7 +295,7 @@ def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(capsys, monke
     assert "end the name in .json" in capsys.readouterr().err
 
 
-def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_borne():
+def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated():
     from rich.console import Console
 
     console = Console(width=100)

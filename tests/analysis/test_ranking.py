@@ -16,8 +16,7 @@ from smc_mujoco import grid
 from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, median_of, share_interval
 from smc_mujoco.analysis.differences import OF_VALUE, coarse, exceeds, least_difference, worse
-from smc_mujoco.analysis.friedman import friedman
-from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, holm
+from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, friedman, holm
 from smc_mujoco.analysis.ranking import ranks as places
 from smc_mujoco.cli.tables import leaderboard as leaderboard_table
 from smc_mujoco.common.errors import ScenarioError, find

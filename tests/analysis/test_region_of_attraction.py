@@ -154,16 +154,10 @@ def test_metres_and_radians_do_not_start_alike():
 
 
 def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
-    limit = maps.holdable(PENDULUM, WEAK.gains["lam"])
     p = PENDULUM.parameters
-    assert limit == pytest.approx(math.asin(1.5 / (p["m"] * p["grav"] * p["l"])), rel=0.01)
+    limit = math.asin(WEAK.gains["lam"] / (p["m"] * p["grav"] * p["l"]))
     found = maps.of(base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0])
     assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
-
-
-def test_a_torque_above_gravitys_holds_it_anywhere():
-    assert maps.holdable(PENDULUM, 2.46) == math.inf
-    assert maps.holdable(smc.plant("duffing"), 0.1) == pytest.approx(0.101, abs=0.001)  # 0.1 = x - x^3
 
 
 def test_what_has_fallen_over_the_saddle_of_full_torque_does_not_come_back_unless_it_swings_back(weak):

@@ -1,4 +1,4 @@
-"""What tuning minimises: tracking error plus effort, summed over the conditions that a law has to withstand.
+"""What tuning minimises: tracking error plus effort, summed over the conditions that a law must cope with.
 
     J = sum over the conditions of  ITAE / sum |x0|  +  w TV / (u_max duration)        in s^2
 
@@ -11,18 +11,17 @@ The conditions are those in which laws are ranked afterwards: nominal, noisy, de
 constant, and with a mass that is 30 % less and 30 % more than the law's gains were meant for. Every run of them has a
 seed, a noise and a start (`initial_states`) that no grid takes, so no law is judged on runs that it was tuned on.
 
-A run that fails has no ITAE. It costs FAILED (2 - t / duration), t the time of its failure: finite, more than any run
-that does not fail, and less the later it fails.
+A run that fails has no ITAE. It costs FAILED (2 - t / duration), t the time of its failure. This is finite, more than
+any run costs that does not fail, and less the later it fails.
 """
 
 import dataclasses
-import functools
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
@@ -64,10 +63,10 @@ class Objective:
     u_max: float | None = None
 
     def __post_init__(self):
-        found = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
-        if not 0 < len(found) <= RUNS:
+        conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
+        if not 0 < len(conditions) <= RUNS:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
-        object.__setattr__(self, "conditions", tuple(find_condition(one) for one in found))
+        object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         if not isinstance(self.starts, Starts):
             raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
         number("weight", self.weight, least=0.0)
@@ -80,13 +79,10 @@ class Objective:
         bound = "" if self.u_max is None else f", |u| <= {self.u_max:g}"
         return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
-    def described(self) -> dict[str, Any]:
-        """Return it as plain data that JSON holds, from which `described` makes it again."""
+    def describe(self) -> dict[str, Any]:
+        """Return it as JSON data, from which `restore` makes it again."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return values | {
-            "conditions": [str(one) for one in self.conditions],
-            "starts": dataclasses.asdict(self.starts),
-        }
+        return values | {"conditions": list(map(str, self.conditions)), "starts": dataclasses.asdict(self.starts)}
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
         """Return one run for each condition; every candidate has the same starts and the same noise.
@@ -115,7 +111,7 @@ class Objective:
         return sum(tracking for tracking, _ in parts), sum(variation for _, variation in parts)
 
     def parts(self, trace: Trace) -> tuple[float, float]:
-        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; of a failed run its price, and 0."""
+        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its price, and 0."""
         if trace.diverged_at is not None:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
@@ -124,24 +120,12 @@ class Objective:
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
 
-def described(data: Mapping[str, Any]) -> Objective:
-    """Return the objective that `Objective.described` wrote; one from before there were starts has the default ones."""
-    found = dict(data.get("starts", {}))
-    if found.get("x0") is not None:
-        found["x0"] = tuple(found["x0"])
-    return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**found)})
+def restore(data: Mapping[str, Any]) -> Objective:
+    """Return the objective that `Objective.describe` wrote; old files have no starts, and so the default ones."""
+    starts = dict(data.get("starts", {}))
+    if starts.get("x0") is not None:
+        starts["x0"] = tuple(starts["x0"])
+    return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)})
 
 
-@functools.cache
-def catalogue() -> dict[str, Objective]:
-    """Return the objectives by name."""
-    return {"balanced": Objective(), "tracking": Objective(weight=0.0)}
-
-
-def objective(given: object) -> Objective:
-    """Return an Objective, from one or its name.
-
-    Raises:
-      ScenarioError: neither.
-    """
-    return given if isinstance(given, Objective) else find("objective", given, catalogue())
+OBJECTIVES = {"balanced": Objective(), "tracking": Objective(weight=0.0)}

@@ -1,4 +1,4 @@
-"""What a tuning found, with all that it depends on: saved as JSON, and compared only with its like."""
+"""The result of a tuning, with all that it depends on: saved as JSON, and compared only with its like."""
 
 import dataclasses
 import math
@@ -6,34 +6,25 @@ import os
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.tuning.objective import FAILED, Objective, described
+from smc_mujoco.analysis.tuning.objective import FAILED, Objective, restore
 from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import read_json, reading, write_json
+from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
-# What two tunings must share to be compared, as the sentence that refuses calls it.
-ALIKE = {
-    "rule": "rule",
-    "plant": "plant",
-    "definition": "objective",
-    "budget": "budget",
-    "seed": "seed",
-    "versions": "versions",
-}
+ALIKE = ("rule", "plant", "definition", "budget", "seed", "versions")  # what two tunings must share to be compared
 WRITTEN = ("objective", "before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Evaluation:
+class Evaluation(NamedTuple):
     """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation, see `objective`."""
 
     gains: tuple[float, ...]
@@ -49,17 +40,17 @@ class Evaluation:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Tuned:
-    """A law's best gains, and how they were found.
+    """A law's best gains, and how they were tuned.
 
     Attributes:
       law: with the best gains.
       objective: what they cost, s^2.
       history: every evaluation of the search, in order.
       finals: the best of them, run accurately; one of these has the gains.
-      before: what the gains cost with which the law was given, which the search did not know; s^2.
+      before: the cost of the law's own gains, which the search did not know; s^2.
       plant: the plant.
-      definition: what was minimised, its conditions and u_max among it.
-      rule: in words.
+      definition: what was minimised, with its conditions and u_max.
+      rule: the search, in words.
       budget: how many sets of gains were evaluated.
       seed: of search and noise.
       scales: the plant's X, F, M, T, SI units.
@@ -121,24 +112,16 @@ class Tuned:
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads back."""
-        path = checked(path)
+        path = ended(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
         data = {name: getattr(self, name) for name in WRITTEN} | {
-            "definition": self.definition.described(),
+            "definition": self.definition.describe(),
             "at_bound": self.at_bound,
             "scenario": serialise.describe(scenario),
-            "history": [dataclasses.astuple(e) for e in self.history],
-            "finals": [dataclasses.astuple(e) for e in self.finals],
+            "history": self.history,
+            "finals": self.finals,
         }
         return write_json(path, data)
-
-
-def checked(path: str | os.PathLike) -> Path:
-    """Return the path, if a tuning can be saved under its name."""
-    path = Path(path)
-    if path.suffix != ".json" or "\0" in path.name:
-        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in .json")
-    return path
 
 
 def load(path: str | os.PathLike) -> Tuned:
@@ -152,8 +135,10 @@ def load(path: str | os.PathLike) -> Tuned:
         scenario = serialise.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
-        history = tuple(_evaluation(*entry) for entry in data["history"])
-        finals = tuple(_evaluation(*entry) for entry in data.get("finals", ()))
+        history, finals = (
+            tuple(Evaluation(tuple(gains), *costs) for gains, *costs in data.get(name, ()))
+            for name in ("history", "finals")
+        )
         if not finals:  # tuned before there was a second round: the best of the first one
             finals = (min(history, key=lambda e: e.objective),)
         return Tuned(
@@ -162,7 +147,7 @@ def load(path: str | os.PathLike) -> Tuned:
             finals=finals,
             law=scenario.law,
             plant=scenario.plant,
-            definition=described(data["definition"]),
+            definition=restore(data["definition"]),
         )
 
 
@@ -173,10 +158,6 @@ def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) ->
       ScenarioError: there is none.
     """
     return load(gains.file(plant, law, objective, seed))
-
-
-def _evaluation(gains: Sequence[float], objective: float, tracking: float, variation: float) -> Evaluation:
-    return Evaluation(gains=tuple(gains), objective=objective, tracking=tracking, variation=variation)
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
@@ -191,9 +172,12 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         raise ScenarioError(f"cannot compare {shown(tuned)}: give a list of tunings")
     first = tuned[0]
     for one in tuned:
-        for field, name in ALIKE.items():
+        for field in ALIKE:
             if (its := getattr(one, field)) != (other := getattr(first, field)):
-                pair = f"{one.law.name} has {its}, {first.law.name} {other}"
+                name, pair = (
+                    field.replace("definition", "objective"),
+                    f"{one.law.name} has {its}, {first.law.name} {other}",
+                )
                 raise ScenarioError(f"laws tuned with unequal {name} cannot be compared, {pair}: tune them alike")
         if len(one.history) != one.budget:
             counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"

@@ -30,10 +30,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.analysis.tuning.objective import objective as find_objective
+from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.result import Evaluation, Tuned, compare, load, versions
-from smc_mujoco.common.errors import whole
+from smc_mujoco.common.errors import find, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
@@ -84,7 +83,7 @@ def tune(
     Raises:
       ScenarioError: a law with gains of unknown unit, a plant without scales, or something out of its range.
     """
-    goal = find_objective(objective)
+    goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     if conditions is not None:
         goal = dataclasses.replace(goal, conditions=conditions)  # pyright: ignore[reportArgumentType]
     if starts is not None:
@@ -125,25 +124,20 @@ class _Spent(Exception):
     """Raised when the budget is spent."""
 
 
+@dataclasses.dataclass
 class _Ledger:
     """The evaluations, cheap and accurate, in order. It raises _Spent when they are as many as the budget allows."""
 
-    def __init__(
-        self,
-        goal: Objective,
-        cases: Sequence[Scenario],
-        names: tuple[str, ...],
-        u_max: float,
-        budget: int,
-        threads: int | None,
-        report: Report,
-    ):
-        self.goal, self.cases, self.names, self.u_max = goal, cases, names, u_max
-        self.cheap = [_cheap(case) for case in cases]
-        self.budget, self.threads, self.report = budget, threads, report
-        self.evaluations: list[Evaluation] = []
-        self.finals: list[Evaluation] = []
-        self.known: dict[tuple[float, ...], float] = {}
+    goal: Objective
+    cases: Sequence[Scenario]
+    names: tuple[str, ...]
+    u_max: float
+    budget: int
+    threads: int | None
+    report: Report
+    evaluations: list[Evaluation] = dataclasses.field(default_factory=list)
+    finals: list[Evaluation] = dataclasses.field(default_factory=list)
+    known: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
 
     @property
     def best(self) -> Evaluation:
@@ -155,10 +149,10 @@ class _Ledger:
         asked = [self.gains(column) for column in logs.T.tolist()]
         new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
         left = self.budget - len(self.evaluations)
-        found = self.evaluate(new[:left], self.cheap)
-        self.evaluations += found
-        self.known |= {one.gains: one.objective for one in found}
-        self.report(len(found))
+        evaluated = self.evaluate(new[:left], [_cheap(case) for case in self.cases])
+        self.evaluations += evaluated
+        self.known |= {one.gains: one.objective for one in evaluated}
+        self.report(len(evaluated))
         if len(new) >= left:
             raise _Spent
         return np.array([self.known[gains] for gains in asked])
@@ -184,12 +178,7 @@ class _Ledger:
         traces = run([dataclasses.replace(case, law=law) for law in laws for case in cases], self.threads)
         terms = [self.goal.terms(traces[i : i + size]) for i in range(0, len(traces), size)]
         return [
-            Evaluation(
-                gains=gains,
-                objective=tracking + self.goal.weight * variation,
-                tracking=tracking,
-                variation=variation,
-            )
+            Evaluation(gains, tracking + self.goal.weight * variation, tracking, variation)
             for gains, (tracking, variation) in zip(candidates, terms, strict=True)
         ]
 

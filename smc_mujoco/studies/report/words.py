@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterable
 
-from smc_mujoco.analysis.margin_kinds import MARGIN_KINDS
+from smc_mujoco.analysis.margins import MARGIN_KINDS
 from smc_mujoco.common.text import number as in_digits
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import laws

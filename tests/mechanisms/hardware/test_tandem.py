@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import margin_kinds
+from smc_mujoco.analysis.margins import MARGIN_KINDS
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.drives import tandem
 from smc_mujoco.simulation import reference
@@ -188,8 +188,8 @@ def test_the_users_order_is_kept_and_a_backlash_is_last(tmp_path):
 
 def test_theory_of_delays_knows_no_drive():
     law = smc.law("observer_free", lam=6.0, k1=3.076)
-    assert margin_kinds.MARGIN_KINDS["delay"].expected(scenario(law=law)) is not None
-    assert margin_kinds.MARGIN_KINDS["delay"].expected(scenario(smc.Lag(0.01), smc.Lag(0.01), law=law)) is None
+    assert MARGIN_KINDS["delay"].expected(scenario(law=law)) is not None
+    assert MARGIN_KINDS["delay"].expected(scenario(smc.Lag(0.01), smc.Lag(0.01), law=law)) is None
 
 
 @pytest.mark.parametrize(

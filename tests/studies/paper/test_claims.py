@@ -34,7 +34,7 @@ from smc_mujoco.studies.paper.claims.verdict import (
     Beside,
     check,
     combined,
-    numbers,
+    judged,
     ratio,
     verdict,
 )
@@ -147,7 +147,7 @@ def test_sets_that_agree_give_their_verdict_and_others_flip():
 
 def test_two_numbers_of_one_name_are_refused():
     with pytest.raises(ScenarioError, match="'yes' twice"):
-        numbers([YES, YES])
+        judged(entry(), {"study": [YES, YES]})
 
 
 def entry(id="900", found=(YES,), note=""):
@@ -274,10 +274,9 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
     scenario = short(runs)
     row = {m.name: None if m.network else 1.5 for m in metrics()}
     row |= {"hash": key(scenario), "law": OURS, "gains": '{"lam": 6.0}', "failure": None}
-    held = claim_runs.of_table(SimpleNamespace(rows=lambda: [row]))
-    table = Runs("study", table=held)
+    table = Runs("study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
     assert table.scores([scenario])[0]["itae"] == 1.5
-    assert [one.gains for one in table.held()] == [{"lam": 6.0}]
+    assert [one.gains for one in table.results()] == [{"lam": 6.0}]
 
 
 @pytest.mark.parametrize("condition", ["nominal", "noise", "jump_hard", "encoder"])
@@ -373,7 +372,7 @@ def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory(monkeypa
     monkeypatch.setattr(searches, "PLANTS", single)
     runs = Runs("study")
     for name, found in searches.smallest_stable(runs).items():
-        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], searches.PERIOD)
+        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], claim_runs.PERIOD)
         assert theory <= found <= 1.02 * theory, name
 
 

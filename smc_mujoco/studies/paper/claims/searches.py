@@ -2,33 +2,30 @@
 
     largest_delays(runs, PLANTS, LAWS)["duffing", "classical"]    # s
 
-Delays: a run tolerates a delay if its ultimate bound is at most 5 % of |x0|, as in `margins`. The delays of
-`margin_kinds` are tried from the shortest to the first that is not tolerated, and the gap is halved down to one control
-period. All runs are the audit's own, so that mutants of laws are searched as well.
+Delays: a run tolerates a delay if its ultimate bound is at most 5 % of |x0|. The search is that of `margins`, down to
+one control period. Its runs are the audit's own, so that mutants of laws are searched as well.
 
 Lambda: a start near the origin is to die out. A range is divided by eight values at once, three times.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory
-from smc_mujoco.analysis.margin_kinds import DELAYS, TOLERATED_ERROR
+from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.paper.claims.runs import OURS, Runs, scale
-from smc_mujoco.studies.paper.claims.variants import with_gains
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs, long_run, scale
 from smc_mujoco.studies.paper.scenarios import CONTROL_PERIOD, PLANTS, U_MAX
 
-TRIED = [round(delay / CONTROL_PERIOD) for delay in DELAYS]  # control periods
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 
 LEAST = 1e-3  # N m s or N s: the lambda that stands for "any lambda > 0"
 INNER, ROUNDS, QUICK_ROUNDS = 8, 3, 2  # 8 values at once divide a range by 9: three times, and it is known to 1.2 %
-SMALL, LONG, PERIOD = 1e-3, 40.0, 5e-3  # of x0; s; s, of control and physics: the smooth law near rest asks no more
+SMALL = 1e-3  # of x0
 
 Pair = tuple[str, str]
 
@@ -36,43 +33,32 @@ Pair = tuple[str, str]
 def largest_delays(
     runs: Runs, plants: Sequence[str], laws: Sequence[str], within: float = TOLERATED_ERROR
 ) -> dict[Pair, float]:
-    """Return (plant, law) -> the largest delay tolerated, s: 0 where none is, the last of DELAYS where all are.
+    """Return (plant, law) -> the largest delay tolerated, s: 0 if none is, the last of DELAYS if all are.
 
     Args:
       within: of |x0|, below which the ultimate bound is to be.
     """
-    pairs = [(plant, law) for plant in plants for law in laws]
-    low = dict.fromkeys(pairs, 0)
-    high: dict[Pair, int] = {}
-    tried = dict.fromkeys(pairs, 0)
-    apart = COARSE if runs.quick else 1
-    while tried:
-        for pair, held in zip(tried, _tolerated(runs, tried.items(), within), strict=True):
-            if held:
-                low[pair] = tried[pair]
-            else:
-                high[pair] = tried[pair]
-        tried = {pair: at for pair in pairs if (at := _next(low[pair], high.get(pair), apart))}
-    return {pair: low[pair] * CONTROL_PERIOD for pair in pairs}
+    apart, integrator = (COARSE, "implicitfast") if runs.quick else (1, "RK4")
+    levels = [periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart]
 
+    def tolerated(tried: Sequence[tuple[Pair, float]]) -> list[bool]:
+        scenarios = [
+            runs.scenario(*pair, input_delay=periods * CONTROL_PERIOD, integrator=integrator) for pair, periods in tried
+        ]
+        scores = runs.scores(scenarios)
+        return [s["ultimate_bound"] <= within * scale(c) for s, c in zip(scores, scenarios, strict=True)]
 
-def _next(low: int, high: int | None, apart: int) -> int:
-    """Return the delay to try next, control periods; 0 where the search is over."""
-    if high is None:
-        return next((at for at in TRIED if at > low and at >= apart), 0)
-    return round((low + high) / 2) if high - low > apart else 0
-
-
-def _tolerated(runs: Runs, tried: Iterable[tuple[Pair, int]], within: float) -> list[bool]:
-    """Return whether each delay, in control periods, is tolerated."""
-    integrator = "implicitfast" if runs.quick else "RK4"
-    scenarios = [runs.scenario(*pair, input_delay=at * CONTROL_PERIOD, integrator=integrator) for pair, at in tried]
-    found = runs.scores(scenarios)
-    return [s["ultimate_bound"] <= within * scale(c) for s, c in zip(found, scenarios, strict=True)]
+    searches = {
+        (plant, law): Search(levels=levels, resolution=lambda low: apart, rounded=round)
+        for plant in plants
+        for law in laws
+    }
+    find_boundaries(searches, tolerated)
+    return {pair: search.low * CONTROL_PERIOD for pair, search in searches.items()}
 
 
 def critical_delay(runs: Runs, plant: str) -> float:
-    """Return linear theory's critical delay of the paper's law, s; NaN for a mutant, of which there is no theory."""
+    """Return linear theory's critical delay of the paper's law, s; NaN for a mutant, which has no theory."""
     law = runs.law(plant, OURS)
     if law.function is not find_law(OURS).function or min(law.gains["lam"], law.gains["k1"]) <= 0.0:
         return math.nan
@@ -97,21 +83,9 @@ def smallest_stable(runs: Runs) -> dict[str, float]:
 
 def dying(runs: Runs, lams: Mapping[str, Sequence[float]]) -> dict[str, list[bool]]:
     """Return plant -> whether a small start dies out, for each lambda; k1 is the set's."""
-    grid = [
-        runs.scenario(
-            plant,
-            OURS,
-            law=with_gains(runs.law(plant, OURS), lam=lam),
-            x0=[SMALL * x for x in find_plant(plant).x0],
-            duration=LONG,
-            control_period=PERIOD,
-            physics_step=PERIOD,
-        )
-        for plant, some in lams.items()
-        for lam in some
-    ]
-    found = iter(runs.traces(grid))
-    return {plant: [dies_out(next(found)) for _ in some] for plant, some in lams.items()}
+    grid = [long_run(runs, plant, lam, SMALL) for plant, some in lams.items() for lam in some]
+    traces = iter(runs.traces(grid))
+    return {plant: [dies_out(next(traces)) for _ in some] for plant, some in lams.items()}
 
 
 def dies_out(trace: Trace) -> bool:

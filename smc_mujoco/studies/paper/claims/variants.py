@@ -1,8 +1,8 @@
 """Variants of laws: other gains, a reversed command, or an input gain that varies with x.
 
 A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
-multiplied by g at each sample is therefore the law on that plant, exactly so but for g's change within a control
-period, during which the command is held, where |g| <= 1. So are runs made on plants that the library does not have.
+multiplied by g at each sample is therefore the law on a plant with that gain. This is exact if |g| <= 1, except that g
+changes within a control period, during which the command is held. So runs are made on plants that the library lacks.
 """
 
 import dataclasses
@@ -13,6 +13,12 @@ from numba import njit
 
 from smc_mujoco.control.component import Component
 
+INPUT_GAINS: dict[str, Callable[[float], float]] = {  # of x in rad or m
+    "reversed": lambda x: -1.0,
+    "zero": lambda x: 0.0,
+    "squeezed": lambda x: 1.0 / (1.0 + x * x),
+}
+
 
 def with_gains(law: Component, **gains: float) -> Component:
     """Return the law with some of its gains changed."""
@@ -20,44 +26,29 @@ def with_gains(law: Component, **gains: float) -> Component:
 
 
 def reversed_gain(law: Component) -> Component:
-    """Return the law as on a plant of the opposite input gain: u becomes -u."""
-    return through(law, minus, "reversed")
+    """Return the law on a plant of the opposite input gain: u becomes -u."""
+    return with_input_gain(law, "reversed")
 
 
 def zero_gain(law: Component) -> Component:
     """Return the law with no effect: u becomes 0."""
-    return through(law, nothing, "zero")
+    return with_input_gain(law, "zero")
 
 
 def squeezed(law: Component) -> Component:
-    """Return the law as on a plant whose input gain is its own times 1 / (1 + x^2), x in rad or m."""
-    return through(law, bell, "squeezed")
+    """Return the law on a plant whose input gain is its own times 1 / (1 + x^2)."""
+    return with_input_gain(law, "squeezed")
 
 
-def through(law: Component, gain: Callable[[float], float], name: str) -> Component:
-    """Return the law whose command, bounded as by the actuator, is multiplied by gain(x), x as measured."""
-    return dataclasses.replace(law, name=f"{law.name}_{name}", function=_multiplied(law.function, gain))
-
-
-def minus(x: float) -> float:
-    """g = -1."""
-    return -1.0
-
-
-def nothing(x: float) -> float:
-    """g = 0."""
-    return 0.0
-
-
-def bell(x: float) -> float:
-    """g = 1 / (1 + x^2)."""
-    return 1.0 / (1.0 + x * x)
+def with_input_gain(law: Component, name: str) -> Component:
+    """Return the law whose command, within the actuator's bound, is multiplied by a gain of INPUT_GAINS."""
+    return dataclasses.replace(law, name=f"{law.name}_{name}", function=_multiplied(law.function, name))
 
 
 @functools.cache
-def _multiplied(function: Callable, gain: Callable[[float], float]) -> Callable:
+def _multiplied(function: Callable, name: str) -> Callable:
     """Return the function times the gain; compiled once for each pair."""
-    body, factor = njit(function), njit(gain)
+    body, factor = njit(function), njit(INPUT_GAINS[name])
 
     def multiplied(y, gains, memory):
         u, s = body(y, gains, memory)

@@ -1,12 +1,12 @@
 """From checks to verdicts: a measured number against its limit, a claim under one set of gains, and over several.
 
-A claim consists of one sentence or of several. A sentence holds where all its checks hold; an existential one ("may",
-"there is") where one does. Under one set of gains a claim is supported where all its sentences hold, refuted where none
-does, partly supported between; without checks it is not testable.
+A claim consists of one sentence or several. A sentence holds if all its checks hold; an existential one ("may",
+"there is") if one does. Under one set of gains a claim is supported if all its sentences hold, refuted if none does,
+partly supported between; without checks it is not testable.
 
-Over several sets the verdict is the one that they have in common; where they differ it is partly supported, and flips.
-A universal claim ("every", "any", "by construction") speaks of all gains: a counter-example under one set refutes it.
-An existential one is supported by an example under one set.
+If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the claim is partly
+supported, and flips. A universal claim ("every", "any", "by construction") is about all gains: a counter-example under
+one set refutes it. An existential one is supported by an example under one set.
 """
 
 import dataclasses
@@ -21,7 +21,7 @@ from smc_mujoco.common.errors import ScenarioError, find
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
 MARKS = {SUPPORTED: "●", PARTLY: "◐", REFUTED: "○", NOT_TESTABLE: "–"}
 
-UNIVERSAL, NAMED, EXISTENTIAL = QUANTIFIERS = ("universal", "of what it names", "existential")
+UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"  # quantifiers
 
 RELATIONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -43,7 +43,7 @@ class Check(NamedTuple):
 
     @property
     def slack(self) -> float:
-        """By how much it holds, as a share of the limit, or of 1 where that is 0; negative where it is missed."""
+        """The distance to the limit as a share of it, or of 1 if it is 0; negative if the check fails."""
         room = self.limit - self.value if self.relation in ("<", "<=") else self.value - self.limit
         if math.isnan(room):
             return -math.inf
@@ -71,11 +71,6 @@ def check(what: str, value: float, relation: str, limit: float, sentence: str = 
     return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence)
 
 
-def about(sentence: str, *checks: Check) -> list[Check]:
-    """Return the checks as checks of one of the claim's sentences."""
-    return [one._replace(sentence=sentence) for one in checks]
-
-
 def ratio(value: float, reference: float) -> float:
     """Return value / reference; x / 0 is infinite, 0 / 0 and inf / inf are NaN."""
     if reference == 0.0:
@@ -83,23 +78,21 @@ def ratio(value: float, reference: float) -> float:
     return value / reference
 
 
-Numbers = dict[str, dict[str, dict[str, Any]]]  # set of gains -> what -> value, relation, limit, holds
-Found = Sequence[Check | Beside]
+Evidence = Sequence[Check | Beside]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Claim:
-    """A claim and its verdict.
+class Statement:
+    """What the paper claims, and how it is measured.
 
     Attributes:
-      id, text, where, measured, holds_if: as of the decorator `claim`.
-      verdict: over all sets of gains, one of VERDICTS.
-      numbers: set of gains -> what was measured -> {"value", "relation", "limit", "holds"}; inf is "never".
-      beside: set of gains -> what else was found -> its value, which decides nothing.
-      verdicts: set of gains -> verdict.
-      flips: whether the verdict depends on the set.
-      note: what a reader must know, and on which set the verdict depends.
-      quantifier: one of QUANTIFIERS.
+      id: its number in the list of claims.
+      text: what the paper says, in a few words.
+      where: the section of the paper.
+      measured: what is run, and what is measured on it.
+      holds_if: the threshold, in words.
+      note: what a reader must know to judge the numbers.
+      quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
     """
 
     id: str
@@ -107,20 +100,34 @@ class Claim:
     where: str
     measured: str
     holds_if: str
+    note: str = ""
+    quantifier: str = NAMED
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Claim(Statement):
+    """A claim and its verdict. Besides the attributes of a `Statement` it has:
+
+    Attributes:
+      verdict: over all sets of gains, one of VERDICTS.
+      numbers: set of gains -> what was measured -> {"value", "relation", "limit", "holds"}; inf is "never".
+      beside: set of gains -> what else was measured -> its value, which decides nothing.
+      verdicts: set of gains -> verdict.
+      flips: whether the verdict depends on the set.
+    """
+
     verdict: str
-    numbers: Numbers
+    numbers: dict[str, dict[str, dict[str, Any]]]
     beside: dict[str, dict[str, float]]
     verdicts: dict[str, str]
     flips: bool
-    note: str
-    quantifier: str = NAMED
 
     def checks(self, gains: str) -> list[Check]:
         """Return the checks under a set of gains."""
         return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
 
     def decisive(self, gains: str) -> Check | None:
-        """Return the check missed by most, else that with the least room, under a set of gains; None without checks."""
+        """Return the check that fails by most, else the one nearest to its limit; None without checks."""
         return min(self.checks(gains), key=lambda one: (one.holds, one.slack), default=None)
 
     def plain(self) -> dict[str, Any]:
@@ -128,17 +135,17 @@ class Claim:
         return files.plain(dataclasses.asdict(self))
 
 
-def verdict(found: Found, quantifier: str = NAMED) -> str:
+def verdict(evidence: Evidence, quantifier: str = NAMED) -> str:
     """Return the verdict under one set of gains."""
     sentences: dict[str, list[bool]] = {}
-    for one in found:
+    for one in evidence:
         if isinstance(one, Check):
             sentences.setdefault(one.sentence, []).append(one.holds)
     if not sentences:
         return NOT_TESTABLE
     enough = any if quantifier == EXISTENTIAL else all
-    held = [enough(checks) for checks in sentences.values()]
-    return SUPPORTED if all(held) else PARTLY if any(held) else REFUTED
+    hold = [enough(checks) for checks in sentences.values()]
+    return SUPPORTED if all(hold) else PARTLY if any(hold) else REFUTED
 
 
 def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str, bool, str]:
@@ -146,22 +153,42 @@ def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str,
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
-    told = ", ".join(f"{kind} with {name} gains" for name, kind in verdicts.items())
+    each = ", ".join(f"{kind} with {name} gains" for name, kind in verdicts.items())
     decisive = {UNIVERSAL: REFUTED, EXISTENTIAL: SUPPORTED}.get(quantifier)
     if decisive in kinds:
-        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {told}."
-    return PARTLY, True, f"The verdict depends on the gains: {told}."
+        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {each}."
+    return PARTLY, True, f"The verdict depends on the gains: {each}."
 
 
-def numbers(found: Found) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
-    """Return checks and the numbers beside them, by what they measure.
+def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
+    """Return a claim with its verdict.
+
+    Args:
+      evidence: set of gains -> checks and the numbers beside them.
 
     Raises:
-      ScenarioError: two of one name.
+      ScenarioError: two numbers of one name.
     """
-    for i, one in enumerate(found):
-        if any(one.what == other.what for other in found[:i]):
-            raise ScenarioError(f"a claim measures {one.what!r} twice: name the two apart")
-    told = ("value", "relation", "limit", "holds", "sentence")
-    checks = {one.what: {name: getattr(one, name) for name in told} for one in found if isinstance(one, Check)}
-    return checks, {one.what: float(one.value) for one in found if isinstance(one, Beside)}
+    verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
+    overall, flips, sentence = combined(verdicts, statement.quantifier)
+    shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
+    return Claim(
+        **shared | {"note": " ".join(filter(None, (statement.note, sentence)))},
+        verdict=overall,
+        numbers={name: _numbers(some) for name, some in evidence.items()},
+        beside={
+            name: {b.what: float(b.value) for b in some if isinstance(b, Beside)} for name, some in evidence.items()
+        },
+        verdicts=verdicts,
+        flips=flips,
+    )
+
+
+def _numbers(evidence: Evidence) -> dict[str, dict[str, Any]]:
+    """Return the checks by what they measure."""
+    names = [one.what for one in evidence]
+    for what in names:
+        if names.count(what) > 1:
+            raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
+    checks = {one.what: one._asdict() for one in evidence if isinstance(one, Check)}
+    return {what: {name: value for name, value in one.items() if name != "what"} for what, one in checks.items()}
