@@ -16,10 +16,10 @@ ends are order statistics too, and cover as the binomial distribution says: 93 %
 A block may have fewer runs than there are seeds: seeds that change nothing in it are one run. It is fixed all the same,
 and a resample that draws none of its runs takes each of them once.
 
-An interval tells of starts and noise, and of little else. Gains that were tuned from three seeds come in turn, run s
-with those of tuning seed s modulo 3, and so 16 runs hold three samples of tuning, not 16: where gains differ much from
-one tuning seed to the next, the runs of one tuning are alike, the interval is too narrow, and the sign test of
-`ranking` too sure. Of laws tuned from one seed the intervals hold for these gains alone.
+An interval is about starts and noise, and little else. Gains that were tuned from three seeds come in turn, run s
+with those of tuning seed s modulo 3, and so 16 runs have three samples of tuning, not 16. If gains differ much from one
+tuning seed to the next, the runs of one tuning are alike, the interval is too narrow, and the sign test of `ranking`
+too sure. For laws tuned from one seed the intervals hold for these gains alone.
 
 The median of several blocks is the median of their medians. A law with the lower median in every block then has the
 lower one over all of them; the median of all runs together does not promise that.
@@ -61,19 +61,19 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
     of the two to the resampled higher.
 
     Args:
-      values: (n,) a value a seed, or (blocks, n), whose columns are drawn together and of which the median is that of
-        the blocks' medians; inf for never.
+      values: (n,), a value a seed; or (blocks, n), whose columns are drawn together, for the median of the
+        blocks' medians; inf for never.
       level: of the interval.
 
     Raises:
       ScenarioError: no values, or NaN: whether it stands for a failure or for nothing is for the caller to say.
     """
-    given = np.atleast_2d(np.asarray(values, float))
-    if given.ndim != 2 or not given.size:
-        raise ScenarioError(f"values have the shape {given.shape}: give (n,) or (blocks, n), with at least one value")
-    if np.isnan(given).any():
+    rows = np.atleast_2d(np.asarray(values, float))
+    if rows.ndim != 2 or not rows.size:
+        raise ScenarioError(f"values have the shape {rows.shape}: give (n,) or (blocks, n), with at least one value")
+    if np.isnan(rows).any():
         raise ScenarioError("a value is nan: give inf for a run that failed, and leave out one that has no value")
-    return median_of(np.sort(given) if len(given) == 1 else given, level, resamples, seed)
+    return median_of(np.sort(rows) if len(rows) == 1 else rows, level, resamples, seed)
 
 
 def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
@@ -103,21 +103,21 @@ def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np
     Returns:
       Two arrays (resamples, blocks).
     """
-    found = np.empty((2, drawn.shape[1], len(values)))
+    lower, upper = np.empty((2, drawn.shape[1], len(values)))
     for k, block in enumerate(values):
         order = np.argsort(block)[: (~np.isnan(block)).sum()]
         counted, ordered = 2 * np.cumsum(counts(drawn, order), axis=0, dtype=drawn.dtype), block[order]
         total = counted[-1] // 2
-        found[0, :, k] = ordered[(counted < total).sum(axis=0)]
-        found[1, :, k] = ordered[(counted <= total).sum(axis=0)]
-    return found[0], found[1]
+        lower[:, k] = ordered[(counted < total).sum(axis=0)]
+        upper[:, k] = ordered[(counted <= total).sum(axis=0)]
+    return lower, upper
 
 
 def counts(drawn: np.ndarray, runs: np.ndarray) -> np.ndarray:
-    """Return how often each run of a block counts in each resample: as drawn, or once where none of them was drawn."""
-    found = drawn[runs]
-    found[:, ~found.any(axis=0)] = 1
-    return found
+    """Return how often each run of a block counts in each resample: as drawn, or once if none of them was drawn."""
+    counted = drawn[runs]
+    counted[:, ~counted.any(axis=0)] = 1
+    return counted
 
 
 def share_interval(share: float, n: int, level: float = 0.95) -> Interval:

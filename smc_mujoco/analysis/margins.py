@@ -254,7 +254,7 @@ class Margin:
       unit: of value, resolution, searched and theory.
       resolution: the first level not tolerated is at most this much larger.
       searched: the largest level tried.
-      theory: the same by linear theory, or None where there is none.
+      theory: the same by linear theory, or None.
     """
 
     plant: str
@@ -307,7 +307,7 @@ def margins(
     for base in bases:
         if not any(base.x0):
             cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
-            raise ScenarioError(f"{base.plant.name} starts at 0, of which no margin is a part: {cure}")
+            raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {cure}")
     return of(bases, [kinds] if isinstance(kinds, str) else kinds, COARSE if quick else FINE, threads, report)
 
 

@@ -29,7 +29,7 @@ class Columns(Protocol):
     """A table, a row a run: plant, law, condition, seed, failure, diverged_at, and every metric."""
 
     def column(self, name: str) -> np.ndarray:
-        """Return values by row; None or NaN where there is none."""
+        """Return values by row; None or NaN for none."""
         ...
 
     def scenario(self, i: int) -> Scenario:
@@ -40,16 +40,16 @@ class Columns(Protocol):
 def values(table: Columns, metric: str) -> np.ndarray:
     """Return a metric by row: inf for a failed run, NaN where it does not apply. "settles" is 0.0 if it does, else 1.0.
 
-    It does not apply to a plant whose runs all lack it, but for those that failed.
+    A metric does not apply to a plant if all runs lack it that did not fail.
     """
-    found = np.array(table.column("settling_time" if metric == SETTLES else metric), float)
+    scores = np.array(table.column("settling_time" if metric == SETTLES else metric), float)
     failed = np.array([failure is not None for failure in table.column("failure")], bool)
     failed |= ~np.isnan(np.array(table.column("diverged_at"), float))
-    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(found) & ~failed
+    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed
     without = set(plants[lacking]) - set(plants[~lacking & ~failed])
-    found[failed] = np.inf
-    found[np.isin(plants, list(without))] = np.nan
-    return np.isinf(found).astype(float) if metric == SETTLES else found
+    scores[failed] = np.inf
+    scores[np.isin(plants, list(without))] = np.nan
+    return np.isinf(scores).astype(float) if metric == SETTLES else scores
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -58,25 +58,17 @@ class Group:
 
     Attributes:
       name: what they share.
-      rows: of the table.
       laws: that ran, by name.
       blocks: (plant, condition), in the table's order.
-      shape: laws, blocks, seeds.
-      places: where among these each row is, flat.
-      seeds: of each block, in how many every law ran.
+      rows: (laws, blocks, seeds), the row of each run in the table; -1 where no run is.
       outcome: (laws, blocks, seeds), equal for runs of a law that are the same but for rounding; -1 where no run is.
-      repeats: (blocks, seeds), whether every law has done the same in an earlier seed.
     """
 
     name: Mapping[str, str]
-    rows: np.ndarray
     laws: tuple[str, ...]
     blocks: tuple[tuple[str, str], ...]
-    shape: tuple[int, int, int]
-    places: np.ndarray
-    seeds: tuple[int, ...]
+    rows: np.ndarray
     outcome: np.ndarray
-    repeats: np.ndarray
 
     @property
     def plants(self) -> int:
@@ -84,29 +76,33 @@ class Group:
         return len({plant for plant, _ in self.blocks})
 
     @property
-    def first(self) -> list[int]:
-        """A row of each block."""
-        block = np.unravel_index(self.places, self.shape)[1]
-        return [int(self.rows[np.argmax(block == k)]) for k in range(self.shape[1])]
+    def common(self) -> np.ndarray:
+        """Whether every law ran, (blocks, seeds)."""
+        return np.all(self.rows >= 0, axis=0)
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The number of seeds of each block in which every law ran."""
+        return tuple(self.common.sum(axis=1).tolist())
 
     def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Return the blocks in which a metric applies, law -> (these blocks, seeds), and law -> its outcomes in them.
 
-        Of no blocks, {} twice. Scores are NaN in cells that not all laws have, and in repeats.
+        Of no blocks, {} twice. Scores are NaN in cells that not all laws have, and in seeds in which every law has done
+        the same as in an earlier one.
 
         Raises:
           ScenarioError: the laws share no cell.
         """
-        if np.isnan(by_row[self.rows]).all():
+        cube = np.where(self.rows >= 0, by_row[self.rows], np.nan)
+        if np.isnan(cube).all():
             return [], {}, {}
-        cube = np.full(self.shape, np.nan)
-        cube.flat[self.places] = by_row[self.rows]
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             where = f" of {', '.join(self.name.values())}" if self.name else ""
             laws = ", ".join(self.laws)
             raise ScenarioError(f"{laws} have no run{where} in common: run them in the same conditions and seeds")
-        common &= ~self.repeats
+        common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
         own, outcomes = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in (cube, self.outcome))
@@ -129,12 +125,12 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
         raise ScenarioError("the table has no runs: run a study first")
     columns |= {"seed": seeds, "outcome": _outcomes(table)}
     _check_alike(table, columns)
-    keys = np.stack([columns[name] for name in by]) if by else np.zeros((1, seeds.size), str)
-    shared, first, which = np.unique(keys, axis=1, return_index=True, return_inverse=True)
-    for i in np.argsort(first):
-        rows = np.flatnonzero(which.ravel() == i)
-        name = dict(zip(by, shared[:, i].tolist(), strict=True)) if by else {}
-        yield _group(name, rows, {name: values[rows] for name, values in columns.items()})
+    members: dict[tuple[str, ...], list[int]] = {}
+    for row in range(seeds.size):
+        members.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
+    for key, rows in members.items():
+        own = {name: values[rows] for name, values in columns.items()}
+        yield _group(dict(zip(by, key, strict=True)), np.array(rows), own)
 
 
 def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
@@ -149,11 +145,11 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
     cells = list(zip(columns["plant"], columns["condition"], columns["seed"].tolist(), strict=True))
     first: dict[tuple, tuple[str, dict[str, Any]]] = {}
     for cell, law, text in zip(cells, columns["law"], texts, strict=True):
-        told = {name: value for name, value in json.loads(text).items() if name not in FREE}
-        told["plant"].get("mjcf", {}).pop("path", None)  # its contents tell models apart
-        known, other = first.setdefault(cell, (law, told))
-        if told != other and (found := _difference(other, told)):
-            what, one, two = found
+        about = {name: value for name, value in json.loads(text).items() if name not in FREE}
+        about["plant"].get("mjcf", {}).pop("path", None)  # its contents tell models apart
+        known, other = first.setdefault(cell, (law, about))
+        if about != other and (difference := _difference(other, about)):
+            what, one, two = difference
             raise ScenarioError(
                 f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {known} and "
                 f"{shown(two)} under {law}: give runs that differ in the law alone"
@@ -188,42 +184,28 @@ def _outcomes(table: Columns) -> np.ndarray:
 
 def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray]) -> Group:
     laws, law = np.unique(columns["law"], return_inverse=True)
-    keys = np.stack([columns["plant"], columns["condition"]])
-    blocks, first, block = np.unique(keys, axis=1, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    blocks, block = blocks[:, order], np.argsort(order)[block.ravel()]
+    keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
+    blocks = tuple(dict.fromkeys(keys))
+    index = {key: i for i, key in enumerate(blocks)}
+    block = np.array([index[key] for key in keys])
     numbers, seed = np.unique(columns["seed"], return_inverse=True)
-    shape = len(laws), blocks.shape[1], len(numbers)
-    places = np.ravel_multi_index((law, block, seed), shape)
-    if (twice := np.bincount(places) > 1).any():
-        a, b, c = np.unravel_index(int(np.argmax(twice)), shape)
-        cell = f"{laws[a]} on {blocks[0, b]}, {blocks[1, b]}, seed {numbers[c]}"
+    place, outcome = np.full((2, len(laws), len(blocks), len(numbers)), -1)
+    if (twice := np.bincount(np.ravel_multi_index((law, block, seed), place.shape)) > 1).any():
+        a, b, c = np.unravel_index(int(np.argmax(twice)), place.shape)
+        cell = f"{laws[a]} on {', '.join(blocks[b])}, seed {numbers[c]}"
         raise ScenarioError(f"the table has several runs of {cell}: give those of one set of gains and one duration")
-    outcome = np.full(shape, -1)
-    outcome.flat[places] = columns["outcome"]
-    there = np.all(outcome >= 0, axis=0)
-    return Group(
-        name=name,
-        rows=rows,
-        laws=tuple(laws.tolist()),
-        blocks=tuple(zip(*blocks.tolist(), strict=True)),
-        shape=shape,
-        places=places,
-        seeds=tuple(there.sum(axis=1).tolist()),
-        outcome=outcome,
-        repeats=there & ~first_of_kind(outcome, there),
-    )
+    place[law, block, seed], outcome[law, block, seed] = rows, columns["outcome"]
+    return Group(name=name, laws=tuple(laws.tolist()), blocks=blocks, rows=place, outcome=outcome)
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
-    """Return a scenario of each block of a group. It is None where its plant is a user's and cannot be loaded here."""
-    found: list[Scenario | None] = []
-    for row in group.first:
-        try:
-            found.append(table.scenario(row))
-        except ScenarioError:
-            found.append(None)
-    return found
+    """Return a scenario of each block of a group. It is None if its plant is a user's and cannot be loaded here."""
+    known: list[Scenario | None] = []
+    for rows in group.rows.swapaxes(0, 1):
+        known.append(None)
+        with contextlib.suppress(ScenarioError):
+            known[-1] = table.scenario(int(rows[rows >= 0].min()))
+    return known
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

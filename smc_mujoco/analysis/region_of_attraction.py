@@ -8,16 +8,17 @@
 The channels of a network all start alike. x is not wrapped: a pendulum that rests a turn away has not converged.
 
 The rule. X and V are the largest |x| and |v| of the grid; a run is home while |x| <= 2 % of X and |v| <= 2 % of V on
-every channel. States are run for 15 % of the duration; those still open again, from the start, for 40 %, and the rest
-for all of it (runs are deterministic, and keep no state between: this costs at most 1.55 times the last).
+every channel. States are run for 15 % of the duration; those not decided then are run again, from the start, for 40 %,
+and the rest for all of it (runs are deterministic and keep no state: this costs at most 1.55 times the last).
 - converges, early: home throughout the last third of the horizon, and (x/X)^2 + (v/V)^2 smaller by a tenth in the
-  second half of it than in the first; or near, within a tenth of home, in the second half. There its size tells
-  nothing: a law that switches leaves a ripple, whose beat makes now one half larger, now the other. A start that is
-  near itself tells nothing either: what leaves slowly is near for long.
+  second half of it than in the first; or near, within a tenth of home, in the second half. There its size means
+  nothing: a law that switches leaves a ripple, and either half may be the larger one. A start that is near itself means
+  nothing either: a run that leaves slowly is near for long.
 - does not, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away from home.
 - at the end: converges if home throughout the last 20 % of the run, and near or not leaving, larger by 5 %; does not if
-  never home in them; else undecided. What leaves by less, 2.5 % a second in runs of 10 s, is taken to stay.
-Early verdicts are no proofs, as a run that is home and shrinking might leave later: tests hold them against runs to
+  never home in them; else undecided. A run that leaves by less, 2.5 % a second in runs of 10 s, counts as one that
+  stays.
+Early verdicts are no proofs, as a run that is home and shrinking might leave later: tests compare them with runs to
 the end. `basin` integrates with implicitfast, four times as fast as RK4 and 1e-3 rad or m from it: less than a
 fiftieth of a cell.
 """

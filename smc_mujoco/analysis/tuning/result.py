@@ -194,7 +194,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
 
 
 def _bounds(tuned: Tuned) -> Box:
-    """Return the bounds that the rule gives; of a law that is not at hand only their width can be told."""
+    """Return the bounds that the rule gives; for a law that cannot be loaded here, only their width is checked."""
     if tuned.law.template:
         return box(tuned.law, tuned.scales)
     one_sided = 10.0**DECADES  # of a force, which is searched up to u_max

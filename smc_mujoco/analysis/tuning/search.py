@@ -72,7 +72,7 @@ def tune(
     """Find the law's best gains on the plant, by the rule that is the same for every law.
 
     Args:
-      law: its gains are the starting point of nothing: `Tuned.before` says what they cost. Those held keep their value.
+      law: the search does not start from its gains; `Tuned.before` is their cost. Those held keep their value.
       budget: how many sets of gains are evaluated, each in as many runs as the objective has conditions.
       seed: of the search, and of the starts and the noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", which has no price on the variation of u.
