@@ -67,7 +67,7 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
 
 
 def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
-    """Return the input delay in s from which (1) is unstable: 0 if it is so without one, inf if no delay makes it so.
+    """Return the input delay in s from which (1) is unstable: 0 if it is unstable without delay, inf if with none.
 
     Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
     right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|, a quadratic in w^2 without tau, which the phase then
@@ -127,7 +127,7 @@ def _adjugate(m: np.ndarray) -> np.ndarray:
 def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
     """Return where (1) rests under a constant d on every channel, worst channel, rad or m.
 
-    Of one joint it is |d| / (lam k1 + K).
+    For one joint it is |d| / (lam k1 + K).
     """
     lam, k1, d = number("lam", lam, least=0.0), number("k1", k1, least=0.0), number("d", d)
     at = linear(plant)
@@ -138,7 +138,7 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> float | None:
     """Return the same without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|; inf if none.
 
-    None for a law without theory. Followed from x = 0 to the first summit of that force: beyond it nothing holds.
+    None for a law without theory. Only x up to the first maximum of that force count: beyond it nothing holds.
     """
     force = holding(plant, law, u_max)
     if force is None:
@@ -154,7 +154,7 @@ def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> flo
 def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
     """Return the largest constant d, or dry friction, with which the plant rests within |x| <= most.
 
-    None as of `rest_error`. Dry friction up to this level cannot hold the plant further out. It may stop further in.
+    None as in `rest_error`. Dry friction up to this level cannot hold the plant further out. It may stop further in.
     """
     force = holding(plant, law, u_max)
     if force is None:

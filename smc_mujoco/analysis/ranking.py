@@ -7,17 +7,17 @@
 As in `bootstrap`, seeds are the sample, blocks are fixed, and inf is worst, two of them tied. One law is better than
 another in a block if three things hold.
 
-- Its median is lower by more than the least relevant difference, see `differences`. Smaller ones are ties.
+- Its median is lower by more than the least relevant difference, see `differences`. Smaller differences are ties.
 - It is ahead in more seeds, and the sign test over them rejects that both are ahead equally often (W. J. Conover,
   Practical Nonparametric Statistics, 1999, 3.4). The test is exact for any number of seeds and free of units. Its
   p-values are two-sided and corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979) for all pairs
   of laws in all blocks: the probability that any law is wrongly called better, in any block, is at most 1 - level.
 - There are at least 16 seeds. With fewer, hardly anything survives the correction.
 
-A seed is a sample of two laws if it changes one of the two. Seeds in which both do what they did together in an earlier
-one are that one run over again: they count once in the test and among the 16, whatever other laws do in them.
+A seed is a sample of two laws if it changes one of them. If both do what they did in an earlier seed, it is the same
+run again: such seeds count once in the test and among the 16, whatever other laws do in them.
 
-A law that no other is better than is among the best of its block; where it alone is, it is the winner there. "Better"
+A law that no other is better than is among the best of its block; if it is the only one, it is the winner. "Better"
 follows the medians, so every block has a best law, and a winner has the lowest median.
 
 A law's rank in a block is that of its median; medians that differ by less than the least relevant difference are tied.
@@ -29,6 +29,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,8 +41,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 SEEDS = 16  # the fewest, of distinct runs, with which one law is called better than another
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Rank:
+class Rank(NamedTuple):
     """A law's place among laws, 1 the best; ties share the mean of their places.
 
     Attributes:
@@ -202,20 +202,9 @@ def ranks(comparison: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> 
         drawn = block_ranks(_drawn_centres(comparison, draws(n, resamples, seed)), comparison.floors)
         places, at = np.sort(_places(drawn.mean(axis=2)), axis=0), outermost(n, comparison.level, resamples)
         middles, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
-    p, best = comparison.p.min(axis=(0, 1)), ~np.any(comparison.better, axis=(0, 1))
-    rows = [
-        Rank(
-            law=law,
-            mean=float(mean[0, i]),
-            place=float(place[i]),
-            median=float(middles[i]),
-            low=float(low[i]),
-            high=float(high[i]),
-            p=float(p[i]),
-            best=bool(best[i]),
-        )
-        for i, law in enumerate(comparison.laws)
-    ]
+    numbers = np.column_stack([mean[0], place, middles, low, high, comparison.p.min(axis=(0, 1))]).tolist()
+    best = (~np.any(comparison.better, axis=(0, 1))).tolist()
+    rows = [Rank(law, *row, one) for law, row, one in zip(comparison.laws, numbers, best, strict=True)]
     return sorted(rows, key=lambda rank: rank.mean)
 
 
@@ -256,8 +245,8 @@ class Friedman:
     Attributes:
       blocks: how many.
       mean_ranks: law -> mean rank over the blocks, in each by its median over the seeds.
-      p: that laws which rank alike differ by so much.
-      critical_difference: of mean ranks; laws that differ by less are not told apart.
+      p: the probability that laws which rank alike differ by this much.
+      critical_difference: of mean ranks; laws that differ by less cannot be distinguished.
     """
 
     blocks: int

@@ -14,7 +14,7 @@ bounded in the same way: k at most u_max b, for the b of each candidate. The law
 over="b")`. A law that has the model divides by the plant's g instead: its k is stated as a force and searched up to
 F = u_max / M. Gains k and b are tuned without the model, and with it, where g is less than b, k / g may be more.
 
-A law states the unit of each gain where it states the gain, and which gains are held at the value the law came with:
+A law declares the unit of each gain with the gain, and which gains are held at the law's own value:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
@@ -47,7 +47,7 @@ ROUNDING = 1e-3  # of a gain: twice what four digits may add to it
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
 
 
-# Deprecated: law -> gain -> its unit, or None where it is held. Version 0.1 kept the units of all laws here.
+# Deprecated: law -> gain -> its unit, or None if it is held. Version 0.1 kept the units of all laws here.
 SCALES: dict[str, Mapping[str, Unit | Callable[[Mapping[str, float]], Unit] | None]] = {}
 
 
@@ -73,7 +73,7 @@ def _gain(law: Component, name: str) -> Gain:
 
 
 def unit(law: Component, name: str) -> Unit | None:
-    """Return the unit of a law's gain; None of a number that is held.
+    """Return the unit of a law's gain; None for a number that is held.
 
     Raises:
       ScenarioError: it is not known.
@@ -134,7 +134,7 @@ def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
 
 
 def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
-    """Return the most that the actuator can give of each gain that the law divides by another one: u_max b of k / b."""
+    """Return the upper bound of each gain that the law divides by another one: u_max b for the force k / b."""
     known = law.template.gains if law.template else {}
     values = {**law.gains, **gains}
     return {name: u_max * values[gain.over] for name, gain in known.items() if gain.over is not None}

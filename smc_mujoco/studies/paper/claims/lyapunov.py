@@ -1,4 +1,4 @@
-"""The paper's Lyapunov function along its own closed loop, exactly: V = s^2 / 2, s = alpha - u / g, and its rate.
+"""The paper's Lyapunov function along its closed loop, exactly: V = s^2 / 2, s = alpha - u / g, and its rate.
 
     x, v = plane(plant, k1)                                    # a grid of states
     rate = vdot(plant, lam, k1, x, v)                          # V' at each; the paper says V' < 0 wherever s != 0
@@ -14,8 +14,8 @@ The paper asserts V' <= -eps s^2 without expanding s'. For g > 0, s has the sign
 so V' has the sign of alpha alpha'. On alpha = 0, where v = -k1 x, (1) leaves alpha' = f(x, -k1 x) - k1^2 x: wherever
 that is not 0, V' is positive on one side of the line, arbitrarily near it, whatever lam is.
 
-A network is taken synchronised: with equal angles and rates its springs are relaxed and each channel is one pendulum.
-A state in which V' > 0 there is a state of the whole network.
+A network is synchronised: with equal angles and rates its springs are relaxed and each channel is one pendulum. Such a
+state with V' > 0 is a state of the whole network.
 Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", stability analysis; (1) and (2)
 derived here.
 """
@@ -45,7 +45,7 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
     """Return V' by (2) in the states (x, v), in the unit of s, squared, per s.
 
     Args:
-      plant: with its nominal f and g; a network is taken synchronised.
+      plant: with its nominal f and g; a network is synchronised.
       lam, k1: gains of the paper's law, not saturated.
       x, v: positions and velocities, arrays of one shape, SI units.
     """

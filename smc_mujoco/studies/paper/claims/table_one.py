@@ -1,17 +1,9 @@
 """The paper's table I: five properties of four laws, each cell a mark that is measured.
 
-A property is a number of a law, the worst over the five plants of the study, and the mark is + where it meets a limit:
-
-- no chattering: TV rate of u, nominal, over classical SMC's on that plant, below 1 % (the limit of claims 3 and 52).
-- observer-free: how many estimated signals the law takes beside position and velocity, which all four take, is 0.
-- bounded input: growth of the largest |u| that the law asks for, before the actuator's bound, when it is held at
-  100 |x0| instead of 10 |x0|, or for 2 s instead of 1 s, the larger of both, at most 1 %. Where it does not grow
-  there is a bound.
-- delay-tolerant: largest delay tolerated (as claim 61 measures it) less classical SMC's on that plant is above 0.
-- smoothness: largest step of u from sample to sample, nominal, over the run's max |u|, below 10 % (the limit under
-  which claim 48 calls u smooth).
-
-A cell holds where our mark is the paper's.
+A property is a number of a law, the worst over the five plants of the study. The mark is + if it meets a limit, which
+the note of the claim states. "Bounded input" compares the largest |u| that the law asks for, before the actuator's
+bound: at a constant distance of 100 |x0| against 10 |x0|, and after 2 s against 1 s; the larger growth counts.
+"Delay-tolerant" is measured as in claim 61. A cell holds if our mark is the paper's.
 """
 
 import math
@@ -39,7 +31,7 @@ MARKS = {
 }
 ESTIMATED = ("a", "q", "dq")  # of a Measurement: acceleration, and a joint that moves along
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<="}
-# Cells that hold whatever the runs are, for the laws as they are: of the yardstick, without estimates, of tanh.
+# Cells that hold for any runs: of the law that is the reference, of laws without estimates, of tanh.
 CERTAIN = {(name, "classical") for name in ("no chattering", "delay-tolerant", "observer-free")}
 CERTAIN |= {("observer-free", "adaptive"), ("observer-free", "proposed"), ("bounded input", "proposed")}
 SMOOTH, STRICT = 0.1, 0.02  # of max |u|: the limits of claims 48 and 49
@@ -58,7 +50,7 @@ def table_one(runs: Runs) -> list[Check | Beside]:
     distance and time; largest delay less classical's; largest step of u over max |u|; worst of five plants.
 
     The limits of the cells are ours: set in November 2026, when the audit was written, not before any run. Six cells
-    cannot fail, and say so: classical SMC is the yardstick of two rows, three laws take no estimated signal, and tanh
+    cannot fail, and say so: classical SMC is the reference of two rows, three laws take no estimated signal, and tanh
     is bounded. Marks are given at: TV rate < 1 % of classical's; no estimated signal beside velocity, which all four
     laws take; growth of max |u| <= 1 %; a longer delay than classical's on every plant; steps < 10 % of max |u|, under
     which claim 48 calls u smooth. If 2 %, the limit of claim 49, gives another mark, that stands beside: a steep
@@ -121,7 +113,7 @@ def estimated(runs: Runs, law: str) -> float:
 
 
 def _asked(law: Component, x: np.ndarray, v: np.ndarray | None = None, **signals: np.ndarray) -> np.ndarray:
-    """Return what a law commands, sample by sample, when it is shown these signals whatever it commands."""
+    """Return what a law commands, sample by sample, in open loop: the signals do not depend on its command."""
     function, gains, memory = (
         remade(law.function, lambda same: same),
         SimpleNamespace(**law.gains),

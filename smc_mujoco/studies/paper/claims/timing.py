@@ -1,7 +1,8 @@
 """Time of a law per control sample: its compiled C function alone, on states that vary between samples.
 
-Rounds of the laws are interleaved and the least of each law's counts, as what else runs only adds to it; only ratios
-within one call mean anything. benchmarks/laws.py measures the whole sample, in which reading and logging cost more.
+Rounds of the laws are interleaved, and each law's least time counts, since other processes can only add to it. Only
+ratios within one call mean anything. benchmarks/laws.py measures the whole sample, in which reading and logging cost
+more.
 """
 
 # pyright: reportCallIssue=false
