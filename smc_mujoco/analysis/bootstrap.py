@@ -43,7 +43,7 @@ class Interval(NamedTuple):
 
     Attributes:
       median: of the values; of `share_interval` the share.
-      low: NaN where it is not known: a median of a single seed.
+      low: NaN if unknown, for the median of a single seed.
       high: likewise; inf where it may be "never".
       n: seeds.
     """
@@ -128,7 +128,7 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     """
     number("share", share, least=0.0, most=1.0)
     whole("n", n, 1, 10**9)
-    z = NormalDist().inv_cdf((1 + checked(level)) / 2)
+    z = NormalDist().inv_cdf((1 + confidence(level)) / 2)
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((middle + side * half) / (1 + z * z / n) for side in (-1, 1))
     return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding leaves 1 out, and 0
@@ -153,10 +153,10 @@ def outermost(n: int, level: float, resamples: int) -> int:
     """
     from scipy.special import ndtr, stdtrit
 
-    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + checked(level)) / 2))
+    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + confidence(level)) / 2))
     return max(1, math.floor(tail * (resamples + 1)))
 
 
-def checked(level: float) -> float:
+def confidence(level: float) -> float:
     """Return a level of confidence, or refuse it."""
     return number("level", level, least=0.5, most=0.999)

@@ -169,7 +169,7 @@ def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float
     from scipy.optimize import minimize_scalar
 
     ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]
-    found = minimize_scalar(
+    summit = minimize_scalar(
         lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
     )
-    return float(found.x), -float(found.fun)
+    return float(summit.x), -float(summit.fun)

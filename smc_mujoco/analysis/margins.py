@@ -291,7 +291,7 @@ def margins(
       gains: a set of `gains.SETS`.
       quick: runs of 5 s, to within 5 control periods or 10 %: for a look.
       threads: as of `run`.
-      report: called with the work done and the whole, in simulated steps; the whole grows while it is being found out.
+      report: called with the work done and the whole, in simulated steps; the whole is an estimate until the end.
       condition: what holds besides, such as "coulomb".
       starts: where runs begin. Default: the plant's own x0.
 
@@ -360,9 +360,9 @@ def of(
     ]
 
 
-def save(found: Sequence[Margin], path: str | os.PathLike) -> Path:
+def save(margins: Sequence[Margin], path: str | os.PathLike) -> Path:
     """Write margins to a .json file that `load` reads back; NaN and infinity are words there, see `files.plain`."""
-    return write_json(ended(path, ".json"), [dataclasses.asdict(margin) for margin in found])
+    return write_json(ended(path, ".json"), [dataclasses.asdict(margin) for margin in margins])
 
 
 def load(path: str | os.PathLike) -> list[Margin]:

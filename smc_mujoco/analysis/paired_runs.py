@@ -165,9 +165,9 @@ def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, An
         if not (isinstance(a, dict) and isinstance(b, dict)):
             if a != b:
                 return str(name), a, b
-        elif found := _difference(a, b):
+        elif difference := _difference(a, b):
             inner = isinstance(name, int) or name == "values"  # no names of a user's
-            return found if inner else (f"{name}'s {found[0]}", *found[1:])
+            return difference if inner else (f"{name}'s {difference[0]}", *difference[1:])
     return None
 
 
@@ -200,12 +200,11 @@ def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
     """Return a scenario of each block of a group. It is None if its plant is a user's and cannot be loaded here."""
-    known: list[Scenario | None] = []
-    for rows in group.rows.swapaxes(0, 1):
-        known.append(None)
+    scenarios: list[Scenario | None] = [None] * len(group.blocks)
+    for k, rows in enumerate(group.rows.swapaxes(0, 1)):
         with contextlib.suppress(ScenarioError):
-            known[-1] = table.scenario(int(rows[rows >= 0].min()))
-    return known
+            scenarios[k] = table.scenario(int(rows[rows >= 0].min()))
+    return scenarios
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.bootstrap import RESAMPLES, checked, counts, drawn_medians, draws, middle, outermost
+from smc_mujoco.analysis.bootstrap import RESAMPLES, confidence, counts, drawn_medians, draws, middle, outermost
 from smc_mujoco.analysis.differences import exceeds, least_difference, worse
 from smc_mujoco.common.errors import ScenarioError, shown
 
@@ -146,7 +146,7 @@ def compare(
     p[:, a, b], p[:, b, a] = np.where(ahead < 0, value, 1.0).T, np.where(ahead > 0, value, 1.0).T
     runs[:, a, b] = runs[:, b, a] = ran.sum(axis=2).T
     widths = np.broadcast_to(np.asarray(floors, float), blocks)
-    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=checked(level), p=p, runs=runs)
+    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=confidence(level), p=p, runs=runs)
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -204,7 +204,7 @@ def ranks(comparison: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> 
         middles, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
     numbers = np.column_stack([mean[0], place, middles, low, high, comparison.p.min(axis=(0, 1))]).tolist()
     best = (~np.any(comparison.better, axis=(0, 1))).tolist()
-    rows = [Rank(law, *row, one) for law, row, one in zip(comparison.laws, numbers, best, strict=True)]
+    rows = [Rank(law, *row, best=one) for law, row, one in zip(comparison.laws, numbers, best, strict=True)]
     return sorted(rows, key=lambda rank: rank.mean)
 
 

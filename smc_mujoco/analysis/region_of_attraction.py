@@ -106,7 +106,7 @@ def basin(
 
     Args:
       plant, law: names, or a plant and a law of your own.
-      points: how many positions and velocities where x or v is not given: then -X .. X and -V .. V, X a half turn, or
+      points: numbers of positions and velocities of the default grid: -X .. X and -V .. V, X a half turn, or
         twice the study's start on a rail, and V = 3 X per second.
       gains: a set of `gains.SETS`.
       threads: as of `run`.

@@ -232,7 +232,7 @@ def leaderboard(
 def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
     """Return block k of a group, which is number `at` of those compared."""
     plant, condition = group.blocks[k]
-    runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws])
+    runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws], bool)
     best = runs[np.ix_(laws, laws)][np.triu_indices(laws.sum(), 1)]
     most = int(runs.max()) if len(laws) > 1 else int(found.seeds[at])
     return Block(

@@ -93,8 +93,8 @@ class Tuned:
     def _largest(self) -> dict[str, float]:
         """Return the most that the actuator gives of gains that the law divides by another one."""
         u_max = self.definition.u_max
-        found = largest(self.law, self.law.gains, math.inf if u_max is None else u_max)
-        return {name: most for name, most in found.items() if name in self.bounds}
+        bounds = largest(self.law, self.law.gains, math.inf if u_max is None else u_max)
+        return {name: most for name, most in bounds.items() if name in self.bounds}
 
     @property
     def widened(self) -> list[str]:
@@ -104,11 +104,11 @@ class Tuned:
     @property
     def front(self) -> list[Evaluation]:
         """The finals that no other beats in both tracking and variation, by tracking; failed ones left out."""
-        found: list[Evaluation] = []
+        front: list[Evaluation] = []
         for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
-            if not one.failed and (not found or one.variation < found[-1].variation):
-                found.append(one)
-        return found
+            if not one.failed and (not front or one.variation < front[-1].variation):
+                front.append(one)
+        return front
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads back."""

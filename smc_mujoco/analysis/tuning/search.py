@@ -137,7 +137,7 @@ class _Ledger:
     report: Report
     evaluations: list[Evaluation] = dataclasses.field(default_factory=list)
     finals: list[Evaluation] = dataclasses.field(default_factory=list)
-    known: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
+    objectives: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
 
     @property
     def best(self) -> Evaluation:
@@ -146,23 +146,23 @@ class _Ledger:
 
     def costs(self, logs: np.ndarray) -> np.ndarray:
         """Return J of candidates given as columns of log10 gains (gains, candidates)."""
-        asked = [self.gains(column) for column in logs.T.tolist()]
-        new = [gains for gains in dict.fromkeys(asked) if gains not in self.known]
+        candidates = [self.gains(column) for column in logs.T.tolist()]
+        new = [gains for gains in dict.fromkeys(candidates) if gains not in self.objectives]
         left = self.budget - len(self.evaluations)
         evaluated = self.evaluate(new[:left], [_cheap(case) for case in self.cases])
         self.evaluations += evaluated
-        self.known |= {one.gains: one.objective for one in evaluated}
+        self.objectives |= {one.gains: one.objective for one in evaluated}
         self.report(len(evaluated))
         if len(new) >= left:
             raise _Spent
-        return np.array([self.known[gains] for gains in asked])
+        return np.array([self.objectives[gains] for gains in candidates])
 
     def gains(self, logs: Sequence[float]) -> tuple[float, ...]:
         """Return the gains of a candidate, none of them above what the actuator can give, see `search_space`."""
-        found = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
-        for name, most in search_space.largest(self.cases[0].law, found, self.u_max).items():
-            found[name] = min(found[name], _rounded(most))
-        return tuple(found.values())
+        gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
+        for name, most in search_space.largest(self.cases[0].law, gains, self.u_max).items():
+            gains[name] = min(gains[name], _rounded(most))
+        return tuple(gains.values())
 
     def decide(self, count: int) -> None:
         """Run the best of the first candidates accurately, as many as a stage has finalists."""
@@ -221,7 +221,7 @@ def _evolve(
     """Evolve the members until that many are evaluated; return a fresh population where it has collapsed."""
     from scipy.optimize import differential_evolution
 
-    found = differential_evolution(
+    result = differential_evolution(
         ledger.costs,
         [(low, high) for low, high in np.log10(list(box.values()))],
         strategy="best1bin",
@@ -235,7 +235,7 @@ def _evolve(
         polish=False,
         callback=lambda intermediate_result: len(ledger.evaluations) >= until,
     )
-    return found.population if len(ledger.evaluations) >= until else _hypercube(box, random)
+    return result.population if len(ledger.evaluations) >= until else _hypercube(box, random)
 
 
 def _hypercube(box: search_space.Box, random: np.random.Generator) -> np.ndarray:

@@ -113,24 +113,21 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
     Raises:
       ScenarioError: a law or gain whose unit is not known, or nothing to tune.
     """
-    found = {}
+    bounds = {}
     for name in law.gains:
         if (its := unit(law, name)) is not None and not _gain(law, name).held:
             scale = its.of(plant_scales)
-            found[name] = (scale * 10**-DECADES, scale if its == FORCE else scale * 10**DECADES)
-    if not found:
+            bounds[name] = (scale * 10**-DECADES, scale if its == FORCE else scale * 10**DECADES)
+    if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
-    return found
+    return bounds
 
 
 def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     """Return the gains within 2 % of a bound, on the scale of logarithms: gain -> "lower" or "upper"."""
-    found = {}
-    for name, (low, high) in bounds.items():
-        place = math.log(gains[name] / low) / math.log(high / low)
-        if min(place, 1.0 - place) <= NEAR:
-            found[name] = "lower" if place < 0.5 else "upper"
-    return found
+    places = {name: math.log(gains[name] / low) / math.log(high / low) for name, (low, high) in bounds.items()}
+    near = {name: place for name, place in places.items() if min(place, 1.0 - place) <= NEAR}
+    return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
 
 
 def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:

@@ -75,10 +75,10 @@ def scenario(
         if name not in FIELDS:
             raise unknown("field of a Scenario", name, FIELDS)
     sets.paper_plant(plant)
-    found = sets.law(plant, law_name, "default" if law_name == "none" else gains)
+    law = sets.law(plant, law_name, "default" if law_name == "none" else gains)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
     conditioned = fields(condition, plant, duration)
-    return Scenario(**({"plant": plant, "law": found} | common | conditioned | dict(changes)))
+    return Scenario(**({"plant": plant, "law": law} | common | conditioned | dict(changes)))
 
 
 def comparison(

@@ -55,7 +55,7 @@ def claim(id: str, text: str, **fields: Any) -> Callable[[Callable[[Runs], Evide
 
     def enter(evidence: Callable[[Runs], Evidence]) -> Entry:
         measured, _, note = (inspect.getdoc(evidence) or "").partition("\n\n")
-        texts = {"measured": " ".join(measured.split()).rstrip("."), "note": " ".join(note.split())}
+        texts: dict[str, Any] = {"measured": " ".join(measured.split()).rstrip("."), "note": " ".join(note.split())}
         return Entry(id=id, text=text, evidence=evidence, **texts | fields)
 
     return enter

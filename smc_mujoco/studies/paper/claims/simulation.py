@@ -114,10 +114,10 @@ def largest_oscillation(runs: Runs) -> list[Check | Beside]:
     and by 0.5 % of |x0|.
     """
     others = larger_than(max(overshoot(runs, VAN_DER_POL, law) for law in LAWS if law != HOSMC), of=100.0)
-    found = {law: runs.score(VAN_DER_POL, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
+    over = {law: runs.score(VAN_DER_POL, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
     return [
-        *(check(f"{VAN_DER_POL}: overshoot of {law}, %", found[law], ">", others) for law in (HOSMC, CONDITIONED)),
-        Beside(f"{VAN_DER_POL}: overshoot of {UNCLAMPED}, %", found[UNCLAMPED]),
+        *(check(f"{VAN_DER_POL}: overshoot of {law}, %", over[law], ">", others) for law in (HOSMC, CONDITIONED)),
+        Beside(f"{VAN_DER_POL}: overshoot of {UNCLAMPED}, %", over[UNCLAMPED]),
     ]
 
 
