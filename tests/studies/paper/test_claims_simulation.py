@@ -421,6 +421,11 @@ def test_a_law_that_tolerates_no_delay_and_one_that_tolerates_all_end_the_search
     assert found == {("duffing", OURS): 0.0, ("duffing", CLASSICAL): DELAYS[-1]}
 
 
+def test_a_law_that_comes_to_rest_only_with_a_delay_tolerates_none():
+    late = Stub(lambda s: {"ultimate_bound": 0.0 if s.input_delay else 9.0})
+    assert searches.largest_delays(late, ["duffing"], [OURS]) == {("duffing", OURS): 0.0}
+
+
 def test_a_quick_search_ends_within_eight_periods_below():
     for periods in (13, 61, 333):
         (found,) = searches.largest_delays(

@@ -35,11 +35,13 @@ def largest_delays(
 ) -> dict[Pair, float]:
     """Return (plant, law) -> the largest delay tolerated, s: 0 if none is, the last of DELAYS if all are.
 
+    A law that does not come to rest without delay tolerates none.
+
     Args:
       within: of |x0|, below which the ultimate bound is to be.
     """
     apart, integrator = (COARSE, "implicitfast") if runs.quick else (1, "RK4")
-    levels = [periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart]
+    levels = [0, *(periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart)]
 
     def tolerated(tried: Sequence[tuple[Pair, float]]) -> list[bool]:
         scenarios = [
@@ -49,12 +51,12 @@ def largest_delays(
         return [s["ultimate_bound"] <= within * scale(c) for s, c in zip(scores, scenarios, strict=True)]
 
     searches = {
-        (plant, law): Search(levels=levels, resolution=lambda low: apart, rounded=round)
+        (plant, law): Search(levels=levels, resolution=lambda low: apart, rounded=round, low=-1)
         for plant in plants
         for law in laws
     }
     find_boundaries(searches, tolerated)
-    return {pair: search.low * CONTROL_PERIOD for pair, search in searches.items()}
+    return {pair: max(search.low, 0) * CONTROL_PERIOD for pair, search in searches.items()}
 
 
 def critical_delay(runs: Runs, plant: str) -> float:
