@@ -43,14 +43,14 @@ def tune(
     Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
     with held_back():
-        from smc_mujoco.analysis.tuning import result, search
+        from smc_mujoco.analysis.tuning import search
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import writable
+        from smc_mujoco.common.files import ended, writable
 
     for file in (out, front):
         if file:
             writable(file)
-    path, terminal = out and result.checked(out), Terminal()
+    path, terminal = out and ended(out, ".json"), Terminal()
     tuned = search.tune(
         options.plant(plant),
         law,
