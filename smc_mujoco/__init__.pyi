@@ -50,8 +50,6 @@ from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.initial_states import starts as starts
 from smc_mujoco.simulation.perturbations import Jump as Jump
 from smc_mujoco.simulation.perturbations import Noise as Noise
-from smc_mujoco.simulation.references import MinimumJerk as MinimumJerk
-from smc_mujoco.simulation.references import Ramp as Ramp
 from smc_mujoco.simulation.run import PlainLoopWarning as PlainLoopWarning
 from smc_mujoco.simulation.run import run as run
 from smc_mujoco.simulation.run import stream as stream
@@ -60,8 +58,10 @@ from smc_mujoco.simulation.signals import BandLimited as BandLimited
 from smc_mujoco.simulation.signals import Constant as Constant
 from smc_mujoco.simulation.signals import Gust as Gust
 from smc_mujoco.simulation.signals import Impulse as Impulse
+from smc_mujoco.simulation.signals import MinimumJerk as MinimumJerk
 from smc_mujoco.simulation.signals import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from smc_mujoco.simulation.signals import Pulse as Pulse
+from smc_mujoco.simulation.signals import Ramp as Ramp
 from smc_mujoco.simulation.signals import Signal as Signal
 from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step

@@ -41,7 +41,7 @@ class NotCompilable(Exception):
 
 
 def _at(kind: types.Type) -> Callable:
-    """Return a compiled function that takes an address for a pointer or record of this type."""
+    """Return a compiled function that takes an address for a pointer of this type."""
 
     @intrinsic
     def at(typingctx, address):
@@ -58,8 +58,18 @@ integers = _at(types.CPointer(types.int64))  # an address as a pointer to int64
 
 
 def record_at(dtype: Any) -> Callable:
-    """Return a compiled function that takes an address for a NumPy record of this dtype."""
-    return _at(from_dtype(dtype))
+    """Return a compiled function (address, i) -> record i of the NumPy array of this dtype at an address."""
+    record = from_dtype(dtype)
+
+    @intrinsic
+    def at(typingctx, address, i):
+        def codegen(context, builder, signature, args):
+            place = builder.add(args[0], builder.mul(args[1], ir.Constant(args[1].type, dtype.itemsize)))
+            return builder.inttoptr(place, context.get_value_type(record))
+
+        return record(types.intp, types.intp), codegen
+
+    return at
 
 
 def _calling(bits: int) -> Callable:

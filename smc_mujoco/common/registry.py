@@ -24,7 +24,8 @@ FORMER_PLACES = {
     "smc_mujoco.surfaces": "smc_mujoco.control.surfaces",
     "smc_mujoco.estimators": "smc_mujoco.control.estimators",
     "smc_mujoco.signals": "smc_mujoco.simulation.signals",
-    "smc_mujoco.references": "smc_mujoco.simulation.references",
+    "smc_mujoco.references": "smc_mujoco.simulation.signals",
+    "smc_mujoco.simulation.references": "smc_mujoco.simulation.signals",
     "smc_mujoco.series": "smc_mujoco.simulation.time_series",
 }
 

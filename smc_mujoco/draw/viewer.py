@@ -134,6 +134,7 @@ class Live:
         if gains != dict(self.law.gains):
             law = dataclasses.replace(self.law, gains=gains)
             self.loop.scenario, self.unchanged = dataclasses.replace(self.loop.scenario, law=law), 0
+            self.loop.law.bind(law)
         elif self.unchanged >= SETTLED and self.printed != self.law:
             self.printed = self.law
             self.say(as_code(self.law))

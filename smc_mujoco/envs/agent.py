@@ -21,7 +21,6 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.core import Episode
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.guarded import Failure
 
 
 def agent(
@@ -69,15 +68,16 @@ class Agent:
         """Return the action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
         loop, k, n = self.loop, self.episode.sample, self.loop.scenario.plant.n
         if k == 0:  # the last commands are part of the nominal model of coupled channels
-            for memory in (*loop.memory, *loop.surface_memory, *loop.estimator_memory, loop.latest):
-                memory[:] = 0.0
+            for component in filter(None, (loop.law, loop.surface, loop.estimator)):
+                component.memory[:] = 0.0
+            loop.latest[:] = 0.0
         x, v = _positions_and_velocities(observation, n)
         loop.data.sensordata[loop.channels["x_sensor"]] = x
         loop.data.sensordata[loop.channels["v_sensor"]] = v
         try:
             with np.errstate(all="ignore"):
                 u, loop.s = loop.decide(*loop.measure(loop.data, k), k)
-        except Failure as failure:
+        except reference.Failure as failure:
             raise ScenarioError(f"{failure}, at t = {k * loop.scenario.control_period:.6g} s") from failure
         return u[: loop.scenario.plant.driven] / loop.scenario.limits
 

@@ -23,7 +23,7 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
-from smc_mujoco.simulation.guarded import Failure, signalled
+from smc_mujoco.simulation.reference import Failure, evaluate
 from smc_mujoco.simulation.scenario import Scenario
 
 FIELDS = (  # of a Scenario, that an environment accepts
@@ -235,7 +235,7 @@ def _references(scenario: Scenario, samples: int) -> np.ndarray:
     """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
     times = np.arange(samples) * scenario.control_period
     try:
-        references = np.array([signalled(scenario.reference, float(t)) for t in times])
+        references = np.array([evaluate(scenario.reference, float(t)) for t in times])
     except Failure as failure:
         raise ScenarioError(f"reference {failure}: give another") from None
     if not (finite := np.isfinite(references).all(axis=1)).all():

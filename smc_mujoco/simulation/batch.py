@@ -5,13 +5,16 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.plant import array
+from smc_mujoco.mechanisms.plant import Values, array
 from smc_mujoco.simulation import callback, controller, reference, state
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
-from smc_mujoco.simulation.guarded import retold
-from smc_mujoco.simulation.prepare import Prepared, pack
+from smc_mujoco.simulation.prepare import Packed, Prepared, pack
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace, from_log
 
 # isort: split
@@ -143,10 +146,10 @@ class Chunk:
         """What went wrong in simulation i."""
         scenario = self.scenarios[i]
         if state.NOT_FINITE <= failure < state.INTERRUPTED:
-            if told := retold(scenario, self.records[i], self.packed[i]):
-                return told
-            if told := reference.run(scenario).failure:
-                return told.rpartition(", at t = ")[0]
+            if reason := call_again(scenario, self.records[i], self.packed[i]):
+                return reason
+            if failure_in_python := reference.run(scenario).failure:
+                return failure_in_python.rpartition(", at t = ")[0]
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
         return {
             state.DIVERGED: self.errors.get(i, reference.LEFT_THE_WORLD),
@@ -160,3 +163,47 @@ class Chunk:
             state.INTERRUPTED: reference.INTERRUPTED,
             state.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[failure]
+
+
+def call_again(s: Scenario, record: np.ndarray, packed: Packed) -> str | None:
+    """Return why a simulation failed, in the words of Python, which compiled functions lack.
+
+    The function that failed is called once more, in Python, with what its record still holds, so the words depend on
+    nothing but the run. Return None if it does not fail again, because it had already changed its memory.
+    """
+    n = s.plant.n
+    joints = state.view(packed.numbers, int(record["joints"]), (2 + 4 * n,))
+    i, t = int(joints[0]), float(record["instant"]["t"])
+
+    def memory(function: np.ndarray, size: int) -> np.ndarray:
+        return state.view(packed.numbers, int(function["memory"]), (n, size)).copy()
+
+    def call(c: Component, y: tuple) -> None:
+        function = reference.PythonComponent(c, n)
+        function.memory = memory(record[c.kind], c.memory)
+        function(i, y)
+
+    try:
+        match int(record["failure"]):
+            case state.ESTIMATOR_RAISED:
+                call(s.velocity, Reading(*record["reading"].tolist()))
+            case state.SURFACE_RAISED if s.surface is not None:
+                call(s.surface, Measurement(*record["y"].tolist()))
+            case state.LAW_RAISED | state.NOT_FINITE as failure:
+                call(s.law, Measurement(*record["y"].tolist()))
+                if failure == state.NOT_FINITE:
+                    u, sliding = record["control"].tolist()
+                    return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
+            case state.REFERENCE_RAISED:
+                reference.evaluate(s.reference, t)
+            case state.NOMINAL_RAISED:
+                x, v, _, u = joints[2:].reshape(4, n).copy()
+                reference.nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)
+            case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
+                for j, signal in enumerate(s.disturbance):
+                    memories = memory(packed.signals[j]["function"], signal.memory)
+                    for channel in range(n if signal.random else 1):
+                        reference.evaluate(signal, t, memories[channel], s.seed, channel, s.stream(j))
+    except reference.Failure as failure:
+        return str(failure)
+    return None

@@ -3,8 +3,8 @@
     with installed():
         batch.step(nstep=1000)
 
-The callback is global to the process: `installed` holds a lock, and puts back what was there before. The callback does
-nothing in simulations of others: it knows ours by the magic number in their userdata.
+The callback is global to the process, so `installed` holds a lock, and puts back what was there before. In simulations
+of others the callback does nothing. It recognises ours by the magic number in their userdata.
 """
 
 # pyright: reportCallIssue=false
@@ -25,7 +25,7 @@ from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.state import simulation_at
 
-with mjcb.installed(None):  # this import compiles a model: here, before it would have to wait for a run of ours
+with mjcb.installed(None):  # this import compiles a model, so do it before it would have to wait for a run of ours
     import mujoco.batch
 
 USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simulation's record
@@ -44,40 +44,39 @@ def magic() -> float:
 
 @functools.cache
 def callback():
-    """The compiled callback void(const mjModel*, mjData*), from numba's cache on disk where there is one."""
+    """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it is there."""
     at, ours = offsets.offsets(), magic()
-    nuserdata, userdata = at.nuserdata, at.userdata
-    qpos, qvel, ctrl, xfrc, qfrc = at.qpos, at.qvel, at.ctrl, at.xfrc_applied, at.qfrc_applied
-    sensors, xipos, xanchor = at.sensordata, at.xipos, at.xanchor
-    actuators, constraints = at.actuator_force, at.qfrc_constraint
 
     def control(model, data):
-        if integers(model + nuserdata)[0] < USERDATA:
+        if integers(model + at.nuserdata)[0] < USERDATA:
             return
-        ours_or_not = pointer(integers(data + userdata)[0])
-        if ours_or_not[0] != ours:
+        userdata = pointer(integers(data + at.userdata)[0])
+        if userdata[0] != ours:
             return
-        address = int(ours_or_not[1])
+        address = int(userdata[1])
         arrays = Arrays(
-            pointer(integers(data + qpos)[0]),
-            pointer(integers(data + qvel)[0]),
-            pointer(integers(data + ctrl)[0]),
-            pointer(integers(data + xfrc)[0]),
-            pointer(integers(data + qfrc)[0]),
-            pointer(integers(data + sensors)[0]),
-            pointer(integers(data + xipos)[0]),
-            pointer(integers(data + xanchor)[0]),
-            pointer(integers(data + actuators)[0]),
-            pointer(integers(data + constraints)[0]),
+            pointer(integers(data + at.qpos)[0]),
+            pointer(integers(data + at.qvel)[0]),
+            pointer(integers(data + at.ctrl)[0]),
+            pointer(integers(data + at.xfrc_applied)[0]),
+            pointer(integers(data + at.qfrc_applied)[0]),
+            pointer(integers(data + at.sensordata)[0]),
+            pointer(integers(data + at.xipos)[0]),
+            pointer(integers(data + at.xanchor)[0]),
+            pointer(integers(data + at.actuator_force)[0]),
+            pointer(integers(data + at.qfrc_constraint)[0]),
         )
-        run_simulation(address, simulation_at(address), arrays)
+        run_simulation(address, simulation_at(address, 0), arrays)
 
     return compiled(types.void(types.intp, types.intp), control, cache=True)
 
 
 @functools.cache
 def silence():
-    """A C function that prints nothing: MuJoCo's warnings name no run, and the controller marks each that diverges."""
+    """Return a C function that prints nothing.
+
+    MuJoCo's warnings do not say which run they are about. The controller marks each run that diverges.
+    """
 
     def silent(message):
         return
@@ -87,7 +86,7 @@ def silence():
 
 @contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
-    """Install our control callback, or another, for the length of a with block; other threads wait."""
+    """Install our control callback, or another one, for the length of a with block. Other threads wait."""
     with mjcb.installed(None):
         function, silent = callback().ctypes if control is None else control, silence().ctypes
         before = mujoco.get_mju_user_warning()

@@ -23,8 +23,7 @@ CHANNEL = np.dtype(
         )
     ]
 )  # fmt: skip
-CHANNEL_SIZE = CHANNEL.itemsize
-channel_at = record_at(CHANNEL)  # how compiled code reads one
+channel_at = record_at(CHANNEL)  # how compiled code reads channel i of an array at an address
 
 _SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
 # Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis.

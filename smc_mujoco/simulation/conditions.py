@@ -3,14 +3,14 @@
     worn = smc.condition("worn gear", friction=smc.Coulomb(0.05), actuator=smc.Backlash(0.02))
     smc.grid(["duffing"], ["classical"], ["nominal", worn, "noise + delay_10ms"], seeds=16)
 
-The suite's own have names, such as "noise"; `NAMED` has them. Those joined by "+" hold at once. As text a condition is
-its name, a colon and its fields, written as in Python; that is parsed and never evaluated:
+The conditions of the suite have names, such as "noise", and stand in `NAMED`. Names joined by "+" hold at once. As
+text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed and never evaluated:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
-The suite's levels are those of a machine of the study's size. 0.1 N m or N of friction is u_max / 60, the gap a worn
-gear's, the lag a hydraulic valve's, the counts, per revolution or metre, an inexpensive encoder's; the pulse of
-"contact", as strong as u_max, throws what can be thrown.
+The levels of the suite are those of a machine of the study's size. The friction of 0.1 N m or N is u_max / 60, the gap
+is that of a worn gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
+inexpensive encoder. The pulse of "contact" is as strong as u_max, so that it moves whatever can move.
 """
 
 import ast
@@ -18,7 +18,7 @@ import contextlib
 import dataclasses
 import inspect
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,19 +43,19 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
+Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
-# What is of the plant, the law or the run, and of no condition.
-OTHERS = ("plant", "law", "model", "surface", "seed", "duration")
+OTHERS = ("plant", "law", "model", "surface", "seed", "duration")  # fields that belong to no condition
 FIELDS = [f.name for f in dataclasses.fields(Scenario) if f.init and f.name not in OTHERS]
-SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up where conditions are joined
-BASES = (Part, Friction, Actuator, Drive, Signal, Recorded)  # of which there are none
+SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up when conditions are joined
+ABSTRACT = (Part, Friction, Actuator, Drive, Signal, Recorded)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
-# Plant -> parameter -> factor, at half time, with the sine disturbance: a mild and a hard one. Plants say them.
+# Plant -> parameter -> factor, of the jump at half time in "jump_mild" and "jump_hard".
 JUMP_MILD, JUMP_HARD = (
     {name: dict(plant.jumps[size]) for name, plant in plants().items() if size in plant.jumps}
     for size in ("mild", "hard")
@@ -67,50 +67,52 @@ class Condition:
     """A named condition; see `condition`.
 
     Attributes:
-      name: what tables and figures call it.
-      fields: Scenario field -> value, or a function of the plant and the duration, s, that gives them.
+      name: its name in tables and figures.
+      fields: Scenario field -> value, or a function of the plant and the duration, s, that returns such a mapping.
     """
 
     name: str
-    fields: Fields | Callable[[Plant, float], Fields]
+    fields: Recipe
 
     def __post_init__(self):
         if not callable(self.fields):
             object.__setattr__(self, "fields", frozen({name: _frozen(value) for name, value in self.fields.items()}))
 
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
-        """The Scenario fields on a plant, in runs of that duration; what happens once does so at half time.
+        """Return the Scenario fields on a plant, in runs of this duration, s. Single events happen at half time.
 
         Raises:
-          ScenarioError: a condition that has no numbers for the plant.
+          ScenarioError: the condition has no numbers for the plant.
         """
         return dict(self.fields(plant, duration) if callable(self.fields) else self.fields)
 
     def __add__(self, other: "Condition | str") -> "Condition":
-        """Both at once. Disturbances, frictions and actuators add up; of any other field only one may say something."""
+        """Return both at once. Disturbances, frictions and actuators add up; only one may set any other field."""
         both = self, find_condition(other)
         return Condition(" + ".join(one.name for one in both), lambda plant, duration: _joined(both, plant, duration))
 
     def __str__(self) -> str:
-        """The text that `parsed` reads; the name alone of one of the suite's."""
+        """Return the text that `parse` reads, or the name alone for a condition of the suite."""
         if self.name in NAMED or callable(self.fields):
             return self.name
         try:
-            texts = {name: _text(value) for name, value in self.fields.items()}
-        except Exception:  # of a user's value, whose repr fails or nests too deep; no scenario takes it either
-            texts = {name: shown(value) for name, value in self.fields.items()}
-        return f"{self.name}: " + ", ".join(f"{name}={text}" for name, text in texts.items())
+            texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
+        except Exception:  # from the repr of a user's value, which no scenario takes either
+            texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
+        return f"{self.name}: {', '.join(texts)}"
 
 
 def condition(name: str, **fields: Any) -> Condition:
-    """A condition of your own, for `grid`, `tune`, `margins` and `basin`.
+    """Return a condition of your own, for `grid`, `tune`, `margins` and `basin`.
 
     Args:
-      name: what tables and figures call it; not one of the suite's names.
-      fields: of a Scenario, such as friction=smc.Coulomb(0.05); all but plant, law, model, surface, seed and duration.
+      name: its name in tables and figures; not a name of the suite.
+      fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model, surface, seed and
+        duration.
 
     Raises:
-      ScenarioError: a name that is taken, a field that there is not or that is none of a condition, or no field at all.
+      ScenarioError: the name is one of the suite's, a field does not exist or belongs to no condition, or there is no
+        field at all.
     """
     if errors.name("a condition's name", name) in NAMED or set(":+,") & set(name):
         raise ScenarioError(f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give another")
@@ -125,26 +127,26 @@ def condition(name: str, **fields: Any) -> Condition:
 
 
 def find_condition(value: Condition | str) -> Condition:
-    """A Condition, from one, a name, several names joined by "+", or a condition's text.
+    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a condition.
 
     Raises:
-      ScenarioError: none of these.
+      ScenarioError: the value is none of these.
     """
     if isinstance(value, Condition):
         return value
     if not isinstance(value, str):
         raise ScenarioError(f"condition is {shown(value)}: give a name, or smc.condition(...)")
     if ":" in value:
-        return parsed(value)
+        return parse(value)
     if set("=(") & set(value):
         raise ScenarioError(f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3")
-    found = [find("condition", part.strip(), NAMED) for part in value.split("+")]
-    return sum(found[1:], start=found[0])
+    first, *others = [find("condition", part.strip(), NAMED) for part in value.split("+")]
+    return sum(others, start=first)
 
 
-def suiting(names: Iterable[str], plants: Iterable[Plant], duration: float) -> list[str]:
-    """Of the suite's conditions of these names, those that have numbers for each plant."""
-    plants, found = list(plants), []
+def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -> list[str]:
+    """Return the names of conditions of the suite that have numbers for every plant."""
+    found = []
     for name in names:
         with contextlib.suppress(ScenarioError):
             for plant in plants:
@@ -153,14 +155,14 @@ def suiting(names: Iterable[str], plants: Iterable[Plant], duration: float) -> l
     return found
 
 
-def parsed(text: str) -> Condition:
-    """The condition that a text tells, such as "worn gear: friction=Coulomb(0.05)".
+def parse(text: str) -> Condition:
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)".
 
-    Values are numbers, texts, lists, dicts, and calls of the suite's parts, signals and estimators, or of a user's own
-    that are imported. Nothing is evaluated.
+    Values are numbers, texts, lists, dicts, and calls of parts, signals and estimators: those of the suite, and a
+    user's own that are imported. Nothing is evaluated.
 
     Raises:
-      ScenarioError: another text.
+      ScenarioError: the text cannot be read, or names something unknown.
     """
     name, _, fields = text.partition(":")
     try:
@@ -170,14 +172,14 @@ def parsed(text: str) -> Condition:
     if not isinstance(call, ast.Call) or call.args or any(word.arg is None for word in call.keywords):
         cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
         raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}")
-    return condition(name.strip(), **_named(call))
+    return condition(name.strip(), **_keywords(call))
 
 
 def from_file(path: Path) -> list[Condition]:
-    """The conditions of a text file, one a line; empty lines and those that begin with # say nothing.
+    """Return the conditions in a text file, one per line. Empty lines and lines that begin with # are skipped.
 
     Raises:
-      ScenarioError: a file or a line that cannot be read.
+      ScenarioError: the file or a line cannot be read.
     """
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
@@ -191,29 +193,30 @@ def from_file(path: Path) -> list[Condition]:
 
 
 def _value(node: ast.expr) -> Any:
-    """The value that a literal, or the call of a part, a signal or an estimator, stands for."""
-    if isinstance(node, ast.Constant):
-        return node.value
-    if isinstance(node, ast.Name) and node.id in CONSTANTS:
-        return CONSTANTS[node.id]
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        return -errors.number("a value", _value(node.operand), infinite=True)
-    if isinstance(node, ast.Tuple | ast.List):
-        return tuple(_value(item) for item in node.elts)
-    if isinstance(node, ast.Dict) and None not in node.keys:
-        return {_value(k): _value(v) for k, v in zip(node.keys, node.values, strict=True) if k is not None}
-    if isinstance(node, ast.Call):
-        return _called(node)
+    """Return the value of a literal, or of the call of a part, a signal or an estimator."""
+    match node:
+        case ast.Constant(value=value):
+            return value
+        case ast.Name(id=name) if name in CONSTANTS:
+            return CONSTANTS[name]
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -errors.number("a value", _value(operand), infinite=True)
+        case ast.Tuple(elts=items) | ast.List(elts=items):
+            return tuple(map(_value, items))
+        case ast.Dict(keys=keys, values=values) if None not in keys:
+            return {_value(key): _value(value) for key, value in zip(keys, values, strict=True) if key is not None}
+        case ast.Call():
+            return _call(node)
     raise ScenarioError(
         f"condition has {shown(ast.unparse(node))}: give numbers, texts and parts such as Coulomb(0.05)"
     )
 
 
-def _called(node: ast.Call) -> Any:
-    """A part, a signal or an estimator with its numbers."""
+def _call(node: ast.Call) -> Any:
+    """Return the part, signal or estimator that a call makes."""
     name = ast.unparse(node.func).removeprefix("smc.")
     kind = find("part, signal or estimator", name, _kinds() | estimators())
-    values, named = [_value(value) for value in node.args], _named(node)
+    values, named = map(_value, node.args), _keywords(node)
     try:
         return kind(*values, **named)
     except TypeError:
@@ -222,8 +225,8 @@ def _called(node: ast.Call) -> Any:
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 
 
-def _named(node: ast.Call) -> dict[str, Any]:
-    """The named values of a call, each of them given once."""
+def _keywords(node: ast.Call) -> dict[str, Any]:
+    """Return keyword -> value of a call, and refuse a keyword that stands twice."""
     found: dict[str, Any] = {}
     for word in node.keywords:
         if str(word.arg) in found:
@@ -233,52 +236,53 @@ def _named(node: ast.Call) -> dict[str, Any]:
 
 
 def _kinds() -> dict[str, Any]:
-    """Name -> class, of parts and signals, a user's own included; the suite's own go first where names are the same."""
-    found: list[type] = [Noise, Jump]
-    bases: list[type] = [Part, Signal]
-    for base in bases:
-        bases += base.__subclasses__()
-    found += [kind for kind in bases if kind not in BASES]
-    found.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
-    return {kind.__name__: kind for kind in found}
+    """Return name -> class of all parts and signals, users' own included. Of equal names the suite's class counts."""
+    kinds: list[type] = [Part, Signal]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+    kinds = [Noise, Jump, *(kind for kind in kinds if kind not in ABSTRACT)]
+    kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
+    return {kind.__name__: kind for kind in kinds}
 
 
 def _text(value: Any) -> str:
-    """A value as `parsed` reads it."""
+    """Return a value as `parse` reads it."""
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
     if isinstance(value, Part | Signal | Noise | Jump):
-        shown_fields = (f for f in dataclasses.fields(value) if f.init)
-        return f"{type(value).__name__}({', '.join(f'{f.name}={_text(getattr(value, f.name))}' for f in shown_fields)})"
+        texts = [f"{f.name}={_text(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init]
+        return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(map(_text, value))},)"
     return repr(value)
 
 
 def _frozen(value: Any) -> Any:
-    """A field's value that cannot change."""
+    """Return a field's value as something that cannot change."""
     if isinstance(value, Mapping):
         return frozen(value)
     value = value.tolist() if isinstance(value, np.ndarray) else value
     return tuple(value) if isinstance(value, list) else value
 
 
-def _joined(both: Iterable[Condition], plant: Plant, duration: float) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for one in both:
-        for field, value in one.on(plant, duration).items():
-            if field in found and field in SEVERAL:
-                found[field] = (*_several(found[field]), *_several(value))
-            elif field in found and not _same(found[field], value):
-                names = " and ".join(repr(c.name) for c in both)
-                raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
-            else:
-                found[field] = value
-    return found
+def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
+    """Return the fields of two conditions at once.
+
+    Raises:
+      ScenarioError: both set a field, to different values, that does not add up.
+    """
+    first, second = (one.on(plant, duration) for one in both)
+    for field in [field for field in second if field in first]:
+        if field in SEVERAL:
+            second[field] = *_several(first[field]), *_several(second[field])
+        elif not _equal(first[field], second[field]):
+            names = " and ".join(repr(one.name) for one in both)
+            raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
+    return first | second
 
 
-def _same(one: Any, other: Any) -> bool:
-    """Whether two values are equal; those that do not compare, such as arrays, are not."""
+def _equal(one: Any, other: Any) -> bool:
+    """Return whether two values are equal; no, if comparing them fails, as with arrays."""
     try:
         return bool(one == other)
     except Exception:
@@ -289,7 +293,9 @@ def _several(value: Any) -> tuple:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _jump(size: str) -> Callable[[Plant, float], Fields]:
+def _jump(size: str) -> Recipe:
+    """Return a jump of parameters at half time, with the sine disturbance; `size` is "mild" or "hard"."""
+
     def fields(plant: Plant, duration: float) -> Fields:
         if size not in plant.jumps:
             known = [name for name, one in plants().items() if size in one.jumps]
@@ -301,14 +307,13 @@ def _jump(size: str) -> Callable[[Plant, float], Fields]:
 
 
 def _contact(plant: Plant, duration: float) -> Fields:
-    """A blow against what a plant may touch: its neighbours, or stops."""
-    kinds = {kind: kind for kind in ("bobs", "stops") if kind in plant.contacts}
-    if not kinds:
-        raise ScenarioError(f"condition 'contact' asks for stops, and plant {plant.name!r} has none: choose another")
-    return {"contact": next(iter(kinds)), "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
+    """Return a blow against the obstacles of a plant: its neighbours, or stops."""
+    if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
+        return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
+    raise ScenarioError(f"condition 'contact' asks for stops, and plant {plant.name!r} has none: choose another")
 
 
-IDEAL: dict[str, Fields | Callable[[Plant, float], Fields]] = {
+IDEAL: dict[str, Recipe] = {
     "nominal": {},
     "noise": {"noise": SENSOR_NOISE},
     "sine": {"disturbance": SINE},
@@ -325,7 +330,7 @@ IDEAL: dict[str, Fields | Callable[[Plant, float], Fields]] = {
     "differenced_5ms": {"velocity": DIFFERENCED},
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
 }
-REAL: dict[str, Fields | Callable[[Plant, float], Fields]] = {
+REAL: dict[str, Recipe] = {
     "coulomb": {"friction": Coulomb(0.1)},
     "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)},
     "lag_20ms": {"actuator": Lag(0.02)},

@@ -1,14 +1,16 @@
-"""The controller: what the control callback does in one simulation, as its record says.
+"""The controller: what the control callback does in one simulation, according to its record.
 
-At the first stage of a control sample, per channel:
+At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-and at every stage: the command whose delay has passed -> ctrl, of two drives in series through the first; and
-disturbance(t) -> xfrc_applied. The forces that acted since the sample before, on average, are logged with each. Time
-counts in calls: RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again,
-so the clock alone cannot tell a sample from a last stage. A run that leaves the finite world, or whose law raises, is
-marked in its record and gets no more control; the simulations beside it go on.
+At the first stage of a physics step, the command whose delay has passed goes to ctrl, through the first of two drives
+in series. At every stage, disturbance(t) goes to xfrc_applied. Each sample is logged with the mean forces since the
+last one.
+
+Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
+again, so the clock cannot distinguish a sample from a last stage. A run that leaves the finite world, or whose law
+raises an exception, is marked in its record and gets no more control. The simulations beside it go on.
 """
 
 # pyright: reportCallIssue=false
@@ -21,12 +23,12 @@ from numba import njit
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.channels import CHANNEL_SIZE, channel_at
-from smc_mujoco.simulation.state import LOG_SIZE, SIGNAL_SIZE, STATE_SIZE, log_at, signal_at, state_at
+from smc_mujoco.simulation.channels import channel_at
+from smc_mujoco.simulation.state import log_at, signal_at, state_at
 
-MAX_STATE = 1e6  # |x| or |v| beyond this many SI units has diverged; MuJoCo itself gives up at 1e10
-LAST_STAGE = 1.0 - 1e-8  # of a step: RK4's last stage looks at its end from the left, before a jump that happens there
-MAX_CONTROL = 1e10  # MuJoCo drops every control where one is larger
+MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
+LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
+MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
 class Arrays(NamedTuple):
@@ -46,7 +48,7 @@ class Arrays(NamedTuple):
 
 @njit(error_model="numpy")
 def control(at, sim, data):
-    """One callback of one simulation.
+    """Do one callback of one simulation.
 
     Args:
       at: the address of its record.
@@ -84,7 +86,7 @@ def control(at, sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _escaped(sim, data):
-    """Whether the mechanism has left the finite world."""
+    """Return whether the mechanism has left the finite world."""
     for i in range(sim.nq):
         if not abs(data.qpos[i]) < MAX_STATE:
             return True
@@ -95,8 +97,14 @@ def _escaped(sim, data):
 
 
 @njit(error_model="numpy", inline="always")
+def _call(function, i, inputs, outputs):
+    """Call a function for channel i, with addresses of what it gets and gives. Return 0, or 1 if it raised."""
+    return call(function.address, inputs, function.parameters, function.memory + i * function.stride, outputs)
+
+
+@njit(error_model="numpy", inline="always")
 def _read(sim, state, i, x, v, j, hinge):
-    """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
+    """Return reading j of channel i: position and velocity after noise, bias, rounding and loss."""
     if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
         z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
         x, v = x + sim.sigma_x * z[0], v + sim.sigma_v * z[1]
@@ -114,55 +122,52 @@ def _read(sim, state, i, x, v, j, hinge):
 
 @njit(error_model="numpy")
 def _measure(at, sim, data, k):
-    """Measured position, estimated velocity and acceleration of every channel at sample k; a failure code."""
+    """Measure position, and estimate velocity and acceleration, of every channel at sample k. Return a failure code."""
     j, x, v, a = k, pointer(sim.x), pointer(sim.v), pointer(sim.a)
     if sim.read_period != 0.0:
         j = max(0, math.floor((k * sim.period - sim.read_delay) / sim.read_period + 1e-6))
-    reading, estimate, estimator = sim.reading, sim.estimate, sim.estimator
+    reading, estimate = sim.reading, sim.estimate
     reading.dt = sim.period
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
+        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         position, velocity = data.sensordata[channel.x_sensor], data.sensordata[channel.v_sensor]
         reading.x, reading.v = _read(sim, state, i, position, velocity, j, channel.tip >= 0)
         pointer(sim.joints)[0] = i
-        memory = estimator.memory + i * estimator.stride
-        if call(estimator.address, at + record.READING_AT, estimator.parameters, memory, at + record.ESTIMATE_AT) != 0:
+        if _call(sim.estimator, i, at + record.READING_AT, at + record.ESTIMATE_AT) != 0:
             return record.ESTIMATOR_RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
     return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _ask_model(at, sim, i):
-    """Nominal f and g of channel i, into the record; not 0 where the model raised."""
+def _evaluate_model(at, sim, i):
+    """Write nominal f and g of channel i into the record. Return 0, or 1 if the model raised."""
     pointer(sim.joints)[0] = i
-    return call(sim.nominal.address, sim.joints, sim.nominal.parameters, 0, at + record.MODEL_AT)
+    return _call(sim.nominal, 0, sim.joints, at + record.MODEL_AT)
 
 
 @njit(error_model="numpy", inline="always")
 def _inform(at, sim, y, i, partner):
-    """What the law of channel i is told, into y; a failure code.
+    """Write into y what the law of channel i reads. Return a failure code.
 
-    Channel `partner` moves with it and has no actuator; 0 for none.
+    Channel `partner` moves with channel i and has no actuator; 0 for none.
     """
     x, v, a = pointer(sim.x), pointer(sim.v), pointer(sim.a)
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     if partner > 0:
-        if _ask_model(at, sim, partner) != 0:
+        if _evaluate_model(at, sim, partner) != 0:
             return record.NOMINAL_RAISED
         y.q, y.dq, y.fq, y.gq = x[partner], v[partner], sim.model.f, sim.model.g
-    if _ask_model(at, sim, i) != 0:
+    if _evaluate_model(at, sim, i) != 0:
         return record.NOMINAL_RAISED
     y.f, y.g = sim.model.f, sim.model.g
     y.x, y.v = x[i], v[i]
     y.e, y.de = y.x - y.r, y.v - y.dr
-    y.a = y.ddr if math.isnan(a[i]) else a[i]  # none is estimated: as the reference asks
+    y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
     y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
     y.surfaced, y.s, y.eq = 0.0, 0.0, 0.0
-    surface = sim.surface
-    if surface.address != 0:
-        memory = surface.memory + i * surface.stride
-        if call(surface.address, at + record.Y, surface.parameters, memory, at + record.SLIDING_AT) != 0:
+    if sim.surface.address != 0:
+        if _call(sim.surface, i, at + record.MEASUREMENT_AT, at + record.SLIDING_AT) != 0:
             return record.SURFACE_RAISED
         y.surfaced, y.s, y.eq = 1.0, sim.sliding.s, sim.sliding.v_eq
     return record.FINE
@@ -170,28 +175,27 @@ def _inform(at, sim, y, i, partner):
 
 @njit(error_model="numpy")
 def _decide(at, sim, k):
-    """The law of every driven channel at sample k: its command into the delay buffer, u, s and r into the log.
+    """Run the law of every driven channel at sample k. Return a failure code.
 
-    A failure code.
+    The command goes into the delay buffer, and u, s and r into the log.
     """
-    y, instant, asked, law = sim.y, sim.instant, sim.control, sim.law
-    instant.t = k * sim.period
-    reference = sim.reference
-    if call(reference.address, at + record.INSTANT_AT, reference.parameters, 0, at + record.MOTION_AT) != 0:
+    y, asked = sim.y, sim.control
+    sim.instant.t = k * sim.period
+    if _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
         return record.REFERENCE_RAISED
-    y.t, y.dt = instant.t, sim.period
+    y.t, y.dt = sim.instant.t, sim.period
     y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
     n, driven, last = sim.n, sim.driven, pointer(sim.u)
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     for i in range(n):
-        sample = log_at(sim.log + (k * n + i) * LOG_SIZE)
+        sample = log_at(sim.log, k * n + i)
         if i >= driven:  # only measured
             buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
             continue
         failure = _inform(at, sim, y, i, i + driven if i + driven < n else 0)
         if failure != record.FINE:
             return failure
-        if call(law.address, at + record.Y, law.parameters, law.memory + i * law.stride, at + record.CONTROL_AT) != 0:
+        if _call(sim.law, i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT) != 0:
             return record.LAW_RAISED
         limit = pointer(sim.limits)[i]
         u = min(max(asked.u, -limit), limit)
@@ -204,36 +208,36 @@ def _decide(at, sim, k):
 
 @njit(error_model="numpy", inline="always")
 def _actuate(sim, data, step):
-    """The command whose delay has passed at a physics step, where one arrives, to the actuators."""
+    """Give the command whose delay has passed at a physics step, if one arrives, to the actuators."""
     past = step - sim.delay
     if past >= 0 and past % sim.steps == 0:
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
-            state_at(sim.states + i * STATE_SIZE).arrived = buffer[i]
+            state_at(sim.states, i).arrived = buffer[i]
             if sim.tandem == 0 and i < sim.driven:
-                data.ctrl[channel_at(sim.channels + i * CHANNEL_SIZE).ctrl] = sim.scale * buffer[i]
+                data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
     if sim.tandem != 0:
         for i in range(sim.driven):
-            state = state_at(sim.states + i * STATE_SIZE)
+            state = state_at(sim.states, i)
             u, first = state.arrived, state.first
             asked = sim.scale * (u + sim.tandem_held * (first - u))
-            data.ctrl[channel_at(sim.channels + i * CHANNEL_SIZE).ctrl] = asked
+            data.ctrl[channel_at(sim.channels, i).ctrl] = asked
             state.first = u + sim.tandem_left * (first - u)
 
 
 @njit(error_model="numpy", inline="always")
 def _release(sim, data):
-    """Take commands and disturbances away."""
+    """Set all commands and disturbances to 0."""
     for i in range(sim.n):
-        channel = channel_at(sim.channels + i * CHANNEL_SIZE)
-        _calm(data, channel)
+        channel = channel_at(sim.channels, i)
+        _clear(data, channel)
         if channel.ctrl >= 0:
             data.ctrl[channel.ctrl] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
-def _calm(data, channel):
-    """Take a channel's disturbances away."""
+def _clear(data, channel):
+    """Set the disturbances of a channel to 0."""
     data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.push] = 0.0, 0.0
     if channel.direct >= 0:
         data.qfrc_applied[channel.direct] = 0.0
@@ -241,36 +245,31 @@ def _calm(data, channel):
 
 @njit(error_model="numpy")
 def _disturb(at, sim, data, t):
-    """The sum of the disturbances of every channel at time t, onto its body or, in models of users, its joint.
+    """Apply the disturbances at time t, s. Return a failure code.
 
-    A failure code.
+    Their sum acts on the body of each channel, in users' models on its joint.
     """
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
     for i in range(sim.n):
-        _calm(data, channel_at(sim.channels + i * CHANNEL_SIZE))
+        _clear(data, channel_at(sim.channels, i))
     for j in range(sim.signal_count):
-        signal = signal_at(sim.signals + j * SIGNAL_SIZE)
-        function = signal.function
+        signal = signal_at(sim.signals, j)
         instant.stream = signal.stream
         for i in range(sim.n):
-            channel = channel_at(sim.channels + i * CHANNEL_SIZE)
-            if signal.stream != 0.0 or i == 0:  # what is not random is the same in every channel
+            channel = channel_at(sim.channels, i)
+            if signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
                 instant.channel = i
-                memory = function.memory + i * function.stride
-                if (
-                    call(function.address, at + record.INSTANT_AT, function.parameters, memory, at + record.MOTION_AT)
-                    != 0
-                ):
+                if _call(signal.function, i, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
                     return record.DISTURBANCE_RAISED
             if signal.cartesian != 0:
                 data.xfrc_applied[channel.push] += motion.value
             elif channel.ctrl >= 0 and channel.direct >= 0:
                 data.qfrc_applied[channel.direct] += motion.value
-            elif channel.ctrl >= 0:  # matched: where an actuator could answer it
+            elif channel.ctrl >= 0:  # only where there is an actuator
                 data.xfrc_applied[channel.xfrc] += channel.sign * motion.value
     for i in range(sim.n):
-        channel = channel_at(sim.channels + i * CHANNEL_SIZE)
+        channel = channel_at(sim.channels, i)
         if not (math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.push])):
             return record.DISTURBANCE_NOT_FINITE
         if channel.direct >= 0 and not math.isfinite(data.qfrc_applied[channel.direct]):
@@ -280,7 +279,7 @@ def _disturb(at, sim, data, t):
 
 @njit(error_model="numpy", inline="always")
 def _disturbance(data, channel):
-    """The generalised force that disturbances exert on a channel."""
+    """Return the generalised force that disturbances exert on a channel."""
     if channel.direct >= 0:
         return data.qfrc_applied[channel.direct]
     d = channel.sign * data.xfrc_applied[channel.xfrc]
@@ -292,9 +291,9 @@ def _disturbance(data, channel):
 
 @njit(error_model="numpy", inline="always")
 def _sum_forces(sim, data):
-    """Add up what drives, and what friction and contacts, exerted on each joint in the last physics step."""
+    """Add the forces of the last physics step on each joint: of the drive, and of friction and contacts."""
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
+        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         if channel.force >= 0:
             state.force += data.actuator_force[channel.force]
         state.reaction += data.qfrc_constraint[channel.qvel]
@@ -304,10 +303,10 @@ def _sum_forces(sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _log(sim, data, k):
-    """Sample k of every channel into the log, but for u, s and r, which are there already."""
+    """Write sample k of every channel into the log, except u, s and r, which are there already."""
     for i in range(sim.n):
-        channel, state = channel_at(sim.channels + i * CHANNEL_SIZE), state_at(sim.states + i * STATE_SIZE)
-        sample = log_at(sim.log + (k * sim.n + i) * LOG_SIZE)
+        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        sample = log_at(sim.log, k * sim.n + i)
         sample.x, sample.v = data.qpos[channel.qpos], data.qvel[channel.qvel]
         if channel.ctrl < 0:
             sample.applied = 0.0

@@ -1,12 +1,13 @@
-"""Assembly: a scenario's plant and parts as one compiled model, and the fields that its numbers set in it.
+"""Assembly: a scenario's plant and parts as one compiled model, and the model fields that its numbers set.
 
-What scenarios must have in common to share a model is its `structure`; everything else about their mechanisms is a
-number in some field of the model, which a Batch holds for every simulation on its own.
+Scenarios of the same `structure` can share a model. Everything else about their mechanisms is a number in some field of
+the model, and a Batch keeps those fields separately for each simulation.
 """
 
 import copy
 import dataclasses
-from collections.abc import Hashable, Iterator, Sequence
+import itertools
+from collections.abc import Hashable, Sequence
 
 import mujoco
 import numpy as np
@@ -15,23 +16,25 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START, Part, joint_ids
-from smc_mujoco.mechanisms.plant import Field, array, ready
+from smc_mujoco.mechanisms.plant import array, ready
 from smc_mujoco.simulation.scenario import Scenario
 
-WAY = 400  # places on the way to a start that must be free: 1 cm apart on the longest rail
-INSIDE = 1e-3  # m: chosen, as a run that starts deeper than a contact gives way begins with a blow from nowhere
+PATH_POINTS = 400  # on the path to a start, which must be free: 1 cm apart on the longest rail
+MAX_OVERLAP = 1e-3  # m, at a start; chosen: contacts give way by less, so a deeper start begins with a blow
 
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
-    """The scenario's parts, in the order in which they are built in and their numbers written."""
+    """Return the scenario's parts, in the order in which they are built in and their numbers written."""
     contact = () if scenario.contact.kind == "none" else (scenario.contact,)
     sensor = () if scenario.sensor is None else (scenario.sensor,)
-    actuator = scenario.actuator if scenario.tandem is None else scenario.actuator[1:]  # the callback has the first
+    actuator = (
+        scenario.actuator if scenario.tandem is None else scenario.actuator[1:]
+    )  # the callback has the first
     return (*contact, *scenario.friction, *actuator, *sensor)
 
 
 def structure(scenario: Scenario) -> Hashable:
-    """Equal for scenarios whose mechanisms differ in numbers only."""
+    """Return a key that is equal for scenarios whose mechanisms differ only in numbers."""
     plant = scenario.plant
     built = tuple(part.structure() for part in parts(scenario))
     edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
@@ -39,7 +42,7 @@ def structure(scenario: Scenario) -> Hashable:
 
 
 def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
-    """The mechanism that scenarios of one structure share, as an editable MjSpec."""
+    """Return the mechanism that scenarios of one structure share, as an editable MjSpec."""
     first = scenarios[0]
     made = first.plant.spec()
     if first.mechanism != "equation":
@@ -52,7 +55,7 @@ def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
 
 
 def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
-    """The model that scenarios of one structure share, as it was compiled: without their numbers."""
+    """Return the compiled model that scenarios of one structure share, without their numbers."""
     made = ready(spec(scenarios), nuserdata)
     made.opt.timestep = scenarios[0].physics_step
     made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenarios[0].integrator.upper()}")
@@ -60,7 +63,7 @@ def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
 
 
 def numbered(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
-    """A copy of the compiled model with the scenario's numbers in it."""
+    """Return a copy of the compiled model with the scenario's numbers from a physics step on."""
     made = copy.copy(compiled)
     put_numbers(made, compiled, scenario, step)
     mujoco.mj_setConst(made, mujoco.MjData(made))
@@ -68,23 +71,29 @@ def numbered(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> muj
 
 
 def put_numbers(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> None:
-    """Write the scenario's numbers into a copy of the compiled model; mj_setConst is left to the caller."""
+    """Write the scenario's numbers into a copy of the compiled model. The caller calls mj_setConst."""
     for name, value in numbers(compiled, scenario, step).items():
         array(made, name)[:] = value
 
 
 def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Model field -> its values from a physics step on, of every field that the scenario's numbers set."""
-    found: dict[str, np.ndarray] = {}
-    for name, at, value, adds in fields(compiled, scenario, step):
-        held = found.setdefault(name, array(compiled, name).copy())
-        held[at] = held[at] + value if adds else value
+    """Return model field -> its values from a physics step on, for every field that the scenario's numbers set."""
+    plant, found = scenario.plant, {}
+    fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
+    of_parts = (part.fields(compiled) for part in parts(scenario))
+    for name, at, value, adds in itertools.chain(fields(compiled, plant.values(scenario.factors(step))), *of_parts):
+        values = found.setdefault(name, array(compiled, name).copy())
+        values[at] = values[at] + value if adds else value
     return found
 
 
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """qpos and qvel at t = 0: every channel at x0 and v0, its rotor with it, the rest where the model has it."""
-    qpos, qvel = home(compiled), np.zeros(compiled.nv)
+    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints where the model has them.
+
+    The model has them where its start keyframe says, or else at qpos0.
+    """
+    key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
+    qpos, qvel = (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy(), np.zeros(compiled.nv)
     for joint, x, v in zip(joint_ids(compiled), scenario.x0, scenario.v0, strict=True):
         rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):
@@ -92,27 +101,21 @@ def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.
     return qpos, qvel
 
 
-def home(compiled: mujoco.MjModel) -> np.ndarray:
-    """qpos where the model itself has every joint, or the keyframe in which runs start."""
-    key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
-    return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
-
-
 def check_starts(scenarios: Sequence[Scenario]) -> None:
-    """Whether scenarios of one structure start on the free side of their obstacles.
+    """Check that scenarios of one structure start on the free side of their obstacles.
 
-    The way there from the plant's own start, or from 0 where that is not free, must cross none: what begins beyond a
-    stop, or half-way through, would be no run of this mechanism.
+    The path from the plant's own start, or from 0 if that is not free, must cross no obstacle. A run that begins beyond
+    a stop, or half-way through it, is no run of this mechanism.
 
     Raises:
-      ScenarioError: one starts inside an obstacle or beyond it.
+      ScenarioError: a run starts inside an obstacle or beyond it.
     """
     if scenarios[0].contact.kind == "none":
         return
     scratch, seen = model(scenarios), set()
     compiled, data = copy.copy(scratch), mujoco.MjData(scratch)
     for scenario in scenarios:
-        place = scenario.plant, scenario.x0, frozen(scenario.factors(0))  # all on which it depends
+        place = scenario.plant, scenario.x0, frozen(scenario.factors(0))  # all that the check depends on
         if place not in seen:
             seen.add(place)
             put_numbers(scratch, compiled, scenario, 0)
@@ -120,14 +123,14 @@ def check_starts(scenarios: Sequence[Scenario]) -> None:
 
 
 def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
-    """Raise ScenarioError where a scenario starts inside an obstacle or beyond it."""
+    """Raise ScenarioError if a scenario starts inside an obstacle or beyond it."""
     there = start(made, scenario)[0]
     inside, beyond = _overlap(made, data, there), None
     if not inside and scenario.x0 != scenario.plant.x0:
         home = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
         home = made.qpos0 if _overlap(made, data, home) else home
-        way = (_overlap(made, data, (1.0 - part) * home + part * there) for part in np.linspace(0.0, 1.0, WAY))
-        beyond = next(filter(None, way), None)
+        path = (_overlap(made, data, (1 - part) * home + part * there) for part in np.linspace(0, 1, PATH_POINTS))
+        beyond = next(filter(None, path), None)
     if hit := inside or beyond:
         raise ScenarioError(
             f"x0 {shown(scenario.x0)} puts {scenario.plant.name}'s {hit[0]} {'inside' if inside else 'beyond'} "
@@ -136,21 +139,12 @@ def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -
 
 
 def _overlap(made: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
-    """The two geoms that overlap at qpos by more than INSIDE, if any do."""
+    """Return the names of two geoms that overlap at qpos by more than MAX_OVERLAP, or None."""
     data.qpos[:] = qpos
     mujoco.mj_kinematics(made, data)
     mujoco.mj_collision(made, data)
     for touching in data.contact:
-        if touching.dist < -INSIDE:
+        if touching.dist < -MAX_OVERLAP:
             first, second = (made.geom(int(geom)).name for geom in touching.geom)
             return first, second
     return None
-
-
-def fields(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> Iterator[Field]:
-    """What the plant's parameters and the parts' numbers write into the compiled model, in this order."""
-    plant = scenario.plant
-    by = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
-    yield from by(compiled, plant.values(scenario.factors(step)))
-    for part in parts(scenario):
-        yield from part.fields(compiled)

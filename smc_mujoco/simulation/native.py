@@ -1,17 +1,18 @@
-"""Pure Python functions compiled to C functions that the callback calls by address.
+"""Pure Python functions compiled to C functions, which the callback calls by address.
 
-Laws, estimators, signals and nominal models all become one C type,
+Laws, estimators, signals and nominal models all become functions of one C type:
 
     int64 f(const double *inputs, const double *parameters, double *memory, double *outputs)
 
-which returns 0, or 1 where the function raised. Array accesses are bounds-checked, also in compiled functions that a
-law calls: one that writes beyond its memory fails, it does not corrupt its neighbour. Functions of the math module do
-not raise in compiled code: outside their domain they return NaN, beyond the largest float inf; where that reaches u or
-s it ends the run.
+It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in compiled functions
+that a law calls, so a law that writes beyond its memory fails instead of corrupting its neighbour. Functions of the
+math module do not raise in compiled code. Outside their domain they return NaN, and inf beyond the largest float. If
+that reaches u or s, the run ends.
 """
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
+import contextlib
 import functools
 import math
 from collections.abc import Callable
@@ -27,55 +28,39 @@ from smc_mujoco.simulation.signals import Signal
 
 
 @functools.cache
-def law(function: Callable, gains: tuple[str, ...], memory: int) -> Function:
-    """(y, gains, memory) -> (u, s); of a surface (s, eq)."""
-    body, measurement, values = jit(function), loader(Measurement), loader(named(gains))
+def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
+    """Compile (y, gains, memory) -> two numbers; an estimator may return the velocity alone."""
+    body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
 
-    def native(y, g, m, out):
-        ok, result = attempt(body, (measurement(y), values(g), carray(pointer(m), (memory,))))
-        if ok:
-            u, s = result
-            output = carray(pointer(out), (2,))
-            output[0], output[1] = u, s
-        return not ok
+    def compiled(pair: bool) -> Function:
+        def native(y, g, m, out):
+            ok, result = attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))))
+            if ok:
+                output = carray(pointer(out), (2,))
+                if pair:
+                    first, second = result
+                    output[0], output[1] = first, second
+                else:
+                    output[0], output[1] = result, math.nan  # no acceleration
+            return not ok
 
-    return Function(native)
+        return Function(native)
 
-
-@functools.cache
-def estimator(function: Callable, gains: tuple[str, ...], memory: int) -> Function:
-    """(y, gains, memory) -> velocity, or velocity and acceleration."""
-    body, reading, values = jit(function), loader(Reading), loader(named(gains))
-
-    def one(y, g, m, out):
-        ok, result = attempt(body, (reading(y), values(g), carray(pointer(m), (memory,))))
-        if ok:
-            output = carray(pointer(out), (2,))
-            output[0], output[1] = result, math.nan  # no acceleration
-        return not ok
-
-    def two(y, g, m, out):
-        ok, result = attempt(body, (reading(y), values(g), carray(pointer(m), (memory,))))
-        if ok:
-            v, a = result
-            output = carray(pointer(out), (2,))
-            output[0], output[1] = v, a
-        return not ok
-
+    if kind != "estimator":
+        return compiled(pair=True)
     try:
-        return Function(one)
-    except NotCompilable as error:
-        try:
-            return Function(two)
-        except NotCompilable:
-            raise error from None
+        return compiled(pair=False)
+    except NotCompilable:
+        with contextlib.suppress(NotCompilable):
+            return compiled(pair=True)
+        raise
 
 
 @functools.cache
-def signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
-    """inputs: t, seed, channel, stream -> outputs: value, first and second derivative.
+def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
+    """Compile t, seed, channel, stream -> value, first and second derivative.
 
-    After the parameters of a series follow the address of its data and their count.
+    The parameters of a series are followed by the address and the number of its data.
     """
     body, values = jit(kind.value), loader(named(names))
     random, series, memory, behind = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
@@ -100,7 +85,7 @@ def signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
 @functools.cache
 def nominal(function: Callable, names: tuple[str, ...]) -> Function:
-    """inputs: i, n, x (n,), v (n,) -> outputs: f and g of channel i."""
+    """Compile i, n, x (n,), v (n,) -> f and g of channel i."""
     body, values = jit(function), loader(named(names))
 
     def native(y, p, m, out):
@@ -118,29 +103,29 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 def component(c: Component) -> Function | AtAddress:
-    """A law, a surface or an estimator, compiled; one that is in C already as it is.
+    """Return a law, a surface or an estimator as a C function: compiled, unless it is one already.
 
     Raises:
-      NotCompilable: with its name and the compiler's reason.
+      NotCompilable: with its name and the reason of the compiler.
     """
     if isinstance(c.function, AtAddress):
         return c.function
+    who = f"{c.kind} {c.name!r}"
     if isinstance(c.function, Uncompiled):
-        raise NotCompilable(f"{c.kind} {c.name!r} {c.function.why}")
-    compiler = {"law": law, "surface": law, "estimator": estimator}[c.kind]
-    return _named(f"{c.kind} {c.name!r}", compiler, c.function, tuple(c.gains), c.memory)
+        raise NotCompilable(f"{who} {c.function.why}")
+    return _named(who, _component, c.function, c.kind, tuple(c.gains), c.memory)
 
 
 def of_signal(s: Signal) -> Function:
-    """A signal, compiled; raises as `component`."""
-    return _named(type(s).__name__, signal, type(s), tuple(s.parameters()))
+    """Return a signal, compiled; raises as `component`."""
+    return _named(type(s).__name__, _signal, type(s), tuple(s.parameters()))
 
 
 def values_of(s: Signal) -> tuple[float, ...]:
-    """What the compiled signal reads at its parameters' address; good for as long as the signal itself lives.
+    """Return what a compiled signal reads at its parameters' address. Valid for as long as the signal lives.
 
     Raises:
-      ScenarioError: a series whose data are not (2, N) float64, C-contiguous.
+      ScenarioError: the data of a series are not (2, N) float64, C-contiguous.
     """
     values = tuple(s.parameters().values())
     if not s.series:
@@ -153,10 +138,11 @@ def values_of(s: Signal) -> tuple[float, ...]:
     return (*values, float(data.ctypes.data), float(data.shape[1]))
 
 
-def _named(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:
+def _named(who: str, compiler: Callable[..., Function], *arguments: object) -> Function:
+    """Return what a compiler makes; its errors name the function."""
     try:
         return compiler(*arguments)
     except NotCompilable as error:
-        raise NotCompilable(f"{name} does not compile: {error}") from None
+        raise NotCompilable(f"{who} does not compile: {error}") from None
     except TypeError:
-        raise NotCompilable(f"{name} does not compile: it is not hashable") from None
+        raise NotCompilable(f"{who} does not compile: it is not hashable") from None

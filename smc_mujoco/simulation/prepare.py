@@ -60,7 +60,7 @@ class Prepared:
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
-        log = state.LOG_SIZE * (s.samples + 1) * s.plant.n
+        log = state.LOG.itemsize * (s.samples + 1) * s.plant.n
         return int(log + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
 
 
@@ -152,7 +152,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         for made, d in zip(compiled.disturbances, s.disturbance, strict=True)
     ]
     slots = s.delay_steps // s.steps + 1
-    joints, states = buffer.put([0.0, float(n), *[0.0] * (4 * n)]), buffer.reserve(state.STATE_SIZE // 8 * n)
+    joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
+    states = buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n)
     limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
     numbers = buffer.array()
 

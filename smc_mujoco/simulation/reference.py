@@ -1,50 +1,52 @@
-"""The reference loop: mj_step with the law called as the Python function it is.
+"""The reference loop: mj_step, with laws, estimators and signals called as the Python functions they are.
 
-It runs what does not compile, and it is the oracle that the tests hold the compiled callback against: same Scenario,
-same Trace, but written for reading, with numpy's own Philox and nothing of the harness. A step takes tens of
-microseconds.
+It runs what does not compile. It is also what the tests compare the compiled callback with: same Scenario, same Trace,
+but written for reading, with numpy's own Philox and none of the callback's code. A step takes tens of microseconds.
 """
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common import jit
+from smc_mujoco.common.errors import one_line, shown
 from smc_mujoco.common.remade import remade
+from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.plant import Coupled, Values
+from smc_mujoco.mechanisms.plant import Coupled, Plant, Values
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
-from smc_mujoco.simulation.guarded import (
-    Failure,
-    as_written,
-    estimated,
-    guarded,
-    named,
-    nominal,
-    numbers,
-    signalled,
-    surfaced,
-)
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
+RAISES = (Exception, SystemExit)  # what may end a user's function while the other runs go on
+RETURNS = {  # what a component returns, for messages
+    "law": "the two numbers u, s",
+    "surface": "the two numbers s, eq",
+    "estimator": "a velocity, or it and an acceleration",
+}
 LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {MAX_STATE:g}, or NaN)"
-
 INTERRUPTED = (
     "MuJoCo's control callback was set by someone else during the run, which went on without its law: "
     "call mujoco.set_mjcb_control before or after it, or put back what mujoco.get_mjcb_control() gave"
 )
 
 
+class Failure(Exception):
+    """Why a run ended early."""
+
+
 def run(scenario: Scenario) -> Trace:
-    """One run in the reference loop."""
+    """Return the trace of a scenario, simulated in the reference loop."""
     with installed():
         loop = Loop(scenario)
     with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named
@@ -69,22 +71,19 @@ class Loop:
             encoder.remember(self.model, self.data)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
-        self.law, self.estimator = (remade(c.function, as_written) for c in (scenario.law, scenario.velocity))
-        self.surface = scenario.surface and remade(scenario.surface.function, as_written)
-        self.surface_memory = [np.zeros(scenario.surface.memory if scenario.surface else 0) for _ in range(n)]
+        self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, scenario.velocity))
+        self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.nominal = Values(**scenario.plant.parameters)
         if isinstance(scenario.plant.nominal, Coupled):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.nominal)
-        self.memory = [np.zeros(scenario.law.memory) for _ in range(n)]
-        self.estimator_memory = [np.zeros(scenario.velocity.memory) for _ in range(n)]
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.commands: list[np.ndarray] = []
         self.latest = np.zeros(n)  # the last command of each channel
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
-        self.held = np.zeros((n, 2))  # the last readings that arrived
-        self.acted = np.zeros((2, n))  # sums of what drives, and what friction and contacts, exerted on the joints
+        self.last_reading = np.zeros((n, 2))  # that arrived
+        self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
-        self.tandem, self.first = scenario.tandem, np.zeros(n)  # of two drives, and the output of the first
+        self.tandem, self.first = scenario.tandem, np.zeros(n)  # two drives in series, and the output of the first
         self.limits = np.array(scenario.limits)
         self.arrived = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
@@ -92,7 +91,7 @@ class Loop:
         self.failed_step = 0  # physics step
 
     def step(self, step: int) -> None:
-        """Physics step 0, 1, ..., with `control` installed; that after the last one only completes the log."""
+        """Do physics step 0, 1, ..., with `control` installed. The step after the last one only completes the log."""
         if step == self.scenario.jump_step:
             self.set_parameters(step)
         if step < self.total:
@@ -109,9 +108,9 @@ class Loop:
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """The callback: at the first stage of a sample the law, at every stage the disturbance."""
+        """Control callback: run the law at the first stage of a sample, and the disturbance at every stage."""
         if self.failure or data._address != self.data._address:
-            return  # a law may step a model of its own, and other threads load theirs
+            return  # a law may step a model of its own, and so may other threads
         step, stage = divmod(self.calls, self.scenario.stages)
         self.calls += 1
         try:
@@ -126,17 +125,16 @@ class Loop:
                 reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
                 applied, driven = np.zeros(len(x)), self.channels["ctrl"] >= 0
                 applied[driven] = np.clip(reached[driven], -self.limits, self.limits)  # scaled and back: an ulp beyond
-                acted = self.acted / self.scenario.steps
-                sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *acted)
+                sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
-                self.acted[:] = 0.0
+                self.forces[:] = 0.0
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
     def begin(self, data: mujoco.MjData, step: int) -> None:
-        """The first stage of a physics step: at a sample the law; the command whose delay has passed."""
-        self.weigh(data)
+        """Begin a physics step: run the law if it is a sample, and apply the command whose delay has passed."""
+        self.sum_forces(data)
         if not (np.all(np.abs(data.qpos) < MAX_STATE) and np.all(np.abs(data.qvel) < MAX_STATE)):
             raise Failure(LEFT_THE_WORLD)
         k, within = divmod(step, self.scenario.steps)
@@ -152,20 +150,18 @@ class Loop:
         data.ctrl[self.channels["ctrl"][driven]] = (self.scale * asked)[driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Measured positions and estimated velocities, (n,) each."""
+        """Return measured positions and estimated velocities, (n,) each, at sample k."""
         x, v = data.sensordata[self.channels["x_sensor"]], data.sensordata[self.channels["v_sensor"]]
-        estimator, j, sensor = self.scenario.velocity, k, self.scenario.sensor
+        j, sensor = k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((k * self.scenario.control_period - sensor.delay) / sensor.period + 1e-6))
         for i in range(len(x)):
             x[i], v[i] = self.read(i, x[i], v[i], j)
-            reading = Reading(self.scenario.control_period, float(x[i]), float(v[i]))
-            out = guarded(estimator, self.estimator, i, reading, named(estimator), self.estimator_memory[i])
-            v[i], self.a[i] = estimated(estimator, out)
+            v[i], self.a[i] = self.estimator(i, Reading(self.scenario.control_period, float(x[i]), float(v[i])))
         return x, v
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
-        """Reading j of channel i: position and velocity after noise, bias, rounding, and loss."""
+        """Return reading j of channel i: position and velocity after noise, bias, rounding and loss."""
         sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
@@ -176,16 +172,16 @@ class Loop:
         if q := sensor.quantum(self.channels["tip"][i] >= 0):
             x = q * math.floor(x / q + 0.5)
         if j > 0 and words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
-            return self.held[i, 0], self.held[i, 1]
-        self.held[i] = x, v
+            return self.last_reading[i, 0], self.last_reading[i, 1]
+        self.last_reading[i] = x, v
         return x, v
 
     def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Saturated commands and sliding variables, (n,) each."""
-        scenario, law = self.scenario, self.scenario.law
+        """Return saturated commands and sliding variables, (n,) each, for measured x and v at sample k."""
+        scenario = self.scenario
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         limits = scenario.limits
-        r, dr, ddr = signalled(scenario.reference, t)
+        r, dr, ddr = evaluate(scenario.reference, t)
         self.r[:] = r
         for i in range(len(x)):
             if self.channels["ctrl"][i] < 0:  # only measured
@@ -199,31 +195,30 @@ class Loop:
             if (j := i + int(np.sum(self.channels["ctrl"] >= 0))) < len(x):  # moves with it, without an actuator
                 fq, gq = self.model_at(x, v, j)
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
-            if scenario.surface is not None:
-                slid = guarded(scenario.surface, self.surface, i, y, named(scenario.surface), self.surface_memory[i])
-                y = y._replace(surfaced=1.0, **dict(zip(("s", "eq"), surfaced(scenario.surface, slid), strict=True)))
-            out = guarded(law, self.law, i, y, named(law), self.memory[i])
-            u[i], s[i] = numbers(f"law {law.name!r}", out, "the two numbers u, s", 2)
+            if self.surface:
+                sliding, v_eq = self.surface(i, y)
+                y = y._replace(surfaced=1.0, s=sliding, eq=v_eq)
+            u[i], s[i] = self.law(i, y)
             self.latest[i] = np.clip(u[i], -limits[i], limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < MAX_CONTROL):
-                raise Failure(f"law {law.name!r} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
+                raise Failure(f"{self.law.name} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
             u[i] = self.latest[i]
         return u, s
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int) -> tuple[float, float]:
-        """Nominal f and g of channel i."""
+        """Return nominal f and g of channel i."""
         return nominal(self.scenario.plant, x, v, i, self.nominal, self.latest)
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
-        """Put the disturbances of time t on the bodies; their generalised forces, (n,)."""
+        """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
         xfrc, table = data.xfrc_applied.ravel(), self.channels
         xfrc[table["xfrc"]] = xfrc[table["push"]] = 0.0
-        joints = np.zeros(len(table))  # those of an own model
+        joints = np.zeros(len(table))  # forces on the joints themselves, in a user's model
         for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
             stream = self.scenario.stream(j)
-            d = [signalled(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
-            matched = table["sign"] * d * (table["ctrl"] >= 0)  # where an actuator could answer it
+            d = [evaluate(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
+            matched = table["sign"] * d * (table["ctrl"] >= 0)  # only where there is an actuator
             joints += matched
             xfrc[table["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
         if self.scenario.plant.direct:
@@ -236,16 +231,104 @@ class Loop:
             raise Failure("the disturbance became NaN or inf")
         return d
 
-    def weigh(self, data: mujoco.MjData) -> None:
-        """Add up what drives, and what friction and contacts, exerted on the joints in the last physics step."""
+    def sum_forces(self, data: mujoco.MjData) -> None:
+        """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
         rubs = self.channels["friction"] >= 0
-        self.acted[0] += np.where(self.channels["force"] >= 0, data.actuator_force[self.channels["force"]], 0.0)
-        self.acted[1] += data.qfrc_constraint[self.channels["qvel"]]
-        self.acted[1, rubs] += data.actuator_force[self.channels["friction"][rubs]]
+        self.forces[0] += np.where(self.channels["force"] >= 0, data.actuator_force[self.channels["force"]], 0.0)
+        self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
+        self.forces[1, rubs] += data.actuator_force[self.channels["friction"][rubs]]
+
+
+def gains_of(c: Component) -> tuple:
+    """Return the gains of a component as the record that its function reads."""
+    return jit.named(tuple(c.gains))(*(c.gains.values() or [0.0]))
+
+
+class PythonComponent:
+    """A law, surface or estimator as the Python function that its author wrote.
+
+    Attributes:
+      name: its kind and name, for messages.
+      function: the function, and all that it calls, not compiled.
+      gains: the record that it reads.
+      memory: one row for each channel, (n, c.memory).
+    """
+
+    def __init__(self, c: Component, n: int):
+        self.name, self.returns = f"{c.kind} {c.name!r}", RETURNS[c.kind]
+        self.function = remade(c.function, lambda function: function)
+        self.memory = np.zeros((n, c.memory))
+        self.bind(c)
+
+    def bind(self, c: Component) -> None:
+        """Take the gains of a component with the same function."""
+        self.gains = gains_of(c)
+
+    def __call__(self, i: int, y: tuple) -> list[float]:
+        """Return its two numbers for channel i; NaN for an acceleration that is not estimated.
+
+        Args:
+          y: a Reading for an estimator, else a Measurement.
+
+        Raises:
+          Failure: it raised an exception, or did not return numbers.
+        """
+        try:
+            out = self.function(y, self.gains, self.memory[i])
+        except RAISES as error:
+            raise raised(self.name, error, f" in channel {i}") from error
+        if isinstance(y, Reading) and not isinstance(out, tuple):
+            out = out, math.nan
+        return numbers(self.name, out, self.returns, 2)
+
+
+def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
+    """Return a signal and its two derivatives at time t, s.
+
+    Args:
+      state: memory, seed, channel and stream, which only process noise reads.
+
+    Raises:
+      Failure: it raised an exception, or did not return three numbers.
+    """
+    name = type(signal).__name__
+    try:
+        out = type(signal).value(t, signal, *(state if signal.random else (signal.data,) if signal.series else ()))
+    except RAISES as error:
+        raise raised(name, error) from error
+    return numbers(name, out, "a value and two derivatives", 3)
+
+
+def nominal(plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray) -> tuple[float, float]:
+    """Return nominal f and g of channel i. The model of coupled channels also depends on the last commands u, (n,)."""
+    try:
+        return plant.nominal(x, v, i, values, *((u,) if isinstance(plant.nominal, Coupled) else ()))
+    except RAISES as error:
+        raise raised(f"the nominal model of {plant.name}", error) from error
+
+
+def raised(name: str, error: BaseException, where: str = "") -> Failure:
+    """Return the Failure for an exception of a user's function."""
+    try:
+        text = str(error)
+    except RAISES:
+        text = "its text cannot be shown"
+    return Failure(f"{name} raised {type(error).__name__} ({one_line(text)}){where}")
+
+
+def numbers(name: str, out: Any, expected: str, count: int) -> list[float]:
+    """Return what a user's function returned, as `count` floats."""
+    try:
+        values = [float(value) for value in out]
+    except (TypeError, ValueError, OverflowError):
+        values = []
+    if len(values) != count:
+        raise Failure(f"{name} returned {shown(out)} instead of {expected}")
+    return values
 
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:
-    """What noise.normals gives, from numpy's own generator."""
+    """Return the numbers of philox.normals, from numpy's own generator."""
     first, second = words(seed, channel, stream, k)
     radius = math.sqrt(-2.0 * math.log((first + 1) * 2.0**-53))
     angle = 2.0 * math.pi * second * 2.0**-53
@@ -253,7 +336,7 @@ def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]
 
 
 def words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
-    """Two whole numbers of 53 random bits, from numpy's own generator."""
+    """Return two whole numbers of 53 random bits, from numpy's own generator."""
     before = (k - 1 + (stream << 64)) % 2**256
     first, second = np.random.Philox(key=seed + (channel << 64), counter=before).random_raw(2)
     return int(first) >> 11, int(second) >> 11

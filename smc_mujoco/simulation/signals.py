@@ -1,10 +1,14 @@
-"""References r(t) and disturbances d(t): frozen data plus one pure function of time.
+"""References r(t) and disturbances d(t): frozen dataclasses, each with one pure function of time.
 
-A signal is a frozen dataclass whose float fields are its parameters p and whose `value` is compiled. Deterministic
-signals read `value(t, p) -> (r, r', r'')`; as a disturbance only the first is used. Process noise depends on the
-channel, the seed and its own past, and reads `value(t, p, memory, seed, channel, stream)`: memory is its per-channel
-state, stream tells it from the run's other noises. A series reads `value(t, p, data)`, the array that it holds.
-Times in seconds, values in the unit of what the signal is added to (reference: m or rad; disturbance: N or N m).
+The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of three forms:
+
+    value(t, p) -> (r, r', r'')                       deterministic; a disturbance uses only the first number
+    value(t, p, memory, seed, channel, stream)        process noise
+    value(t, p, data)                                 a series, which holds an array
+
+The memory of process noise is its state in one channel. The stream number separates it from the other noises of a run.
+Times are in seconds. Values have the unit of what the signal is added to: m or rad for a reference, N or N m for a
+disturbance.
 """
 
 import dataclasses
@@ -19,21 +23,32 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.simulation import philox
 
-EARLY = 1.0 - 1e-15  # sums and products of decimal times miss a sample's time by an ulp or two, to either side
-TERMS = 32  # sinusoids of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below a Gaussian's
+EARLY = 1.0 - 1e-15  # factor on a switching time: sums of decimal times miss it by an ulp or two, to either side
+TERMS = 32  # sinusoids of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
 
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """Base of all signals: checks that every parameter is a finite number."""
+    """Base of all signals. Checks that every parameter is a finite number. All attributes are those of the class.
 
-    memory: ClassVar[int] = 0  # floats of per-channel state
-    positive: ClassVar[tuple[str, ...]] = ()  # parameters that must exceed 0
-    natural: ClassVar[tuple[str, ...]] = ()  # parameters that must not be below 0
-    random: ClassVar[bool] = False  # whether value takes memory, seed, channel and stream
-    series: ClassVar[bool] = False  # whether value takes data
-    cartesian: ClassVar[bool] = False  # as a disturbance: a horizontal force in N on the body, not one on the joint
-    data: ClassVar[np.ndarray]  # of a series: what it holds, (2, N) float64, C-contiguous
+    Attributes:
+      memory: floats of state in each channel.
+      positive, natural: names of parameters that must be > 0, and >= 0.
+      random: whether `value` takes memory, seed, channel and stream.
+      series: whether `value` takes data.
+      cartesian: whether it disturbs as a horizontal force on the body, N, instead of a force on the joint.
+      data: the array of a series, (2, N) float64, C-contiguous.
+      value: static method that returns the value and its first and second derivative.
+    """
+
+    memory: ClassVar[int] = 0
+    positive: ClassVar[tuple[str, ...]] = ()
+    natural: ClassVar[tuple[str, ...]] = ()
+    random: ClassVar[bool] = False
+    series: ClassVar[bool] = False
+    cartesian: ClassVar[bool] = False
+    data: ClassVar[np.ndarray]
+    value: ClassVar[Callable[..., tuple[float, float, float]]]
 
     def __post_init__(self):
         for name, value in self.parameters().items():
@@ -43,10 +58,8 @@ class Signal:
             object.__setattr__(self, name, checked)
 
     def parameters(self) -> dict[str, float]:
-        """Parameter name -> value."""
+        """Return parameter name -> value."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-
-    value: ClassVar[Callable[..., tuple[float, float, float]]]  # a static method: value, first and second derivative
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +98,43 @@ class Step(Signal):
     @staticmethod
     def value(t, p):
         return (p.amplitude if t >= p.time * EARLY else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Ramp(Signal):
+    """0 before `time`, slope (t - time) from then on; slope in the signal's unit per second."""
+
+    slope: float
+    time: float = 0.0
+
+    @staticmethod
+    def value(t, p):
+        if t < p.time * EARLY:
+            return 0.0, 0.0, 0.0
+        return p.slope * (t - p.time), p.slope, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class MinimumJerk(Signal):
+    """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration held to 0 .. 1: a smooth move from rest to rest.
+
+    Of all moves in that time it has the least integral of the squared jerk; velocity and acceleration are 0 at both
+    ends. Source: T. Flash & N. Hogan, "The coordination of arm movements: an experimentally confirmed mathematical
+    model", J. Neuroscience 5(7):1688, 1985.
+    """
+
+    amplitude: float
+    time: float
+    duration: float
+
+    positive = ("duration",)
+
+    @staticmethod
+    def value(t, p):
+        a = min(max((t - p.time) / p.duration, 0.0), 1.0)
+        b, T = 1.0 - a, p.duration
+        r = p.amplitude * a * a * a * (10.0 - a * (15.0 - 6.0 * a))
+        return r, p.amplitude * 30.0 * a * a * b * b / T, p.amplitude * 60.0 * a * b * (1.0 - 2.0 * a) / (T * T)
 
 
 @dataclasses.dataclass(frozen=True)

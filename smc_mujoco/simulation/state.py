@@ -1,9 +1,9 @@
 """The record of one simulation: all that the callback needs besides MuJoCo's own state, under names.
 
-`mjData.userdata` holds two numbers, `callback.magic()` and the address of the record. Compiled code reads it as a
-record (`simulation.period`, `simulation.calls += 1`), Python as a NumPy structured array of the same dtype. What a
-user's function reads and writes are records, too: a law gets a MEASUREMENT and gives a CONTROL. Arrays, such as gains
-and memories, lie in one buffer beside the record, which holds their addresses.
+`mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code reads the record by
+names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of the same dtype. What a user's function
+reads and writes are records, too: a law gets a MEASUREMENT and gives a CONTROL. Arrays, such as gains and memories, lie
+in one buffer beside the record, which holds their addresses.
 """
 
 import itertools
@@ -18,19 +18,19 @@ from smc_mujoco.control.law import Measurement
 
 
 def floats(names: Iterable[str]) -> np.dtype:
-    """The dtype of a record of float64."""
+    """Return the dtype of a record of float64."""
     return np.dtype([(name, "f8") for name in names], align=True)
 
 
-# What functions get, and what they give: a law a MEASUREMENT -> CONTROL, a surface a MEASUREMENT -> SLIDING, an
-# estimator a READING -> ESTIMATE, a reference or a disturbance an INSTANT -> MOTION, the nominal model -> MODEL.
+# What functions get and give. Law: MEASUREMENT -> CONTROL. Surface: MEASUREMENT -> SLIDING. Estimator: READING ->
+# ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal model: -> MODEL.
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream"))
 CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 
-# What is kept of a channel between calls: the last reading that arrived, the command that has passed its delay, the
-# output of the first of two drives, and sums over a control period of the drive's force and of friction and contacts.
+# The state of a channel between calls: the last reading that arrived, the command that has passed its delay, the output
+# of the first of two drives, and sums over a control period of the drive's force and of friction and contacts.
 CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction"))
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
@@ -74,29 +74,24 @@ SIMULATION = np.dtype(
     align=True,
 )  # fmt: skip
 
-# Compiled code reads a record at an address by these.
+# How compiled code reads record i of an array at an address.
 simulation_at, state_at, log_at, signal_at = map(record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL))
 
-
-def _place(name: str) -> int:
-    """Bytes from the start of a simulation's record to a field."""
-    return SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript, reportArgumentType]
-
-
-Y, READING_AT, INSTANT_AT = _place("y"), _place("reading"), _place("instant")
-CONTROL_AT, SLIDING_AT, ESTIMATE_AT = _place("control"), _place("sliding"), _place("estimate")
-MOTION_AT, MODEL_AT = _place("motion"), _place("model")
-STATE_SIZE, LOG_SIZE, SIGNAL_SIZE = CHANNEL_STATE.itemsize, LOG.itemsize, SIGNAL.itemsize
-
-# What `failure` says.
-FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE = range(4)
-ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED, DISTURBANCE_RAISED, SURFACE_RAISED, INTERRUPTED = range(
-    4, 11
+# Bytes from the start of a simulation's record to what functions get and give.
+MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT = (
+    SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
+    for name in ("y", "reading", "instant", "control", "sliding", "estimate", "motion", "model")
 )
+
+# Values of `failure`.
+(
+    FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE, ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED,
+    DISTURBANCE_RAISED, SURFACE_RAISED, INTERRUPTED,
+) = range(11)  # fmt: skip
 
 
 def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
-    """A record's values in the order of its fields, 0 for each that is not named."""
+    """Return the values of a record in the order of its fields, 0 for each that is not named."""
     return tuple(
         values.get(name, 0) if (kind := dtype[name]).names is None else as_tuple(kind, values.get(name, {}))
         for name in dtype.names or ()
@@ -104,14 +99,12 @@ def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
 
 
 class Buffer:
-    """Float64 numbers for one array. A part has a place at once, and an address once the array is made.
+    """Float64 numbers for one array. Each part has a place at once, and an address once the array is made.
 
-    In use:
-
-        buffer = Buffer()
-        gains = buffer.put([6.0, 3.0])      # a place
-        array = buffer.array()
-        buffer.address(gains)               # where the gains lie, as long as `array` lives
+    buffer = Buffer()
+    gains = buffer.put([6.0, 3.0])      # a place
+    array = buffer.array()
+    buffer.address(gains)               # address of the gains, valid as long as `array` lives
     """
 
     def __init__(self) -> None:
@@ -119,32 +112,32 @@ class Buffer:
         self.base = 0
 
     def put(self, values: Iterable[float]) -> int:
-        """Append numbers; their place."""
+        """Append numbers and return their place."""
         place = len(self.values)
         self.values.extend(values)
         return place
 
     def reserve(self, count: int) -> int:
-        """Append zeros; their place."""
+        """Append zeros and return their place."""
         return self.put(itertools.repeat(0.0, count))
 
     def array(self) -> np.ndarray:
-        """The numbers, (count,) float64."""
+        """Return the numbers, (count,) float64."""
         made = np.array(self.values)
         self.base = address(made)
         return made
 
     def address(self, place: int) -> int:
-        """The address of a place in the array."""
+        """Return the address of a place in the array."""
         return self.base + 8 * place
 
 
 def address(array: np.ndarray) -> int:
-    """The address of a C-contiguous array's data."""
+    """Return the address of the data of a C-contiguous array."""
     return array.__array_interface__["data"][0]
 
 
 def view(array: np.ndarray, at: int, shape: Sequence[int]) -> np.ndarray:
-    """The numbers at an address within a float64 array, as an array of that shape."""
+    """Return the numbers at an address within a float64 array, as an array of a shape."""
     first = (at - address(array)) // 8
     return array[first : first + int(np.prod(shape))].reshape(shape)

@@ -30,7 +30,7 @@ def called(law, times=1, memory=None, **y):
     memory, u = np.zeros(law.memory) if memory is None else memory, math.nan
     assert law.function is not None
     for _ in range(times):
-        u, _ = law.function(measured(**y), plain.named(law), memory)
+        u, _ = law.function(measured(**y), plain.gains_of(law), memory)
     return u
 
 

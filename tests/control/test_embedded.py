@@ -26,7 +26,7 @@ def measured(e=0.0, de=0.0, **more):
 
 def forces(law, e, de):
     """u and s at many states, (N, 2)."""
-    gains, memory = reference.named(law), np.zeros(law.memory)
+    gains, memory = reference.gains_of(law), np.zeros(law.memory)
     return np.array([law.function(measured(float(a), float(b)), gains, memory) for a, b in zip(e, de, strict=True)])
 
 

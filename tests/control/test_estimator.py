@@ -24,7 +24,7 @@ def both(estimator, x, v=None, h=H):
     """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
     function, gains, memory = (
         remade(estimator.function, lambda f: f),
-        reference.named(estimator),
+        reference.gains_of(estimator),
         np.zeros(estimator.memory),
     )
     x = np.asarray(x, float)

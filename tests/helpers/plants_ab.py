@@ -68,7 +68,7 @@ def on_surface(s, dt=1e-3, eq=0.0, **y):
 def called(law: Law, y: Measurement, memory: np.ndarray):
     """u and s of a law that keeps its memory."""
     assert law.function is not None
-    return law.function(y, reference.named(law), memory)
+    return law.function(y, reference.gains_of(law), memory)
 
 
 def one(law: Law, **y):
@@ -120,7 +120,7 @@ def chain(law, d, x, h, duration, sign=1.0, noise=None, f=0.0, g=1.0, model=0.0,
       limit: bound on |u|.
     """
     count, n = round(duration / h), len(x)
-    function, gains, memory = remade(law.function, lambda f: f), reference.named(law), [0.0] * law.memory
+    function, gains, memory = remade(law.function, lambda f: f), reference.gains_of(law), [0.0] * law.memory
     errors = None if noise is None else np.broadcast_to(np.reshape(noise, (count, -1)), (count, n)).tolist()
     taylor = [h**j / math.factorial(j) for j in range(n + 1)]
     # plain lists and one tuple a sample: this loop is most of what the tests of laws take

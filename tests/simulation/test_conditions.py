@@ -16,7 +16,7 @@ from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
-from smc_mujoco.simulation.conditions import NAMED, find_condition, from_file, parsed, suiting
+from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
 from smc_mujoco.simulation.initial_states import SEEDS
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.run_key import condition as told
@@ -63,7 +63,7 @@ def arm(file):
     ],
 )
 def test_text_says_a_condition_whole(condition):
-    assert parsed(str(condition)) == condition
+    assert parse(str(condition)) == condition
 
 
 def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
@@ -76,7 +76,7 @@ def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
         pass
 
     made = smc.condition("own", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(0.1), Mine(0.3)))
-    assert parsed(str(made)) == made
+    assert parse(str(made)) == made
 
 
 def test_the_suites_conditions_go_by_their_names():
@@ -104,7 +104,7 @@ def test_a_condition_of_any_values_has_a_text_and_joins_others():
 
     assert str(smc.condition("shy", friction=Shy())) == "shy: friction=<Shy>"
     array = smc.condition("array", x0=np.array([0.3]))
-    assert parsed(str(array)) == array
+    assert parse(str(array)) == array
     (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
     assert run.x0 == (0.3,)
     odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
@@ -178,8 +178,8 @@ def test_conditions_of_one_name_that_differ_are_refused():
 def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
     names = ["nominal", "jump_mild", "coulomb", "contact"]
     duffing = smc.plant("duffing")
-    assert suiting(names, [duffing], 1.0) == names
-    assert suiting(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
+    assert applicable(names, [duffing], 1.0) == names
+    assert applicable(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
 
 
 def test_a_condition_that_starts_at_0_is_nothing_to_tune_for():

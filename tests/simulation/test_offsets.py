@@ -74,13 +74,13 @@ def test_a_field_more_before_an_array_is_refused(monkeypatch, live, name):
         return fields
 
     doctored(monkeypatch, "mjData", insert)
-    with pytest.raises(layout.LayoutError, match=rf"mjData\.{name} is not at byte"):
+    with pytest.raises(layout.LayoutError, match=rf"does not have mjData\.{name} at byte"):
         layout.checked(*live)
 
 
 def test_a_field_less_is_refused(monkeypatch, live):
     doctored(monkeypatch, "mjData", lambda fields: fields[1:])
-    with pytest.raises(layout.LayoutError, match=r"mjData\.qpos is not at byte"):
+    with pytest.raises(layout.LayoutError, match=r"does not have mjData\.qpos at byte"):
         layout.checked(*live)
 
 

@@ -14,15 +14,16 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.simulation import native, reference, serialise
-from smc_mujoco.simulation.references import MinimumJerk, Ramp
 from smc_mujoco.simulation.signals import (
     TERMS,
     BandLimited,
     Constant,
     Gust,
     Impulse,
+    MinimumJerk,
     OrnsteinUhlenbeck,
     Pulse,
+    Ramp,
     Recorded,
     Signal,
     Sine,

@@ -59,7 +59,7 @@ def bench(
         from smc_mujoco.cli import tables
         from smc_mujoco.control.gain_sets import general_laws
         from smc_mujoco.mechanisms.plant import plant as find_plant
-        from smc_mujoco.simulation.conditions import suiting
+        from smc_mujoco.simulation.conditions import applicable
         from smc_mujoco.simulation.grid import grid
         from smc_mujoco.studies.leaderboard import leaderboard
         from smc_mujoco.studies.study import FULL, QUICK, study
@@ -68,7 +68,7 @@ def bench(
     machines = [options.plant(text) for text in options.names(plants, size.plants)]
     length = size.duration if duration is None else duration
     found = [find_plant(plant) if isinstance(plant, str) else plant for plant in machines]
-    usual = () if condition else suiting(size.conditions, found, length)
+    usual = () if condition else applicable(size.conditions, found, length)
     chosen = options.names(laws, size.laws)
     chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
     scenarios = grid(

@@ -22,7 +22,7 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.simulation import native
-from smc_mujoco.simulation.guarded import named
+from smc_mujoco.simulation.reference import gains_of
 
 pytestmark = pytest.mark.skipif(
     subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
@@ -130,7 +130,8 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
 def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
     law, f = LAWS[name](), np.float32
     ours, theirs = back(folder, law, "float", flags=["-Wdouble-promotion"]), remade(law.function, lambda g: g)
-    gains, memory, rng = type(named(law))(*map(f, named(law))), np.zeros(law.memory, f), np.random.default_rng(0)
+    read = gains_of(law)
+    gains, memory, rng = type(read)(*map(f, read)), np.zeros(law.memory, f), np.random.default_rng(0)
     for k in range(200):
         y = Measurement(*map(f, measured(k, rng)))
         before = memory.astype(float)
@@ -218,10 +219,10 @@ def turns(z, K, state):
 def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
     law, rng = turns(), np.random.default_rng(1)
     ours, theirs = back(folder, law), remade(law.function, lambda g: g)
-    mine, its = np.zeros(4), np.zeros(4)
+    mine, its, gains = np.zeros(4), np.zeros(4), gains_of(law)
     for k in range(300):
         y = Measurement(*measured(k, rng))
-        assert ours(y, named(law), mine) == pytest.approx(theirs(y, named(law), its), rel=1e-14, abs=1e-14)
+        assert ours(y, gains, mine) == pytest.approx(theirs(y, gains, its), rel=1e-14, abs=1e-14)
         np.testing.assert_allclose(mine, its, rtol=1e-14, atol=1e-14)
 
 
