@@ -1,4 +1,4 @@
-"""The channels of a compiled model: where each degree of freedom that a law sees lies in mjData."""
+"""Channels: where each degree of freedom that a law sees stands in the mjData of a compiled model."""
 
 import mujoco
 import numpy as np
@@ -8,12 +8,13 @@ from smc_mujoco.common.jit import record_at
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import DIRECTLY
 
-# Where a channel lies: addresses into qpos, qvel, sensordata (position, velocity), ctrl and actuator_force (-1 without
-# an actuator). `xfrc` is the address into xfrc_applied of a generalised force d, which enters there with `sign`; `push`
-# and `push_sign` are the same of a horizontal force on the body, whose lever arm lies between the components `tip` of
-# xipos and `anchor` of xanchor (-1 for a slide). `friction` is the address into actuator_force of a friction (-1
-# without one). `direct` is the address into qfrc_applied where disturbances act on the joint itself, as in models of
-# users (else -1).
+# Indices of a channel in mjData, -1 if it has no such thing:
+#   qpos, qvel, x_sensor and v_sensor (in sensordata), ctrl, force (in actuator_force)
+#   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
+#   push: of a horizontal force on the body in xfrc_applied, with `push_sign`
+#   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor; -1 for a slide
+#   friction: of a friction in actuator_force
+#   direct: in qfrc_applied, in users' models, whose disturbances act on the joint itself
 CHANNEL = np.dtype(
     [
         (name, "i8")
@@ -26,19 +27,19 @@ CHANNEL = np.dtype(
 channel_at = record_at(CHANNEL)  # how compiled code reads channel i of an array at an address
 
 _SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
-# Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis.
+# Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis
 _LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
-    """The channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each joint only measured.
+    """Return the channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each other joint.
 
-    A disturbance d acts on the body that carries the joint, as a force along a slide's axis or a torque about a
-    hinge's, so that its generalised force is d; a horizontal one acts on its centre of mass.
+    A disturbance d acts on the body that carries the joint, as a force along the axis of a slide or a torque about that
+    of a hinge, so that its generalised force is d. A horizontal one acts on the centre of mass.
 
     Raises:
-      ScenarioError: an actuator that drives no hinge or slide with gear 1, that lacks a position or velocity sensor, or
-        whose joint's axis lies along no world axis, which own models alone may have.
+      ScenarioError: an actuator does not drive a hinge or slide with gear 1, or its joint lacks a position or velocity
+        sensor, or has an axis along no world axis, which only users' models may have.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -52,14 +53,14 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
-    """The fields of a CHANNEL; `drive` is -1 for a joint that is only measured."""
+    """Return the fields of a CHANNEL; `drive` is -1 for a joint without an actuator."""
     body = int(model.jnt_bodyid[joint])
     name = f"actuator {model.actuator(drive).name!r}" if drive >= 0 else f"sensor of joint {model.joint(joint).name!r}"
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         raise ScenarioError(f"{name} is on no hinge or slide joint: give it one")
     direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECTLY) >= 0
-    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # direct ones take any
+    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct one may be any
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))

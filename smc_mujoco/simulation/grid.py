@@ -2,7 +2,7 @@
 
     scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
 
-Plants may be the suite's, by name, or models of your own; so may laws and conditions.
+Plants, laws and conditions may be those of the suite, by name, or your own.
 """
 
 import warnings
@@ -27,7 +27,7 @@ from smc_mujoco.simulation.scenario import QUIET, REST, Scenario
 
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 NOTHING: Mapping[str, Any] = frozen({})
-STILL = 1e-9  # rad/s^2 or m/s^2: rounding
+MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 
 
 def grid(
@@ -39,29 +39,27 @@ def grid(
     duration: float = DURATION,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Every plant in every condition under every law from every seed; plant varies slowest, seed fastest.
+    """Return scenarios of every plant, condition, law and seed. The plant varies slowest, then condition, law and seed.
 
     Args:
       plants: names or Plants, one or several.
       laws: names, with gains from the set `gains`, or laws with gains of their own.
       conditions: names, such as "noise" or "noise + coulomb", or conditions of your own, see `condition`.
       seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise, the same in every
-        condition and under every law; see `starts`. Where a law was tuned from several seeds, it also says which of
-        its gains are taken.
+        condition and under every law; see `starts`. If a law was tuned several times, the seed also selects which of
+        its gains are used.
       gains: "study", "tuned", "tracking" or "default", see `gains`.
       duration: of each run, s.
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: a name that is not known, plants, laws or conditions that differ and have one name, gains that the
-        set does not have, runs in which nothing happens, as they begin at rest at 0 and stay there, or more than a
-        million runs.
+      ScenarioError: an unknown name, different plants, laws or conditions of the same name, gains that the set does not
+        have, runs that begin at rest at 0 and stay there, or more than a million runs.
 
     Warns:
-      ScenarioWarning: gains of a set that were found for other parameters of the plant.
+      ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    numbers = seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST))
-    numbers = listed("seeds", numbers)
+    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST)))
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
@@ -89,12 +87,12 @@ def case(
     starts: Starts | None = None,
     changes: Mapping[str, Any] = NOTHING,
 ) -> Scenario:
-    """One run of a grid; arguments as of `grid`.
+    """Return one run of a grid, with arguments as in `grid`.
 
     Args:
-      changes: Scenario field -> value, over what the condition has.
+      changes: Scenario field -> value, in place of what the condition sets.
     """
-    machine = _machine(plant)
+    machine = _plant(plant)
     asked, seed = find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
     fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
     if machine.name in sets.STUDY:
@@ -106,7 +104,7 @@ def case(
 
 
 def check_moving(seeds: Sequence[Scenario]) -> None:
-    """Raise ScenarioError for runs from several seeds in which nothing happens, whatever the law."""
+    """Raise ScenarioError if nothing happens in any of the runs, which differ only in their seeds, whatever the law."""
     if all(map(_rests, seeds)):
         at = seeds[0]
         raise ScenarioError(
@@ -116,7 +114,7 @@ def check_moving(seeds: Sequence[Scenario]) -> None:
 
 
 def _rests(scenario: Scenario) -> bool:
-    """Whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
+    """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
     moved = any(scenario.x0) or any(scenario.v0) or scenario.disturbance or scenario.sensor
     if moved or scenario.noise != QUIET or scenario.reference != REST:
         return False
@@ -124,47 +122,48 @@ def _rests(scenario: Scenario) -> bool:
     data = mujoco.MjData(made)
     data.qpos[:], data.qvel[:] = start(made, scenario)
     mujoco.mj_forward(made, data)
-    return bool(np.abs(data.qacc).max() < STILL)
+    return bool(np.abs(data.qacc).max() < MAX_REST_ACCELERATION)
 
 
 def _check_apart(
     plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
 ) -> None:
-    """Raise ScenarioError for plants, laws or conditions that differ and have one name, by which tables tell them."""
-    machines = [_machine(plant) for plant in plants]
+    """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
+    machines = [_plant(plant) for plant in plants]
     chosen = [law if isinstance(law, str) else coerce.component(law, "law") for law in laws]
-    _check_names("plants", [(p.name, p, (p.build, p.parameters, p.n)) for p in machines], "give each a grid of its own")
-    named = [(law if isinstance(law, str) else law.name, law, law) for law in chosen]
-    _check_names("laws", named, "name one of them, as smc.law(...).named('slow') or --laws \"slow: classical(k=2)\"")
-    _check_names("conditions", [(c.name, c, str(c)) for c in conditions], "give each a name of its own")
+    # name, thing, and what distinguishes it from others
+    for what, cure, things in (
+        ("plants", "give each a grid of its own", [(p.name, p, (p.build, p.parameters, p.n)) for p in machines]),
+        (
+            "laws",
+            "name one of them, as smc.law(...).named('slow') or --laws \"slow: classical(k=2)\"",
+            [(law if isinstance(law, str) else law.name, law, law) for law in chosen],
+        ),
+        ("conditions", "give each a name of its own", [(c.name, c, str(c)) for c in conditions]),
+    ):
+        known = {}
+        for name, thing, content in things:
+            first, first_content = known.setdefault(name, (thing, content))
+            if first_content != content:
+                both = f"{one_line(str(first))} and {one_line(str(thing))}"
+                raise ScenarioError(f"two {what} have the name {name!r}, {both}: {cure}")
 
 
-def _check_names(what: str, things: Sequence[tuple[str, object, object]], cure: str) -> None:
-    """Raise ScenarioError where of things - name, thing, what tells it from others - two differ and have one name."""
-    known: dict[str, tuple[object, object]] = {}
-    for name, thing, content in things:
-        first, its = known.setdefault(name, (thing, content))
-        if its != content:
-            both = f"{one_line(str(first))} and {one_line(str(thing))}"
-            raise ScenarioError(f"two {what} have the name {name!r}, {both}: {cure}")
-
-
-def _machine(plant: str | Plant) -> Plant:
-    """A plant as given, or of that name."""
-    machine = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(machine, Plant):
+def _plant(plant: str | Plant) -> Plant:
+    """Return a plant, or the plant of a name."""
+    plant = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(plant, Plant):
         raise ScenarioError(f"plant is {shown(plant)}: give a name, smc.plant(...) or smc.plant_from(...)")
-    return machine
+    return plant
 
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
-    """A law as given, or one of that name with its gains for the plant."""
+    """Return a law, or the law of a name with its gains for the plant."""
     if not isinstance(law, str):
         return checked_name(coerce.component(law, "law"))
-    given = "default" if law == "none" else gains
-    found = sets.law(plant, law, given, seed)
-    known = catalogue().get(plant.name)
-    if given != "default" and known is not None and plant.parameters != known.parameters:
+    gains = "default" if law == "none" else gains
+    found, known = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
+    if gains != "default" and known is not None and plant.parameters != known.parameters:
         changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != known.parameters[name]]
         warnings.warn(
             f"gains of set {gains!r} were found for {plant.name} as it comes, and this one has {', '.join(changed)}: "
@@ -176,7 +175,7 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
 
 
 def listed(what: str, values: object) -> list:
-    """Several values as a list, from one or several."""
+    """Return one or several values as a list."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
     if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := taken(what, values)):

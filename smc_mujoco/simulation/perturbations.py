@@ -1,4 +1,4 @@
-"""Conditions of a run that are no signals: measurement noise, and parameters that change in mid-run."""
+"""Perturbations of a run that are not signals: measurement noise, and parameters that change during the run."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from smc_mujoco.common.frozen import Frozen, frozen
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Zero-mean Gaussian measurement noise: standard deviations of position and velocity, in their SI units."""
+    """Zero-mean Gaussian measurement noise, by the standard deviations of position and velocity, in SI units."""
 
     position: float = 0.0
     velocity: float = 0.0
@@ -21,7 +21,7 @@ class Noise:
 
 @dataclasses.dataclass(frozen=True)
 class Jump:
-    """The plant's parameters multiplied by `factors` (parameter name -> factor) from `time` on, s."""
+    """A multiplication of the plant's parameters by `factors` (parameter name -> factor) from `time`, s, on."""
 
     time: float
     factors: Mapping[str, float]
@@ -32,7 +32,7 @@ class Jump:
 
 
 def parameter_factors(name: str, value: object) -> Frozen[float]:
-    """Parameter name -> factor, checked; `name` is what errors call it."""
+    """Return parameter name -> factor, checked. Errors call it `name`."""
     if not isinstance(value, Mapping):
         raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})

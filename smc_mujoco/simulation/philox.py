@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
-MEASUREMENT, PROCESS = 0, 1  # streams: sensor noise; the first process noise, others follow
-DROPOUT = 1 << 32  # the stream that says which readings get lost
+MEASUREMENT, PROCESS = 0, 1  # streams: of sensor noise, and of the first process noise, which the others follow
+DROPOUT = 1 << 32  # stream that decides which readings get lost
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
 _W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
@@ -23,7 +23,7 @@ _SHIFT, _ONE = np.uint64(11), np.uint64(1)
 
 @intrinsic
 def _mulhi(typingctx, a, b):
-    """High 64 bits of the 128-bit product of two uint64."""
+    """Return the high 64 bits of the 128-bit product of two uint64."""
     from llvmlite import ir
 
     def codegen(context, builder, signature, args):
@@ -36,7 +36,7 @@ def _mulhi(typingctx, a, b):
 
 @njit(error_model="numpy")
 def block(seed, channel, stream, k):
-    """Four uint64 words of the block with number k of a stream; all arguments are whole numbers >= 0."""
+    """Return the four uint64 words of block k of a stream. All arguments are whole numbers >= 0."""
     c0, c1, c2, c3 = np.uint64(k), np.uint64(stream), np.uint64(0), np.uint64(0)
     key0, key1 = np.uint64(seed), np.uint64(channel)
     for _ in range(10):
@@ -52,7 +52,7 @@ def block(seed, channel, stream, k):
 
 @njit(error_model="numpy")
 def normals(seed, channel, stream, k):
-    """Two independent standard normal numbers from block k."""
+    """Return two independent standard normal numbers from block k."""
     a, b, _, _ = block(seed, channel, stream, k)
     radius = math.sqrt(-2.0 * math.log(((a >> _SHIFT) + _ONE) * 2.0**-53))  # argument in (0, 1]
     angle = 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
@@ -61,5 +61,5 @@ def normals(seed, channel, stream, k):
 
 @njit(error_model="numpy")
 def uniform(seed, channel, stream, k):
-    """A number uniform in [0, 1) from block k."""
+    """Return a number uniform in [0, 1) from block k."""
     return (block(seed, channel, stream, k)[0] >> _SHIFT) * 2.0**-53

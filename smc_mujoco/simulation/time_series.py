@@ -1,4 +1,4 @@
-"""A user's time series as a signal: given as numbers, or read from a CSV file, which is checked cell by cell."""
+"""A user's time series as a signal, from numbers or from a CSV file, which is checked cell by cell."""
 
 import csv
 import dataclasses
@@ -13,22 +13,22 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.simulation.signals import EARLY, Signal
 
-GAP = 1.5  # median steps; chosen: jitter of a logger's clock stays below, one row that is missing does not
-WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # a column's name
+MAX_GAP = 1.5  # median steps; chosen: jitter of a logger's clock stays below, a missing row does not
+WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
 SECONDS = ("s", "sec", "second", "seconds")
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class TimeSeries(Signal):
-    """Straight lines between the points (times, values), and 0 before the first and after the last.
+    """Straight lines between the points (times, values), and 0 before the first and after the last point.
 
     Attributes:
-      times: s, increasing, N >= 2 of them.
-      values: as many, in the unit of what the signal is added to.
+      times: (N,), s, increasing, N >= 2.
+      values: (N,), in the unit of what the signal is added to.
       data: both, (2, N) float64, read-only.
 
     Raises:
-      ScenarioError: for numbers that are not finite, or times that do not increase, in one sentence.
+      ScenarioError: a number is not finite, or times do not increase.
     """
 
     times: Sequence[float]
@@ -50,41 +50,41 @@ class TimeSeries(Signal):
     def __repr__(self) -> str:
         return f"TimeSeries({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
 
-    def __reduce__(self):  # so that a copy holds data of its own, as read-only as these
+    def __reduce__(self):  # so that a copy has data of its own, also read-only
         return type(self), (self.times, self.values)
 
     def parameters(self) -> dict[str, float]:
-        """None: all its numbers are data."""
+        """Return no parameters: all numbers are data."""
         return {}
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike, column: str | None = None, time: str | None = None) -> "TimeSeries":
-        """The series in a CSV file: numbers separated by commas, a row for each time, at a nearly constant rate.
+        """Return the series in a CSV file: numbers separated by commas, a row per time, at a nearly constant rate.
 
         Args:
-          path: the file. Its first row may name the columns; where it does not, they are time and value. A name may
-            have a unit, "d [N m]", as in what Trace.export writes, and is found with and without it.
-          column: the column of the values. Default: the first besides time.
-          time: the column of the times, s. Default: "t" or "time", else the first.
+          path: the file. Its first row may name the columns; otherwise they are time and value. A name may have a unit,
+            "d [N m]", as Trace.export writes it, and is found with and without the unit.
+          column: name of the column of values. Default: the first besides time.
+          time: name of the column of times, s. Default: "t" or "time", else the first.
 
         Raises:
-          ScenarioError: no such file or column, times that are not in s, a cell that is empty or no finite number,
-            times that do not increase, or a step between them beyond 1.5 median steps; each with its line.
+          ScenarioError: there is no such file or column, times are not in s or do not increase, a cell is empty or not
+            a finite number, or a step of time is longer than 1.5 median steps. The error names the line.
         """
         rows = _rows(path)
         if not rows:
             raise ScenarioError(f"{path} is empty: give a CSV file with the columns t and a value")
-        at, of, body = _columns(path, rows, column, time)
-        names = {i: rows[0][1][i] if body is not rows else f"column {i + 1}" for i in (at, of)}
-        times, values = ([_cell(path, line, names[i], row[i]) for line, row in body] for i in (at, of))
+        places, body = _columns(path, rows, column, time)
+        names = {i: rows[0][1][i] if body is not rows else f"column {i + 1}" for i in places}
+        times, values = ([_cell(path, line, names[i], row[i]) for line, row in body] for i in places)
 
         def where(i: int) -> str:
             return f"line {body[i][0]}"
 
         _check(str(path), times, values, where)
         steps = np.diff(times)
-        usual = np.quantile(steps, 0.5, method="lower")  # of two steps the shorter: the other has the gap
-        for i in np.flatnonzero(steps > GAP * usual)[:1]:
+        usual = np.quantile(steps, 0.5, method="lower")  # the shorter one of two steps, as the other has the gap
+        for i in np.flatnonzero(steps > MAX_GAP * usual)[:1]:
             raise ScenarioError(
                 f"{path} has a gap after {where(i)}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
                 f"{usual:g} s apart: fill it in, or cut the file there"
@@ -108,6 +108,7 @@ class TimeSeries(Signal):
 
 
 def _floats(what: str, items: object) -> tuple[float, ...]:
+    """Return a user's sequence of finite numbers as floats."""
     if isinstance(items, np.ndarray):
         items = items.tolist()
     if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
@@ -116,14 +117,13 @@ def _floats(what: str, items: object) -> tuple[float, ...]:
 
 
 def _check(what: str, times: Sequence[float], values: Sequence[float], where: Callable[[int], str]) -> None:
-    """Enough points, times that increase, and slopes that a float holds."""
+    """Raise ScenarioError if there are fewer than two points, times do not increase, or a slope overflows."""
     if len(times) < 2:
         raise ScenarioError(f"{what} has {len(times)} points: give at least two")
-    for i in range(1, len(times)):
-        if times[i] <= times[i - 1]:
-            raise ScenarioError(
-                f"{what}, {where(i)}: {times[i]:.12g} s comes after {times[i - 1]:.12g} s: give times that increase"
-            )
+    for i in np.flatnonzero(np.diff(times) <= 0.0)[:1] + 1:
+        raise ScenarioError(
+            f"{what}, {where(i)}: {times[i]:.12g} s comes after {times[i - 1]:.12g} s: give times that increase"
+        )
     with np.errstate(all="ignore"):
         slopes = np.diff(values) / np.diff(times)
     for i in np.flatnonzero(~np.isfinite(slopes))[:1]:
@@ -134,7 +134,7 @@ def _check(what: str, times: Sequence[float], values: Sequence[float], where: Ca
 
 
 def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
-    """The rows of a CSV file that are not blank, each with its line."""
+    """Return the line number and the cells of each row of a CSV file that is not blank."""
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot read a series from {shown(path)}: give the path of a CSV file")
     try:
@@ -153,8 +153,8 @@ def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
 
 def _columns(
     path: str | os.PathLike, rows: list[tuple[int, list[str]]], column: str | None, time: str | None
-) -> tuple[int, int, list[tuple[int, list[str]]]]:
-    """Where times and values stand, and the rows below the header."""
+) -> tuple[tuple[int, int], list[tuple[int, list[str]]]]:
+    """Return the indices of the columns of times and values, and the rows below the header."""
     names = rows[0][1]
     if len(names) < 2:
         raise ScenarioError(f"{path} has one column in its first line: give two, time and value, separated by commas")
@@ -167,9 +167,11 @@ def _columns(
                 f"{path} has no header to find {shown(wanted)} in: write the columns' "
                 "names in its first line, or leave out column and time"
             )
-        return 0, 1, rows
-    places = {WITH_UNIT.sub(r"\1", name): i for i, name in reversed([*enumerate(names)])}
-    places |= {name: i for i, name in reversed([*enumerate(names)])}
+        return (0, 1), rows
+    places: dict[str, int] = {}
+    for spellings in (names, [WITH_UNIT.sub(r"\1", name) for name in names]):
+        for i, name in enumerate(spellings):
+            places.setdefault(name, i)
     if time is None:
         time = next((name for name in ("t", "time") if name in places), names[0])
     if not isinstance(time, str) or time not in places:
@@ -179,10 +181,11 @@ def _columns(
     at = places[time]
     if (unit := WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECONDS:
         raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
-    return at, int(at == 0) if column is None else places[column], rows[1:]
+    return (at, int(at == 0) if column is None else places[column]), rows[1:]
 
 
 def _cell(path: str | os.PathLike, line: int, name: str, cell: str) -> float:
+    """Return the number in a cell."""
     if not cell:
         raise ScenarioError(f"{path}, line {line}: {name} is empty: fill it in, or cut the file there")
     if not _is_number(cell) or not math.isfinite(float(cell)):

@@ -19,7 +19,8 @@ from smc_mujoco.simulation.state import LOGGED
 ARRAYS = ("t", *LOGGED)
 LONGEST_FAILURE = 500  # characters; chosen
 MOST_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
-NEWER = ("force", "reaction")  # which the oldest files lack: they hold ideal runs
+NEWER = ("force", "reaction")  # arrays that the oldest files lack, as they hold ideal runs
+KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,16 +62,22 @@ class Trace:
         for name in ARRAYS:
             getattr(self, name).flags.writeable = False
 
-    def __reduce__(self):  # so that a copy is as read-only as this
-        return _trace, ({f.name: getattr(self, f.name) for f in dataclasses.fields(self)},)
+    def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
+        vars(self).update(fields)
+        self.__post_init__()
 
     def __repr__(self) -> str:
         end = "" if self.diverged_at is None else f", {self.failure}"
         return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write a .npz file that `smc.load` reads back, making folders; an old file is replaced whole or not at all."""
-        path = _suffixed(path, ".npz")
+        """Write a .npz file that `smc.load` reads back. Make folders. Replace an old file whole or not at all."""
+        path = Path(path)
+        if not path.name or "\0" in path.name:
+            raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
+        if path.suffix not in ("", ".npz"):
+            raise ScenarioError(f"cannot save to {path.name!r}: end the name in .npz")
+        path = path.with_suffix(".npz")
         about = to_json(serialise.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
         if len(about) > MOST_TEXT:
             raise ScenarioError(
@@ -83,31 +90,31 @@ class Trace:
         return path
 
     def columns(self) -> dict[str, np.ndarray]:
-        """The arrays by channel: t, x, v, ... of a single one, t, x0, x1, ..., v0, ... of several; see `units`."""
+        """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several."""
         n = self.x.shape[1]
         return {"t": self.t} | {
             f"{name}{i}" if n > 1 else name: getattr(self, name)[:, i] for name in ARRAYS[1:] for i in range(n)
         }
 
     def units(self) -> dict[str, str]:
-        """The unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, which is what the law makes of it."""
-        found, channels = {"t": "s"}, self.scenario.plant.units
-        for column in list(self.columns())[1:]:
+        """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit depends on the law."""
+        found = {}
+        for column in self.columns():
             name = column.rstrip("0123456789")
-            x = channels[int(column[len(name) :] or 0)]
-            found[column] = {"x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
+            x = self.scenario.plant.units[int(column[len(name) :] or 0)]
+            found[column] = {"t": "s", "x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
         return found
 
     def export(self, path: str | os.PathLike) -> Path:
-        """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), every number to the last bit.
+        """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), without losing a bit of any number.
 
-        CSV: a line of headers with units, "t [s]", "x [rad]", ..., then a line a sample, of the fewest digits that tell
-        a number from its neighbours (0.1, not 0.10000000000000001); nan after a failure. Parquet: the `columns` under
-        their plain names; the metadata of each has its "unit", those of the schema "scenario", as JSON. MAT: the arrays
-        by name, (K + 1, n), a struct `units` with a unit for each (a cell array where channels differ), and `scenario`.
+        CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the fewest digits that
+        identify each number (0.1, not 0.10000000000000001), and nan after a failure. Parquet: the `columns`; the
+        metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT: the arrays by name,
+        (K + 1, n), a struct `units` with the unit of each (a cell array if channels differ), and `scenario`.
 
         Raises:
-          ScenarioError: another ending.
+          ScenarioError: the name has another ending.
         """
         path = Path(path)
         if path.suffix not in _WRITERS:
@@ -141,7 +148,7 @@ def _write_parquet(trace: Trace, file: Path) -> None:
 
     about = to_json(serialise.describe(trace.scenario))
     fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in trace.units().items()]
-    with file.open("wb") as stream:  # whose errors say what is wrong as those of other files do
+    with file.open("wb") as stream:  # opened here, so that errors are those of other files
         parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
 
 
@@ -150,10 +157,10 @@ FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.exp
 
 
 def formats(listed: str) -> tuple[str, ...]:
-    """The formats of Trace.export that a list such as "csv,mat" names.
+    """Return the formats of Trace.export in a list such as "csv,mat".
 
     Raises:
-      ScenarioError: it names none, or another one.
+      ScenarioError: the list is empty, or names another format.
     """
     names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in listed.split(","))
     for name in names:
@@ -161,54 +168,53 @@ def formats(listed: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _trace(fields: dict) -> Trace:
-    return Trace(**fields)
-
-
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """The Trace of a log, (K + 1, n) LOG; `failed_step` is the physics step of a failure.
+    """Return the Trace of a log. All numbers before its end are finite: one that is not is a failure, and the end.
 
-    What it holds before its end is finite: a sample that is not is a failure, and the end.
+    Args:
+      log: (K + 1, n) LOG.
+      failed_step: physics step of the failure.
+      failure: what happened then, or None.
     """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
     end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
     arrays = {name: np.ascontiguousarray(log[name]) for name in LOGGED}
-    finite = np.array([np.all(np.isfinite(values[:end]), axis=1) for values in arrays.values()])
-    if not np.all(finite):
-        k = int(np.argmin(np.all(finite, axis=0)))
+    finite = np.array([np.isfinite(values[:end]).all(axis=1) for values in arrays.values()])
+    if not finite.all():
+        k = int(np.argmin(finite.all(axis=0)))
         name = LOGGED[int(np.argmin(finite[:, k]))]
-        failed_step, failure = k * scenario.steps, f"{name} became NaN or inf"
+        end, failed_step, failure = k, k * scenario.steps, f"{name} became NaN or inf"
     if failure is not None:
         for values in arrays.values():
-            values[math.ceil(failed_step / scenario.steps) :] = np.nan
+            values[end:] = np.nan
         diverged_at = failed_step * scenario.physics_step
         failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
 
 def load(path: str | os.PathLike) -> Trace:
-    """The trace that `Trace.save` wrote.
+    """Return the trace in a file that `Trace.save` wrote.
 
     Raises:
-      ScenarioError: no such file, or not a trace.
+      ScenarioError: there is no such file, or it is not a trace.
     """
     if isinstance(path, str | os.PathLike) and not os.path.exists(path) and os.path.exists(f"{os.fspath(path)}.npz"):
         path = f"{os.fspath(path)}.npz"
-    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+    with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
         about = from_json(str(_member(archive, "about")))
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
         older = "mechanism" not in about
     try:
         scenario = serialise.restore(about)
-    except ScenarioError as error:  # which names a cure of its own
+    except ScenarioError as error:  # names its own cure
         raise ScenarioError(f"the scenario of {path} cannot be brought back, {error}") from None
-    except Exception as error:  # of JSON that is no scenario
+    except Exception as error:  # JSON that is no scenario
         why = f"{type(error).__name__}, {error}"
         raise ScenarioError(
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
-    with reading(path, *_KIND) as file, zipfile.ZipFile(file) as archive:
+    with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
         names = [name for name in ARRAYS if not (older and name in NEWER)]
         arrays = {name: _member(archive, name, scenario) for name in names}
     arrays.setdefault("force", arrays["applied"].copy())
@@ -216,11 +222,12 @@ def load(path: str | os.PathLike) -> Trace:
     return Trace(**arrays, scenario=scenario, **end)
 
 
-_KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
-
-
 def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """An array out of a file: one that fits the scenario, or else a text. Its size is known before it is read."""
+    """Return an array of a file: one that fits the scenario, or else a text. Its size is checked before it is read.
+
+    Raises:
+      ScenarioError: it has another type or shape, or more bytes than it should.
+    """
     with archive.open(f"{name}.npy") as stream:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)
@@ -232,15 +239,6 @@ def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = Non
         raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
     with archive.open(f"{name}.npy") as stream:
         found = npy.read_array(stream, allow_pickle=False)
-        if stream.read(1):  # at its end the checksum is compared
+        if stream.read(1):  # the checksum is compared at the end
             raise ScenarioError(f"its {name} is longer than it says")
     return found
-
-
-def _suffixed(path: str | os.PathLike, suffix: str) -> Path:
-    path = Path(path)
-    if not path.name or "\0" in path.name:
-        raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
-    if path.suffix not in ("", suffix):
-        raise ScenarioError(f"cannot save to {path.name!r}: end the name in {suffix}")
-    return path.with_suffix(suffix)
