@@ -683,7 +683,7 @@ def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
     text = " ".join(
         printed(leaderboard(stand({"a": blocks(1.0, seeds=seeds), "b": blocks(2.0, seeds=seeds)}), ["itae"])).split()
     )
-    assert ("of fewer than 6 runs an interval is their range" in text) == told
+    assert ("with fewer than 6 runs an interval is their range" in text) == told
 
 
 def test_positions_that_differ_by_less_than_half_a_percent_of_x0_or_half_a_count_are_tied():
