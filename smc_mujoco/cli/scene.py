@@ -93,22 +93,26 @@ def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
 def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     """Draw the scene's figures, SVG and PNG; return the files."""
     from smc_mujoco.draw.figure import figure, signals
+    from smc_mujoco.draw.page import files
 
     if scene.figure == "signals":
-        each = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
-        return signals([t for _, t in each], out / "signals", labels=[c for c, _ in each], title=scene.title)
+        flat = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
+        path = out / "signals"
+        signals([t for _, t in flat], path, labels=[c for c, _ in flat], title=scene.title)
+        return files(path)
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        written += figure(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
+        figure(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
+        written += files(path)
     return written
 
 
 def _labels(runs: Mapping[str, Trace]) -> list[str]:
-    """Return the labels of a condition for pictures. A label that is the name of the law becomes its name in words."""
-    from smc_mujoco.draw.style import law_name
+    """Return the labels of a condition for pictures; the name of a law, surface or estimator is put in words."""
+    from smc_mujoco.draw.style import label
 
-    return [law_name(label) if label == trace.scenario.law.name else label for label, trace in runs.items()]
+    return [label(name) for name in runs]
 
 
 def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal) -> list[Path]:

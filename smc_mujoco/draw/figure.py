@@ -1,112 +1,227 @@
-"""Figures: x, u and s of several runs over time with their phase portrait; u alone under several conditions.
-
-They are written as SVG and PNG. The same traces give the same files.
-"""
+"""Figures: x, u and s of several runs over time with their phase portrait; u alone under several conditions."""
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import replacing
-from smc_mujoco.draw import panels, style
+from smc_mujoco.common.errors import ScenarioError, taken, unknown
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import panels as drawing
+from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
+from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.draw.states import HOLD
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.simulation.trace import Trace
 
-WIDTH = 12.8  # inches: 1280 px of SVG, 1920 of PNG
-DPI = 150
-HEAD = 1.2  # inches, above and below the panels
-LETTERS = 11  # points, in the legend
+OVER_TIME = {  # panel -> quantity
+    "x": "x", "error": "e", "spread": "spread", "v": "v", "u": "u", "delivered": "force", "reaction": "reaction",
+    "d": "d", "s": "s",
+}  # fmt: skip
+BESIDE = ("phase", "transient", "end")
+PANELS = (*OVER_TIME, "channels", *BESIDE)
+ROW = 1.5  # inches on a full page, height of a panel over time
+HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # of the panels beside, in proportion
 
 
 def figure(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike,
+    path: str | os.PathLike | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
-) -> list[Path]:
-    """Draw traces of one plant: x, u and s over time, the phase portrait, the last samples of u.
+    panels: Sequence[str] | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw traces of one plant: x, u and s over time, the phase portrait, close-ups of the transient and of the end.
 
-    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Joints
-    without an actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of what
-    the actuator delivers and of what friction and contacts exert; diamonds show where friction holds them. The end of
-    a failed run and the instant at which a plant changes are marked.
+    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Driven
+    joints of a model of yours have small panels, one a joint, with the reference and the error. Joints without an
+    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of what the actuator
+    delivers and of what friction and contacts exert; diamonds show where friction holds them. The end of a failed run
+    and the instant at which a plant changes are marked. Curves that coincide are dashed in turn.
 
     Args:
       traces: several, or a single one.
-      path: without an ending, or with .svg or .png: both are written.
-      labels: one a trace; default: the laws' labels.
-      title: default: the plant's name.
+      path: file to write; default: none. Without an ending, or with .svg or .png, both are written; or give .pdf.
+      labels: one a trace; default: the laws' labels, and what differs between runs of one law.
+      title: default: the plant's label.
+      panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels" (small panels
+        of every channel), "phase", "transient" (close-up of x), "end" (close-up of u). Default: those that suit the
+        plant and the size.
+      size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), or (width, height) in inches. Default: 12.8 in wide.
+      format: "svg", "png" or "pdf", of the file.
+      fig: Figure or SubFigure to draw into; default: a new one.
 
     Returns:
-      The two files.
+      The figure.
 
     Raises:
-      ScenarioError: no traces, several plants, another ending, or a path that cannot be written.
+      ScenarioError: no traces, several plants, an unknown panel, size or format, or a path that cannot be written.
     """
-    base = _base(path)
+    paths = [] if path is None else pages.files(path, format)
+    if path is None and format is not None:
+        raise ScenarioError(f"format is {format!r} without a file: give path too")
+    width, height = pages.measure(size, fig)
     traces = style.same_plant(traces)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
-    overview, rests = panels.overview(traces), [panels.rests(trace) for trace in traces]
-    with style.page():
-        realism = sum(panel.quantity in panels.REALISM for panel in overview)
-        page = _page(7.2 + 1.3 * (realism + max(0, len(overview) - realism - 4)))
-        left, right = page.add_gridspec(1, 2, width_ratios=(1.7, 1.0))
-        column, axes = left.subgridspec(len(overview), 1), []
-        words = panels.titles(overview, 72 * (page.get_figheight() - HEAD) / len(overview))
-        for i, panel in enumerate(overview):
-            ax = page.add_subplot(column[i], sharex=axes[0] if axes else None, ylabel=words[i])
-            axes.append(ax)
-            if panel.quantity == "x":
-                panels.target(ax, panel.traces)
-            panels.over_time(ax, panel, colours)
-            panels.jumps(ax, style.jumps(traces, names), named=i == 0)
-            ax.tick_params(labelbottom=i == len(overview) - 1)
-        axes[-1].set(xlabel="time (s)", xlim=(0.0, end(traces)))
-        page.align_ylabels(axes)
-        places = [panel for panel in overview if panel.quantity == "x"]
-        column = right.subgridspec(len(places) + 1, 1, height_ratios=(*[1.5] * len(places), 1.0))
-        for i, panel in enumerate(places):
-            portrait = page.add_subplot(column[i], xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
-            panels.phase(portrait, panel.traces, colours, rests)
-        first = next(panel for panel in overview if panel.quantity == "u")
-        channel = ", channel 0" if traces[0].scenario.plant.driven > 1 else ""
-        name = f"control u ({style.units(first.group)['u']}){channel}"
-        close = page.add_subplot(column[-1, 0], xlabel="time before the end (ms)", ylabel=name)
-        panels.last_samples(close, first.traces, colours)
-        _head(page, title or style.plant_name(traces[0]), _key(traces, names, colours, overview, any(rests)))
-        return _write(page, base)
+    narrow = width < pages.NARROW
+    chosen = _default(traces, width) if panels is None else taken("panels", panels)
+    for name in chosen:
+        if name not in PANELS:
+            raise unknown("panel", name, PANELS)
+    overview = _overview(traces, chosen)
+    small = _small(traces) if "channels" in chosen else []
+    beside = [name for name in chosen if name in BESIDE]
+    places = [Panel("x", *each) for each in style.split(traces).items()]
+    rests = [drawing.rests(trace) for trace in traces] if "phase" in beside else []
+    with style.page(width):
+        key = _key(traces, names, colours, [*overview, *(panel for pair in small for panel in pair)], any(rests))
+        column = [name for name in beside for _ in (places if name == "phase" else "x")]
+        row = style.points(ROW)
+        space = pages.head(width, key)
+        parts = [0.62 * len(small), len(overview), sum(HEIGHTS[name] for name in column)]
+        rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
+        page = pages.blank(width, height or max(0.5625 * width * (not narrow), space + row * rows + 0.5), fig)
+        pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
+        there = [i for i, part in enumerate(parts) if part]
+        heights = [1.0] * len(overview), [HEIGHTS[name] for name in column]
+        if narrow:  # one below the other
+            several = [parts[0]] * bool(small) + [*heights[0], *heights[1]]
+            rest = list(page.add_gridspec(len(several), 1, height_ratios=several))
+            cell = rest.pop(0) if small else None
+            cells, others = rest[: len(overview)], rest[len(overview) :]
+        else:
+            grid = page.add_gridspec(1, len(there), width_ratios=[(1.9, 1.7, 1.0)[i] for i in there])
+            cell = grid[0] if small else None
+            cells, others = (
+                list(grid[there.index(i + 1)].subgridspec(len(each), 1, height_ratios=each)) if each else []
+                for i, each in enumerate(heights)
+            )
+        changes = style.jumps(traces, names)
+        if cell is not None:
+            _draw_small(page, cell, small, colours, changes)
+        if overview:
+            _draw_over_time(page, cells, overview, drawing.titles(overview, pitch), colours, changes)
+        _draw_beside(page, others, column, places, colours, rests)
+        pages.set_head(page, width, title or style.plant_name(traces[0]), key)
+        pages.write(page, paths)
+    return page
+
+
+def _default(traces: Sequence[Trace], width: float) -> list[str]:
+    """Return the names of the panels that suit the plant and the page."""
+    several = traces[0].scenario.plant.direct and any(len(group.channels) > 1 for group in style.split(traces))
+    names = ["channels"] if several else ["x", "spread"]
+    names += ["u", "delivered", "reaction", "s"]
+    if several:
+        return [*names, "end"] if width >= style.JOURNAL else names
+    return [*names, "transient"] if width < pages.NARROW else [*names, *BESIDE]
+
+
+def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
+    """Return the panels over time, from top to bottom; of those that the plant has by default only these."""
+    by_default = drawing.overview(traces)
+    found = [panel for panel in by_default if any(OVER_TIME.get(name) == panel.quantity for name in chosen)]
+    there = {panel.quantity for panel in by_default}
+    for name in chosen:
+        if name in OVER_TIME and OVER_TIME[name] not in there and name not in ("spread", "delivered", "reaction"):
+            parts = style.split(traces).items()
+            found += [Panel(OVER_TIME[name], *each) for each in parts if each[0].driven or name in ("v", "error")]
+    return found
+
+
+def _small(traces: Sequence[Trace]) -> list[tuple[Panel, Panel]]:
+    """Return the small panels of all groups, channel by channel."""
+    pairs = [pair for group in style.split(traces) for pair in drawing.small(traces, group)]
+    return sorted(pairs, key=lambda pair: pair[0].channel or 0)
+
+
+def _draw_over_time(
+    page, cells: Sequence[SubplotSpec], overview: Sequence[Panel], words: Sequence[str], colours, changes
+) -> None:
+    """Draw panels over time in the cells of a column."""
+    axes: list[Axes] = []
+    for i, panel in enumerate(overview):
+        ax = page.add_subplot(cells[i], sharex=axes[0] if axes else None, ylabel=words[i])
+        ax.set_xlim(0.0, end(overview[0].traces))
+        axes.append(ax)
+        drawing.over_time(ax, panel, colours)
+        drawing.jumps(ax, changes, named=i == 0)
+        ax.tick_params(labelbottom=i == len(overview) - 1)
+    axes[-1].set_xlabel("time (s)")
+    page.align_ylabels(axes)
+
+
+def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
+    """Draw a row for each channel: x with its reference at the left, the error at the right."""
+    rows = cell.subgridspec(len(small), 2)
+    for i, pair in enumerate(small):
+        for k, panel in enumerate(pair):
+            ax = page.add_subplot(rows[i, k], ylabel=panel.label)
+            ax.set_xlim(0.0, end(panel.traces))
+            ax.locator_params(axis="y", nbins=3)
+            ax.locator_params(axis="x", nbins=4)
+            drawing.over_time(ax, panel, colours)
+            drawing.jumps(ax, changes, named=i == k == 0)
+            ax.tick_params(labelbottom=i == len(small) - 1)
+            if i == len(small) - 1:
+                ax.set_xlabel("time (s)")
+
+
+def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], places, colours, rests) -> None:
+    """Draw phase portraits and close-ups in the cells of a column."""
+    portraits = iter(places)
+    for i, name in enumerate(column):
+        ax = page.add_subplot(cells[i])
+        if name == "phase":
+            panel = next(portraits)
+            drawing.phase(ax, panel.traces, colours, rests)
+            ax.set(xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
+        elif name == "transient":
+            panel = drawing.transient(places[0])
+            drawing.over_time(ax, panel, colours)
+            stop = max(trace.t[-1] for trace in panel.traces) or end(panel.traces)  # of runs that fail at once
+            ax.set(xlabel="time, transient (s)", ylabel=panel.label, xlim=(0.0, stop))
+        else:
+            panel = places[0]._replace(quantity="u")
+            drawing.last_samples(ax, panel.traces, colours)
+            channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
+            ax.set(xlabel="time before the end (ms)", ylabel=f"control u ({style.units(panel.group)['u']}){channel}")
 
 
 def signals(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike,
+    path: str | os.PathLike | None,
     labels: Sequence[str],
     title: str | None = None,
-) -> list[Path]:
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
     """Draw u alone: a column for each condition, a row for each law.
 
     Args:
       labels: the condition of each trace; traces under the same condition share it.
+      path, title, size, format, fig: as of `figure`.
 
     Returns:
-      The two files.
+      The figure.
 
     Raises:
       ScenarioError: as `figure`; also two traces of one law under one condition, or u in two units.
     """
-    base = _base(path)
+    paths = [] if path is None else pages.files(path, format)
+    width, height = pages.measure(size, fig)
     traces = style.same_plant(traces)
     columns = style.labels(traces, labels)
     traces = [finite(trace) for trace in traces]
@@ -117,85 +232,66 @@ def signals(
     if others:
         raise ScenarioError(f"u of {traces[0].scenario.plant.name} has several units: draw it with smc.figure")
     laws, conditions = (list(dict.fromkeys(keys)) for keys in zip(*cells, strict=True))
-    colours = dict(zip(laws, style.law_colours(laws), strict=True))
-    with style.page():
-        page = _page(max(3.4, 1.4 + 1.5 * len(laws)))
+    of_law = {trace.scenario.law.name: trace.scenario.law for trace in traces}
+    colours = dict(zip(laws, style.law_colours([of_law[law] for law in laws]), strict=True))
+    control = Panel("u", group, style.split(traces)[group])
+    with style.page(width):
+        points, room = style.points, 72 * width / len(conditions)  # room of a column, points
+        page = pages.blank(width, height or points(max(3.4, 1.4 + 1.5 * len(laws))), fig)
         axes = page.subplots(len(laws), len(conditions), sharex=True, sharey=True, squeeze=False)
-        room = 72 * WIDTH / len(conditions)  # points, a column's width
+        axes[0, 0].set_xlim(0.0, end(traces))
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
-            panels.over_time(ax, Panel("u", group, [cut(trace, group)]), [colours[law]])
-            panels.jumps(ax, style.jumps([trace], [law]), named=law == laws[0])
-            ax.set_title(_variation(trace, group), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
-        control = Panel("u", group, style.split(traces)[group])
+            drawing.over_time(ax, Panel("u", group, [cut(trace, group)]), [colours[law]])
+            drawing.jumps(ax, style.jumps([trace], [law]), named=False)
+            if room > points(250):
+                drawing.note(ax, _variation(trace, group))
         for law, ax in zip(laws, axes[:, 0], strict=True):
             ax.set_ylabel(control.label.replace("control ", ""))
-            words = style.cropped(style.law_name(law), 0.55 * room, 11, bold=True)
+            words = style.cropped(style.law_name(of_law[law]), 0.55 * room, points(11), bold=True)
             ax.set_title(words, color=colours[law], parse_math=False)
-        for condition, top, bottom in zip(conditions, axes[0], axes[-1], strict=True):
-            words = style.cropped(condition, 0.85 * room, 13)
-            place = (0.5, 1.0), (0, 22), "axes fraction", "offset points"
-            top.annotate(words, *place, ha="center", fontsize=13, parse_math=False)
-            bottom.set_xlabel("time (s)")
-        axes[0, 0].set(xlim=(0.0, end(traces)), ylim=panels.limits(control.traces, "u"))
-        note = Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %")
-        _head(page, title or f"{style.plant_name(traces[0])}: control", [*_meaning([control]), note])
-        return _write(page, base)
-
-
-def _page(height: float) -> Figure:
-    """Return an empty page; height in inches."""
-    layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.07, wspace=0.02, hspace=0.02)
-    return Figure(figsize=(WIDTH, height), layout=layout)
-
-
-def _head(page: Figure, title: str, handles: Sequence[Line2D | Patch]) -> None:
-    """Draw the title with the legend below it: in as few rows as fit."""
-    size, room = LETTERS, 72 * WIDTH - 16  # points
-    words = [style.cropped(str(handle.get_label()), 0.45 * room, size) for handle in handles]
-    widths = [style.width(text, size) + 4.4 * size for text in words]  # with the sample, and the gap to the next
-    fitting = (n for n in range(len(words), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
-    legend = page.legend(
-        handles=handles,
-        labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
-        title=style.cropped(title, room, 17, bold=True),
-        title_fontproperties={"size": 17, "weight": "bold"},
-        alignment="left",
-        loc="outside upper left",
-        ncols=next(fitting, 1),
-        fontsize=size,
-        borderpad=0.2,
-        columnspacing=1.5,
-    )
-    legend.get_title().set_parse_math(False)
-    for shown, text in zip(legend.get_texts(), words, strict=True):
-        shown.set_text(text)
-        shown.set_parse_math(False)
+        for i, condition in enumerate(conditions):
+            changes = style.jumps([cells[key] for key in cells if key[1] == condition][:1], [condition])
+            words = ", ".join([condition, *(f"{change} at {time:g} s" for time, change in changes.items())])
+            place = (0.5, 1.0), (0, points(22)), "axes fraction", "offset points"
+            look = {"ha": "center", "fontsize": points(13), "parse_math": False}
+            axes[0, i].annotate(style.cropped(words, 0.85 * room, points(13)), *place, **look)
+            axes[-1, i].set_xlabel("time (s)")
+        axes[0, 0].set_ylim(drawing.limits(control.traces, "u"))
+        key = _meaning([control])
+        if room > points(250):
+            key.append(Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %"))
+        pages.set_head(page, width, title or f"{style.plant_name(traces[0])}: control", key)
+        pages.write(page, paths)
+    return page
 
 
 def _key(
-    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], overview: Sequence[Panel], rests: bool
-) -> list[Line2D | Patch]:
+    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], shown: Sequence[Panel], rests: bool
+) -> list[Handle]:
     """Return the entries of a legend: the traces, the reference with its band, the meaning of lines and bands."""
-    handles: list[Line2D | Patch] = []
+    handles: list[Handle] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, 0.3 * 72 * WIDTH, LETTERS) + (f" ({how})" if how else "")
-        handles.append(Line2D([], [], color=colour, lw=3, label=words))
+        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, pages.LETTERS) + (f" ({how})" if how else "")
+        handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
     if rests:
-        diamond = {"marker": "D", "ms": 5, "lw": 0, "color": style.MUTED, "mec": style.PAPER}
+        diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
-    return [*handles, Patch(color=style.BAND, label="reference ± 2 %"), *_meaning(overview)]
+    if any(panel.quantity == "x" for panel in shown):
+        look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
+        handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
+    return [*handles, *(_meaning(shown) if shown else [])]
 
 
-def _meaning(overview: Sequence[Panel]) -> list[Line2D | Patch]:
+def _meaning(shown: Sequence[Panel]) -> list[Handle]:
     """Return the entries of a legend that say what bands and lines are."""
     looks = {
         "band": Patch(color=style.MUTED, alpha=0.3),
-        "line": Line2D([], [], color=style.MUTED, lw=1.5),
-        "light": Line2D([], [], color=style.MUTED, alpha=0.5, lw=0.8),
+        "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),
+        "light": Line2D([], [], color=style.MUTED, alpha=0.5, lw=style.points(drawing.LIGHT_LINE)),
     }
-    words = panels.meaning(overview)
+    words = drawing.meaning(shown)
     for name, look in looks.items():
         look.set_label(f"{name}: {words.get(name)}")
     return [look for name, look in looks.items() if name in words]
@@ -207,25 +303,3 @@ def _variation(trace: Trace, group: Group) -> str:
         return style.ending(trace)
     rate = catalogue.tv_rate(trace)
     return f"{rate:,.{0 if rate >= 10 else 2}f} {style.units(group)['u']}/s"
-
-
-def _base(path: str | os.PathLike) -> Path:
-    """Return the path without .svg or .png; the 5 in "lam_0.5" and the "b c" in "a.b c" are no endings."""
-    base = Path(path)
-    if not base.name:
-        raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")
-    if base.suffix in (".svg", ".png"):
-        return base.with_suffix("")
-    if base.suffix[1:].isalnum() and base.suffix[1].isalpha():
-        raise ScenarioError(f"cannot draw to {base.name!r}: end the name in .svg or .png, for both are written")
-    return base
-
-
-def _write(page: Figure, base: Path) -> list[Path]:
-    written = []
-    for suffix in (".svg", ".png"):
-        written.append(base.with_name(base.name + suffix))
-        with replacing(written[-1]) as part:
-            page.savefig(part, dpi=DPI, metadata={"Date": None} if suffix == ".svg" else None)
-        page.set_layout_engine("none")  # laid out once; the second file keeps it
-    return written

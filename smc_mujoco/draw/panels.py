@@ -5,9 +5,10 @@ is the mean of the channels, and where it chatters also a mean over a window of 
 it is the range within a column of the picture, of u and s over all channels. Single channels of a network are light.
 """
 
+import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,10 +17,10 @@ from matplotlib.axes import Axes
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, stretches, window
 from smc_mujoco.draw.states import HOLD, at_rest, has_dry_friction
-from smc_mujoco.metrics.channel_groups import Group
-from smc_mujoco.metrics.conventions import BAND, scale
+from smc_mujoco.metrics.channel_groups import Group, cut
+from smc_mujoco.metrics.conventions import BAND, last_exit, scale
 from smc_mujoco.simulation.reference import LEFT_THE_WORLD
-from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 COLUMNS = 360  # of a panel
 LAST_SAMPLES = 60  # control samples in the close-up of u
@@ -28,11 +29,19 @@ MAX_LIGHT = 9  # channels of a network that are drawn one by one
 LASTING = 0.98  # quantile of |reaction| that a panel shows in full; what is larger are blows; chosen
 MAX_RESTS = 12  # marked in a phase portrait
 SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
+MAX_SMALL = 12  # channels that have small panels of their own
+LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
+COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
+DASH = 5.0  # widths of a line
+TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
-UNBANDED = ("x", "spread")  # drawn sample by sample, without a mean over time
+UNBANDED = ("x", "e", "spread")  # drawn sample by sample, without a mean over time
+
+REFERENCE = "reference"  # id of its lines
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
+    "e": lambda trace: trace.x - trace.r,
     "v": lambda trace: trace.v,
     "u": lambda trace: trace.u,
     "applied": lambda trace: trace.applied,
@@ -45,18 +54,22 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
 
 
 class Panel(NamedTuple):
-    """A quantity of a group of channels over time."""
+    """A quantity of a group of channels, or of one channel, over time."""
 
     quantity: str
     group: Group
     traces: Sequence[Trace]  # of these channels alone
+    channel: int | None = None  # of a small panel
 
     @property
     def label(self) -> str:
         """The label of the vertical axis, with its unit."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
         mean = "mean " * (len(group.channels) > 1)
-        unit = f" ({style.units(group)[{'spread': 'x', 'force': 'u', 'reaction': 'u'}.get(name, name)]})"
+        alike = {"spread": "x", "e": "x", "force": "u", "reaction": "u", "d": "u", "applied": "u"}
+        unit = f" ({style.units(group)[alike.get(name, name)]})"
+        if self.channel is not None:
+            return f"{name}{self.channel}{unit}"
         if name == "spread":
             return f"max − min x{unit}"
         if name in REALISM:
@@ -67,6 +80,7 @@ class Panel(NamedTuple):
             return f"{mean}s{unit}"  # short: there are many such panels, and they are low
         kind = {"rad": "angle", "m": "position"}[group.unit]
         kind = {"x": kind if group.driven else f"free {kind}", "v": "velocity", "u": "control", "s": "sliding variable"}
+        kind |= {"e": "error", "d": "disturbance", "applied": "control"}
         letter = name if group.driven else {"x": "q", "v": "q′"}.get(name, name)
         return f"{mean or kind[name] + ' '}{letter}{unit}"
 
@@ -85,6 +99,17 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
     for group, parts in groups.items():
         panels += [Panel("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
     return panels + [Panel("s", group, parts) for group, parts in driven.items()]
+
+
+def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, Panel]]:
+    """Return small panels of the channels of a group: of each, x with its reference, and the error."""
+    chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
+    pairs = []
+    for i in (group.channels[k] for k in chosen):
+        one = dataclasses.replace(group, channels=(i,))
+        parts = [cut(trace, one) for trace in traces]
+        pairs.append((Panel("x", one, parts, i), Panel("e", one, parts, i)))
+    return pairs
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
@@ -116,14 +141,6 @@ def titles(panels: Sequence[Panel], pitch: float) -> list[str]:
     return [text.replace(" (", "\n(") if {i - 1, i} & close else text for i, text in enumerate(words)]
 
 
-def layers(traces: Sequence[Trace], colours: Sequence[str]) -> list[tuple[Trace, str, float]]:
-    """Return the traces from bottom to top, their colours, and how much wider their lines are.
-
-    The first is on top, each one below is a little wider, so that curves which coincide are all seen.
-    """
-    return [(trace, colours[i], 0.5 * i) for i, trace in reversed(list(enumerate(traces)))]
-
-
 def curve(trace: Trace, y: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the line of a quantity y (K+1,): times in s, and values. Few samples are drawn as they are."""
     return line(trace.t, y, 0 if name in UNBANDED else window(trace)) if smoothed(trace) else (trace.t, y)
@@ -144,38 +161,83 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     return max(times, default=None)
 
 
-def over_time(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
-    """Draw the panel, set its vertical range, and return the artists of the traces."""
+def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> list[Artist]:
+    """Draw the panel, the first trace on top, set its vertical range, and return the artists of the traces.
+
+    The reference of x is drawn over them, its settling band behind. `label`: print what a clipped range leaves out.
+    """
     artists: list[Artist] = []
-    name = panel.quantity
+    name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
     ax.set_ylim(limits(panel.traces, name))
     if name == "reaction":
-        clip_blows(ax, panel)
-    for trace, colour, wider in layers(panel.traces, colours):
+        clip_blows(ax, panel, colours, label)
+    if name in ("x", "e"):
+        target(ax, panel)
+    lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
+    drawn = list(zip(panel.traces, colours, means, lines, dashes(lines, ax.get_ylim()), strict=True))
+    for trace, colour, mean, path, dash in reversed(drawn):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
-        mean = y.mean(axis=1)
-        e = columns(trace.t, mean[:, None] if name == "x" else y, COLUMNS)
+        e = columns(trace.t, mean[:, None] if name in ("x", "e") else y, COLUMNS)
         artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1:
+            look = {"color": colour, "alpha": 0.3, "lw": style.points(LIGHT_LINE), "drawstyle": steps}
             for i in light(y.shape[1]):
-                artists += ax.plot(*curve(trace, y[:, i], name), color=colour, alpha=0.3, lw=0.8, drawstyle=steps)
-        artists += ax.plot(*curve(trace, mean, name), color=colour, lw=1.5 + wider, drawstyle=steps)
+                artists += ax.plot(*curve(trace, y[:, i], name), **look)
+        artists += ax.plot(*path, color=colour, lw=style.points(LINE), drawstyle=steps, ls=dash)
         if trace.diverged_at is not None:
             last = np.clip(mean[-1], *ax.get_ylim())
-            artists += ax.plot(trace.t[-1], last, "X", color=colour, ms=9, mec="white", clip_on=False, zorder=5)
+            artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
     return artists
 
 
-def clip_blows(ax: Axes, panel: Panel) -> None:
-    """Fit the vertical range to what lasts of a reaction, and print the size of blows, which are short, beyond it."""
+def cross() -> dict[str, Any]:
+    """Return the look of the mark at the end of a failed run."""
+    return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
+
+
+def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
+    """Return a line style for each line: solid, but dashed in turn for lines that coincide, so that all are seen."""
+    near = COINCIDENT * (limits[1] - limits[0])
+    groups: list[list[int]] = []
+    for i, (t, y) in enumerate(lines):
+        for group in groups:
+            at, first = lines[group[0]]
+            if len(t) > 1 and t[-1] == at[-1] and np.abs(np.interp(at, t, y) - first).max() <= near:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    styles: list[Any] = ["-"] * len(lines)
+    for group in groups:
+        for k, i in enumerate(group if len(group) > 1 else ()):
+            styles[i] = (DASH * k, (DASH, DASH * (len(group) - 1)))
+    return styles
+
+
+def clip_blows(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> None:
+    """Fit the vertical range to what lasts of a reaction; mark blows, which are short, outside it, with their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
     lasting = [float(np.quantile(size, LASTING)) for size in sizes if size.size]
     usual = max(*lasting, *map(abs, span(panel.traces, "u")))
-    if peak > 2.0 * usual > 0.0:
-        ax.set_ylim(-1.16 * usual, 1.16 * usual)
-        words = f"blows up to {style.short(peak, 3)} {style.units(panel.group)['u']}"
-        ax.set_title(words, loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
+    if not peak > 2.0 * usual > 0.0:
+        return
+    top = 1.16 * usual
+    ax.set_ylim(-top, top)
+    for trace, colour in zip(panel.traces, colours, strict=True):
+        for side, mark in ((1, 2), (-1, 3)):  # matplotlib's ticks up and down, outside the axes
+            beyond = (np.nan_to_num(side * trace.reaction).max(axis=1) > top).astype(int)
+            starts = trace.t[np.flatnonzero(np.diff(beyond, prepend=0) > 0)]
+            look = {"marker": mark, "ls": "", "color": colour, "ms": style.points(5), "mew": style.points(1.2)}
+            ax.plot(starts, np.full(len(starts), side * top), clip_on=False, in_layout=False, **look)
+    if label:
+        words = f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['u']}"
+        note(ax, words)
+
+
+def note(ax: Axes, words: str) -> None:
+    """Print words above the right end of the axes."""
+    ax.set_title(words, loc="right", fontweight="normal", fontsize=style.points(9.5), color=style.MUTED)
 
 
 def rests(trace: Trace) -> list[int]:
@@ -188,52 +250,71 @@ def rests(trace: Trace) -> list[int]:
     return long[-MAX_RESTS:]
 
 
-def target(ax: Axes, traces: Sequence[Trace]) -> None:
-    """Draw each reference to the end of the longest run that has it, and the settling band around it."""
-    for trace in {trace.scenario.reference: trace for trace in sorted(traces, key=lambda trace: len(trace.t))}.values():
-        if np.isfinite(trace.r).all():
-            (t, r), half = line(trace.t, trace.r[:, 0], 2), BAND * scale(trace)
+def target(ax: Axes, panel: Panel) -> None:
+    """Draw each reference (of an error: zero) over the curves, as long as a run has it, and its settling band."""
+    several = sorted(panel.traces, key=lambda trace: len(trace.t))
+    for trace in {trace.scenario.reference: trace for trace in several}.values():
+        known = np.isfinite(trace.r[:, 0])
+        r = trace.r[known, 0] if panel.quantity == "x" else np.zeros(known.sum())
+        if known.any():
+            (t, r), half = line(trace.t[known], r, 2), BAND * scale(trace)
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
-            ax.plot(t, r, color=style.MUTED, lw=0.9, ls=(0, (5, 3)), zorder=1.5)
+            ax.plot(t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
 
 
 def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
-    """Mark when plants change, time in s -> words; with the words if `named`."""
-    for time, words in changes.items():
-        ax.axvline(time, color=style.INK, lw=0.9, ls=(0, (2, 2)), zorder=1.5)
-        if named:
-            ax.annotate(
-                words,
-                (time, 1.0),
-                (4, -3),
-                ("data", "axes fraction"),
-                "offset points",
-                va="top",
-                fontsize=9,
-                bbox={"facecolor": style.PAPER, "alpha": 0.8, "pad": 1, "lw": 0},
-                parse_math=False,
-                zorder=4,
-            )
+    """Mark when plants change, time in s -> words; with the words above the axes if `named`."""
+    last, size = ax.get_xlim()[1], style.points(9)
+    room = ax.get_window_extent().width * 72 / ax.get_figure(root=True).dpi  # points
+    ends: list[float] = []  # of the words in each row above the axes, in points
+    for time, change in sorted(changes.items()):
+        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=(0, (2, 2)), zorder=1.5)
+        if not named:
+            continue
+        words = style.cropped(change, room, size)
+        width, at = style.width(words, size), room * time / last
+        begin = min(at, room - width)
+        row = next((row for row, end in enumerate(ends) if end < begin), len(ends))
+        ends[row:] = [begin + width + size]
+        place = (begin - at, 2 + 1.2 * size * row)
+        look = {"va": "bottom", "fontsize": size, "parse_math": False}
+        ax.annotate(words, (time, 1.0), place, ("data", "axes fraction"), "offset points", **look)
 
 
 def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Sequence[Sequence[int]]) -> None:
     """Draw v over x: a ring at the start of each trace, a diamond at each sample in `held`, where friction holds it."""
-    for (trace, colour, wider), samples in zip(layers(traces, colours), reversed(held), strict=True):
-        x, v = QUANTITIES["x"](trace), QUANTITIES["v"](trace)
-        if x.shape[1] > 1:
-            for i in light(x.shape[1]):
-                ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=0.7)
+    for trace, colour, samples in reversed(list(zip(traces, colours, held, strict=True))):
+        x, v = trace.x, trace.v
+        for i in light(x.shape[1]) if x.shape[1] > 1 else ():
+            ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=style.points(LIGHT_LINE))
         x, v = x.mean(axis=1), v.mean(axis=1)
-        ax.plot(*thinned(x, v), color=colour, lw=1.4 + wider)
-        ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=6, zorder=4)
+        ax.plot(*thinned(x, v), color=colour, lw=style.points(LINE))
+        ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         for sample in samples:
-            ax.plot(x[sample], 0.0, "D", color=colour, ms=5.5, mec=style.PAPER, zorder=4)
+            ax.plot(x[sample], 0.0, "D", color=colour, ms=style.points(5.5), mec=style.PAPER, zorder=4)
         if trace.diverged_at is not None:
-            ax.plot(x[-1], v[-1], "X", color=colour, ms=9, mec="white", zorder=5)
-    ax.axhline(0.0, color=style.RULE, lw=0.9, zorder=1)
-    ax.axvline(0.0, color=style.RULE, lw=0.9, zorder=1)
+            ax.plot(x[-1], v[-1], "X", color=colour, zorder=5, **cross())
+    ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
+    ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     ax.set_xlim(limits(traces, "x"))
     ax.set_ylim(limits(traces, "v"))
+
+
+def transient(panel: Panel) -> Panel:
+    """Return the panel cut to the transient: until the last run that settles has settled, and a little longer."""
+    whole = end(panel.traces)
+    times = []
+    for trace in panel.traces:
+        error = np.abs(trace.x - trace.r).max(axis=1)
+        settled = last_exit(trace.t, error, BAND * scale(trace)) if np.isfinite(error).all() else np.inf
+        times += [settled] if np.isfinite(settled) and trace.diverged_at is None else []
+    shortest, longest = (part * whole for part in TRANSIENT)
+    until = min(max(1.3 * max(times), shortest), longest) if times else 0.5 * longest
+    cut = []
+    for trace in panel.traces:
+        count = max(2, int(np.searchsorted(trace.t, until + 1e-9)))
+        cut.append(dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ARRAYS}))
+    return panel._replace(traces=cut)
 
 
 def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
@@ -241,9 +322,10 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> N
     period = max(trace.scenario.control_period for trace in traces)
     stop = end(traces)
     begin = max(0.0, stop - LAST_SAMPLES * period)
-    for trace, colour, wider in layers(traces, colours):
+    for trace, colour in reversed(list(zip(traces, colours, strict=True))):
         part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
-        ax.step(1e3 * (trace.t[part] - stop), trace.u[part, 0], where="post", color=colour, lw=1.2 + wider)
+        t = 1e3 * (trace.t[part] - stop)
+        ax.step(t, trace.u[part, 0], where="post", color=colour, lw=style.points(LINE))
     if all(trace.diverged_at is not None for trace in traces):
         ax.text(0.5, 0.5, "no run lasted", transform=ax.transAxes, ha="center", color=style.MUTED)
     ax.set_xlim(1e3 * (begin - stop), 0.0)
@@ -279,7 +361,12 @@ def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
 
 
 def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the vertical range for a quantity: its span with some margin."""
+    """Return the vertical range for a quantity: its span with the reference, of an error zero, and some margin."""
     low, high = span(traces, name)
+    if name == "x":
+        r = np.concatenate([trace.r[np.isfinite(trace.r)] for trace in traces])
+        low, high = min(low, r.min(initial=low)), max(high, r.max(initial=high))
+    if name == "e":
+        low, high = min(low, 0.0), max(high, 0.0)
     air = 0.08 * (high - low) or 1.0
     return low - air, high + air

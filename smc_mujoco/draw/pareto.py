@@ -9,38 +9,49 @@ was tried lies below the staircase. The chosen gains have the least objective, s
 import itertools
 import os
 from collections.abc import Sequence
-from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.tuning.result import Tuned, compare
-from smc_mujoco.draw import figure, style
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
 
-HEIGHT = 6.4  # inches
+HEIGHT = 6.4  # inches on a full page
 MIN_VARIATION = 1e-6  # 1/s: none has no place on a logarithmic axis
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
-CHOSEN = {"ms": 11, "mew": 2.0, "mfc": "none", "lw": 0}
+CHOSEN = {"mfc": "none", "lw": 0}
 
 
-def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None = None) -> list[Path]:
+def pareto(
+    tunings: Sequence[Tuned],
+    path: str | os.PathLike | None = None,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
     """Draw the fronts of tunings of one plant that have the same objective, budget and seed.
 
     Args:
-      path: as of `figure`.
+      path, size, format, fig: as of `figure`.
       title: default: names the plant.
 
     Returns:
-      The two files.
+      The figure.
 
     Raises:
-      ScenarioError: no tunings, tunings that cannot be compared, another ending, or a path that cannot be written.
+      ScenarioError: no tunings, tunings that cannot be compared, or as `figure`.
     """
-    base, best = figure._base(path), compare(tunings)
-    with style.page():
-        page = figure._page(HEIGHT)
+    paths, best = [] if path is None else pages.files(path, format), compare(tunings)
+    width, height = pages.measure(size, fig)
+    with style.page(width):
+        page = pages.blank(width, height or style.points(HEIGHT), fig)
         ax = page.subplots()
-        looks = zip(best, itertools.cycle(MARKS), style.law_colours([one.law.name for one in best]), strict=False)
+        looks = zip(best, itertools.cycle(MARKS), style.law_colours([one.law for one in best]), strict=False)
         handles = [_front(ax, *look) for look in looks]
         ax.set(xscale="log", yscale="log")
         ax.set_xlabel("tracking: ITAE / |x₀|, summed over conditions (s²)")
@@ -48,27 +59,32 @@ def pareto(tunings: Sequence[Tuned], path: str | os.PathLike, title: str | None 
         ax.tick_params(which="both", length=0)
         ax.margins(0.04, 0.06)
         if ax.get_ylim()[1] > 0.1 * (limit := _most(best[0])):
-            ax.axhline(limit, color=style.RULE, lw=1.0, ls=(0, (4, 3)))
-            handles.append(
-                Line2D([], [], color=style.RULE, ls=(0, (4, 3)), label="from bound to bound at every sample")
-            )
-        handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **CHOSEN))
-        figure._head(page, title or f"{best[0].plant.name}: tracking against variation", handles)
-        return figure._write(page, base)
+            dashed = {"color": style.RULE, "lw": style.points(1.0), "ls": (0, (4, 3))}
+            ax.axhline(limit, **dashed)
+            handles.append(Line2D([], [], **dashed, label="from bound to bound at every sample"))
+        handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **_ring()))
+        pages.set_head(page, width, title or f"{best[0].plant.name}: tracking against variation", handles)
+        pages.write(page, paths)
+    return page
+
+
+def _ring() -> dict[str, Any]:
+    """Return the size of the mark of chosen gains."""
+    return CHOSEN | {"ms": style.points(11), "mew": style.points(2.0)}
 
 
 def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     """Draw a law's front with its chosen gains, and return its entry in the legend."""
-    words = style.law_name(tuned.law.name)
+    words = style.law_name(tuned.law)
     if not tuned.front:
-        return Line2D([], [], color=colour, lw=3, label=f"{words}: every run failed")
+        return Line2D([], [], color=colour, lw=style.points(3), label=f"{words}: every run failed")
     x = [one.tracking for one in tuned.front]
     y = [max(one.variation, MIN_VARIATION) for one in tuned.front]
-    ax.step(x, y, where="post", color=colour, marker=mark, ms=4.5, mec="none", alpha=0.9)
+    ax.step(x, y, where="post", color=colour, marker=mark, ms=style.points(4.5), mec="none", alpha=0.9)
     chosen = min(tuned.finals, key=lambda one: one.objective)
-    ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **CHOSEN)
+    ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **_ring())
     label = f"{words}: J = {tuned.objective:.3g} s²"
-    return Line2D([], [], color=colour, lw=3, marker=mark, ms=7, mec="none", label=label)
+    return Line2D([], [], color=colour, lw=style.points(3), marker=mark, ms=style.points(7), mec="none", label=label)
 
 
 def _most(tuned: Tuned) -> float:

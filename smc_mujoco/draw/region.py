@@ -3,46 +3,59 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import replacing
+from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
 
-ENDINGS = (".png", ".svg")
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
 # From soon to late, then undecided, then not: different in lightness alone, so also with colour blindness and in grey.
 # Blue and orange are those of Okabe and Ito.
 BLUES, OPEN, NOT = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
+PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
 def checked(path: str | os.PathLike) -> Path:
     """Return the path, if its ending is that of a picture."""
     path = Path(path)
-    if path.suffix not in ENDINGS or "\0" in path.name:
-        raise ScenarioError(f"cannot draw to {str(path)!r}: end the name in {' or '.join(ENDINGS)}")
+    if path.suffix[1:] not in pages.FORMATS or "\0" in path.name:
+        raise ScenarioError(f"cannot draw to {str(path)!r}: end the name in .{', .'.join(pages.FORMATS)}")
     return path
 
 
-def draw(maps: Sequence[Basin], path: str | os.PathLike) -> Path:
-    """Draw maps side by side, to a .png or .svg file.
+def draw(
+    maps: Sequence[Basin],
+    path: str | os.PathLike | None = None,
+    size: Size = None,
+    fig: "Figure | SubFigure | None" = None,
+) -> "Figure | SubFigure":
+    """Draw maps side by side, to the file `path`, if there is one; `size` and `fig` as of `figure`.
 
     Raises:
-      ScenarioError: another kind of file, or no maps.
+      ScenarioError: another kind of file, no maps, or an unknown size.
     """
-    from matplotlib.figure import Figure
-
-    path = checked(path)
+    paths = [] if path is None else [checked(path)]
     if not maps:
         raise ScenarioError("no map to draw: give at least one")
-    with style.page():
-        figure = Figure(figsize=(5.4 * len(maps), 5.3), layout="constrained")
-        for ax, region in zip(np.atleast_1d(figure.subplots(1, len(maps))), maps, strict=True):
+    width, height = (PANEL[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)
+    with style.page(style.FULL_PAGE if size is None and fig is None else width):
+        across = max(1, min(len(maps), int(width / style.points(3.2)))) if size is not None else len(maps)
+        down = -(-len(maps) // across)
+        page = pages.blank(width, height or (PANEL[1] if size is None else down * width / across * 1.08), fig)
+        axes = page.subplots(down, across, squeeze=False).ravel()
+        for ax, region in zip(axes, maps, strict=False):
             fill(ax, region)
-        with replacing(path) as file:
-            figure.savefig(file, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
-    return path
+        for ax in axes[len(maps) :]:
+            ax.remove()
+        pages.write(page, paths)
+    return page
 
 
 def fill(ax, region: Basin) -> None:
@@ -51,14 +64,16 @@ def fill(ax, region: Basin) -> None:
     from matplotlib.patches import Patch
 
     classes, entries = classed(region)
-    ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap([*BLUES, OPEN, NOT]), vmin=-0.5, vmax=4.5)
-    ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=11, markeredgewidth=1.6)
+    ax.pcolormesh(
+        region.x, region.v, classes, cmap=ListedColormap([*BLUES, OPEN, NOT]), vmin=-0.5, vmax=4.5, rasterized=True
+    )
+    ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
     ax.set_title(f"{style.law_name(region.law)} on {region.plant.replace('_', ' ')}")
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [Patch(facecolor=colour, edgecolor=style.RULE, label=words) for colour, words in entries]
-    ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=9.5)
+    ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
 
 
 def classed(region: Basin) -> tuple[np.ndarray, list[tuple[str, str]]]:

@@ -5,18 +5,25 @@ Universal Design, 2008), which colour-blind readers can tell apart. A law has th
 """
 
 import colorsys
+import dataclasses
 import functools
 import itertools
+import math
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from smc_mujoco.common.errors import ScenarioError, shown, taken
+from smc_mujoco.control import estimator as estimators
+from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.trace import Trace
 
 # Colours of laws that state none. Chosen from a grid as the farthest in CIEDE2000 from the stated ones, from each other
@@ -28,7 +35,20 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
+CHROMA = 0.12  # stronger colours differ by hue and lightness alone, see `distance`; chosen
+ALIKE = 0.10  # closer colours look alike beside each other, see `distance`; chosen
+OKLAB_CONES = np.array([
+    [0.4122214708, 0.5363325363, 0.0514459929],
+    [0.2119034982, 0.6806995451, 0.1073969566],
+    [0.0883024619, 0.2817188376, 0.6299787005],
+])  # fmt: skip
+OKLAB = np.array([
+    [0.2104542553, 0.7936177850, -0.0040720468],
+    [1.9779984951, -2.4285922050, 0.4505937099],
+    [0.0259040371, 0.7827717662, -0.8086757660],
+])  # fmt: skip
 
+FULL_PAGE, JOURNAL = 12.8, 10.0  # inches: 1280 px of SVG, 1920 of PNG; narrower pages have smaller letters
 RC = {
     "font.family": "DejaVu Sans",
     "font.size": 10.5,
@@ -51,20 +71,34 @@ RC = {
     "xtick.labelsize": 9.5,
     "ytick.labelsize": 9.5,
     "legend.frameon": False,
-    "lines.linewidth": 1.7,
+    "lines.linewidth": 1.5,
+    "lines.markersize": 6.0,
     "lines.solid_capstyle": "round",
     "figure.facecolor": PAPER,
     "savefig.facecolor": PAPER,
     "svg.fonttype": "path",
+    "pdf.fonttype": 42,  # TrueType, as journals ask for
     "svg.hashsalt": "smc_mujoco",  # the same traces give the same file
 }
 
 
-def page():
-    """Return a context in which matplotlib draws in this style."""
+def page(width: float = FULL_PAGE):
+    """Return a context in which matplotlib draws in this style, on a page of that width in inches.
+
+    Letters and lines are those of RC on a full page, and of 8 points on journal pages and columns.
+    """
     from matplotlib import rc_context
 
-    return rc_context(RC)  # pyright: ignore[reportArgumentType]
+    scale = 1.0 if width >= JOURNAL else 8.0 / RC["font.size"]
+    keys = ("size", "linewidth", "markersize")
+    return rc_context({key: value * scale if key.endswith(keys) else value for key, value in RC.items()})  # pyright: ignore[reportArgumentType]
+
+
+def points(size: float) -> float:
+    """Return the size in points, on this page, of what has `size` points on a full page."""
+    from matplotlib import rcParams
+
+    return size * rcParams["font.size"] / RC["font.size"]
 
 
 def law_colour(law: Component | str) -> str:
@@ -74,25 +108,73 @@ def law_colour(law: Component | str) -> str:
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
-    """Return one colour a law for one picture: its own, or another if an earlier law has that."""
+    """Return one colour a law for one picture, all different.
+
+    Laws that state a colour have it. The others have theirs of OTHERS, or, if that looks like one already in the
+    picture, such as a second green, the colour that is farthest from all of them.
+    """
     wanted = [law_colour(law) for law in laws]
-    free = (colour for colour in _palette() if colour not in wanted)
-    return [next(free) if colour in wanted[:i] else colour for i, colour in enumerate(wanted)]
+    stated = [bool((template := _template(law)[0]) and template.colour) for law in laws]
+    colours, used = [""] * len(laws), set()
+    for i in sorted(range(len(laws)), key=lambda i: not stated[i]):
+        clear = all(distance(wanted[i], other) > ALIKE for other in used)
+        colours[i] = wanted[i] if wanted[i] not in used and (stated[i] or clear) else _free(used)
+        used.add(colours[i])
+    return colours
 
 
-def _palette() -> Iterator[str]:
-    """Yield OTHERS, then the colours of the library's laws, then colours without end that differ in hue."""
-    yield from OTHERS
-    yield from dict.fromkeys(template.colour for template in catalogue().values() if template.colour)
-    for k in itertools.count():
-        hue, lightness = k * 0.618 % 1.0, (0.45, 0.3, 0.6)[k % 3]
-        yield "#" + "".join(f"{round(255 * part):02X}" for part in colorsys.hls_to_rgb(hue, lightness, 0.6))
+def _free(used: set[str]) -> str:
+    """Return the colour farthest from those in use and from what else is drawn: of the laws', else of a grid."""
+    stated = [template.colour for template in catalogue().values() if template.colour]
+
+    def apart(colour: str) -> float:
+        return min(distance(colour, other) for other in (*used, PAPER, DISTURBANCE, REACTION, FAILED))
+
+    for colours in (OTHERS, stated):
+        best = max(colours, key=apart)
+        if apart(best) > ALIKE:
+            return best
+    return max((colour for colour in _grid(len(used)) if colour not in used), key=apart)
+
+
+@functools.cache
+def _grid(count: int) -> tuple[str, ...]:
+    """Return a grid of colours that are neither pale nor dull, at least twice as many as `count`."""
+    hues = max(24, -(-count // 2))
+    parts = itertools.product(range(hues), (0.26, 0.4, 0.52), (0.45, 0.7))
+    colours = (
+        "#" + "".join(f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation))
+        for k, lightness, saturation in parts
+    )
+    return tuple(colour for colour in colours if _lab(colour)[0] < 0.75)
+
+
+@functools.cache
+def _lab(colour: str) -> tuple[float, float, float]:
+    """Return lightness, green-red and blue-yellow of a colour in OKLab (B. Ottosson, 2020), strong colours dampened."""
+    c = np.array(rgb(colour)) / 255
+    cones = OKLAB_CONES @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    lightness, a, b = (OKLAB @ np.cbrt(cones)).tolist()
+    damp = min(1.0, CHROMA / math.hypot(a, b)) if a or b else 1.0
+    return lightness, damp * a, damp * b
+
+
+def distance(one: str, other: str) -> float:
+    """Return how far two colours are apart in OKLab; hue counts most, so that two greens are close."""
+    (l1, a1, b1), (l2, a2, b2) = _lab(one), _lab(other)
+    return math.hypot((l1 - l2) / 3, a1 - a2, b1 - b2)
 
 
 def law_name(law: Component | str) -> str:
     """Return a law's label: its own, or its name in words. A user's law keeps the user's name."""
     template, name = _template(law)
     return (template and template.label) or (in_words(name) if name in catalogue() else name)
+
+
+def label(name: str) -> str:
+    """Return the label of a law, surface or estimator of the library, for its name; other words as they are."""
+    known = {**surfaces.catalogue(), **estimators.catalogue()}
+    return law_name(name) if name in catalogue() else in_words(name) if name in known else name
 
 
 def law_initials(law: str) -> str:
@@ -114,7 +196,9 @@ def in_words(name: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """Return one label a trace: the given ones, else the laws' labels, numbered if a law occurs more than once.
+    """Return one label a trace: the given ones, else the laws' labels, with what differs between runs of one law.
+
+    Runs of one law that differ in nothing are numbered.
 
     Raises:
       ScenarioError: the number of labels is not that of the traces.
@@ -124,7 +208,45 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
         return [str(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
+    alike = [[trace for trace, other in zip(traces, names, strict=True) if other == name] for name in names]
+    words = [differences(trace, others) for trace, others in zip(traces, alike, strict=True)]
+    names = [f"{name}: {what}" if what else name for name, what in zip(names, words, strict=True)]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
+
+
+def differences(trace: Trace, others: Sequence[Trace]) -> str:
+    """Return what a run has that others of its law have not, such as "k1 = 6, no noise"; "" if they are the same."""
+    words = []
+    tables = [_settings(other) for other in others]
+    for name, value in _settings(trace).items():
+        if any(table.get(name) != value for table in tables):
+            words.append(_setting(name, value))
+    return ", ".join(words)
+
+
+def _settings(trace: Trace) -> Mapping[str, object]:
+    """Return the gains of a run and the fields of its scenario."""
+    scenario = trace.scenario
+    fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
+    del fields["law"], fields["plant"]
+    return dict(scenario.law.gains) | fields
+
+
+def _setting(name: str, value: object) -> str:
+    """Return a gain or a field of a scenario in words."""
+    words = name.replace("_", " ")
+    if isinstance(value, Jump):
+        return f"jump at {value.time:g} s"
+    if value is None or value is False or (isinstance(value, tuple) and not value):
+        return f"no {words}"
+    if value is True:
+        return words
+    if isinstance(value, int | float):
+        return f"{words} = {value:.3g}"
+    if isinstance(value, tuple) and all(isinstance(each, int | float) for each in value):
+        same = len(set(value)) == 1
+        return f"{words} = {short(value[0], 3) if same else ', '.join(short(each, 3) for each in value)}"
+    return f"{words} {value}"
 
 
 def ending(trace: Trace) -> str:

@@ -42,7 +42,8 @@ def _shown(what: str, make: Callable[[], Path]) -> str:
 def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
     from smc_mujoco.draw.figure import figure
 
-    return next(file for file in figure(traces, path, title=title) if file.suffix == ".png")
+    figure(traces, path, title=title)
+    return path
 
 
 def _film(traces: Sequence[Trace], path: Path) -> Path:

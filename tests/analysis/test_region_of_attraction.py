@@ -199,12 +199,13 @@ def test_what_is_no_map_is_refused(text, tmp_path):
 
 
 def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
-    assert region.draw([weak, weak], tmp_path / "map.png").stat().st_size > 10_000
+    region.draw([weak, weak], tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 10_000
     classes, entries = region.classed(weak)
     assert np.array_equal(classes == 4, weak.outcome == DOES_NOT)
     assert sum(float(words.split(": ")[1].rstrip(" %")) for _, words in entries) == pytest.approx(100, abs=1)
     with pytest.raises(smc.ScenarioError, match=r"end the name in .png or .svg"):
-        region.draw([weak], tmp_path / "map.pdf")
+        region.draw([weak], tmp_path / "map.gif")
 
 
 @pytest.mark.parametrize("points", [(1, 5), (5, 0), (5, 2.5)])

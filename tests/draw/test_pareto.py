@@ -12,8 +12,9 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.search import tune
-from smc_mujoco.draw import figure
-from smc_mujoco.draw.pareto import MIN_VARIATION, pareto
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import pareto as drawing
+from smc_mujoco.draw.pareto import MIN_VARIATION
 
 LEAN = Objective(conditions=("nominal",), duration=0.5)
 
@@ -23,12 +24,18 @@ def pair() -> list[Tuned]:
     return [tune("duffing", law, budget=24, objective=LEAN) for law in ("observer_free", "classical")]
 
 
+def pareto(tunings, path) -> list:
+    """The files that a figure is written to."""
+    drawing.pareto(tunings, path)
+    return pages.files(path)
+
+
 @pytest.fixture
 def page(monkeypatch) -> list[Figure]:
     """The pages that are drawn."""
-    pages, write = [], figure._write
-    monkeypatch.setattr(figure, "_write", lambda page, base: (pages.append(page), write(page, base))[1])
-    return pages
+    drawn, write = [], pages.write
+    monkeypatch.setattr(pages, "write", lambda page, paths: (drawn.append(page), write(page, paths))[1])
+    return drawn
 
 
 def test_writes_svg_and_png_that_name_the_laws_what_they_cost_and_the_axes(pair, tmp_path):
@@ -85,5 +92,5 @@ def test_unfair_comparisons_and_no_tunings_are_refused(pair, tmp_path):
         with pytest.raises(smc.ScenarioError):
             pareto(unlike, tmp_path / "fronts")
     with pytest.raises(smc.ScenarioError, match="svg"):
-        pareto(pair, tmp_path / "fronts.pdf")
+        pareto(pair, tmp_path / "fronts.gif")
     assert list(tmp_path.iterdir()) == []

@@ -73,9 +73,11 @@ def tune(
     if path:
         terminal.wrote(tuned.save(path))
     if front:
+        from smc_mujoco.draw.page import files
         from smc_mujoco.draw.pareto import pareto
 
-        terminal.wrote(*pareto([tuned], front))
+        pareto([tuned], front)
+        terminal.wrote(*files(front))
 
 
 @errors_as_sentences()
@@ -194,4 +196,5 @@ def basin(
     if json:
         terminal.wrote(found.save(json))
     if out:
-        terminal.wrote(region.draw([found], out))
+        region.draw([found], out)
+        terminal.wrote(out)

@@ -77,8 +77,10 @@ def show(
     written = [loaded.export(file) for file in files]
     if figure:
         from smc_mujoco.draw.figure import figure as draw
+        from smc_mujoco.draw.page import files as drawn
 
-        written += draw([loaded], figure)
+        draw([loaded], figure)
+        written += drawn(figure)
     s = loaded.scenario
     terminal.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
     _print_curves(loaded, terminal)

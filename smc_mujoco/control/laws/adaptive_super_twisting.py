@@ -15,6 +15,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
 
 
 @law_function(
+    label="Adaptive super-twisting",
     gains={
         "rate": Gain(2.0, Unit(force=1, position=-0.5, time=-0.5), positive=True),  # of K, a force per root
         "eps": Gain(0.5, Unit(position=0.5, time=-1.5), positive=True),

@@ -15,7 +15,11 @@ from smc_mujoco.control.law import command, input_gain, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)}, memory=3)
+@law_function(
+    label="Discrete-time",
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+    memory=3,
+)
 def discrete_time(y, gains, memory):
     s, eq = sliding(y, gains.c)
     d = (s - memory[0]) / y.dt - memory[1] if memory[2] != 0.0 else 0.0

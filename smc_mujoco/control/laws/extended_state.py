@@ -24,6 +24,7 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 
 @law_function(
+    label="Extended-state",
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
         "c": Gain(2.5, RATE, nonnegative=True),

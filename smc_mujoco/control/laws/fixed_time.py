@@ -15,6 +15,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
 
 
 @law_function(
+    label="Fixed-time",
     gains={
         "k1": Gain(2.0, force_per("a"), nonnegative=True),
         "k2": Gain(2.0, force_per("b"), nonnegative=True),

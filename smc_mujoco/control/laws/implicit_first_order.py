@@ -14,7 +14,10 @@ from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
-@law_function(gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)})
+@law_function(
+    label="Implicit first-order",
+    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
+)
 def implicit_first_order(y, gains, memory):
     s, eq = sliding(y, gains.c)
     return command(y, eq - min(max(s / y.dt, -gains.k), gains.k)), s

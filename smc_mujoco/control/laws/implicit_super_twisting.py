@@ -18,6 +18,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 
 
 @law_function(
+    label="Implicit super-twisting",
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
         "k2": Gain(4.4, FORCE_RATE, positive=True),

@@ -16,7 +16,10 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
 @law_function(
-    gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)}, memory=1, relative_degree=3
+    label="Nested third-order",
+    gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)},
+    memory=1,
+    relative_degree=3,
 )
 def nested_third_order(y, gains, memory):
     q1, q2 = y.de / gains.w, (y.a - y.ddr) / gains.w**2

@@ -22,6 +22,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 
 
 @law_function(
+    label="Observer-free, adaptive",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),
         "k1": Gain(2.5, RATE),

@@ -47,6 +47,7 @@ def saturated(n):
 
 
 @law_function(
+    label="Observer-free, Q15",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),
         "k1": Gain(2.5, RATE),

@@ -16,6 +16,7 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 
 
 @law_function(
+    label="Observer-free, third order",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),
         "k1": Gain(6.25, RATE2, positive=True),

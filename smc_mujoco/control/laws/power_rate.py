@@ -13,6 +13,7 @@ from smc_mujoco.control.units import RATE, Gain, force_per
 
 
 @law_function(
+    label="Power-rate",
     gains={
         "k": Gain(6.0, force_per("a"), nonnegative=True),
         "a": Gain(0.5, positive=True, held=True),

@@ -16,6 +16,7 @@ from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
 
 
 @law_function(
+    label="Prescribed-time",
     gains={
         "T": Gain(2.0, TIME, positive=True),
         "m": Gain(2.0, INERTIA, nonnegative=True),  # m s / (T - t) is a force

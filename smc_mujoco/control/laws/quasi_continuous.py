@@ -23,6 +23,7 @@ def brakes(gains):
 
 
 @law_function(
+    label="Quasi-continuous",
     gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, PARABOLA, positive=True)},
     memory=1,
     relative_degree=2,

@@ -54,8 +54,8 @@ class Charts:
                 ax.set_xlim(0.0, self.end)
                 ax.set_xlabel("time (s)", labelpad=2)
                 ax.tick_params(length=0)
-                panels.jumps(ax, style.jumps(traces, names), named=ax is axes[0])
-                artists += panels.over_time(ax, panel, colours)
+                panels.jumps(ax, style.jumps(traces, names), named=False)
+                artists += panels.over_time(ax, panel, colours, label=False)
             self.full = picture(canvas)
             for artist in artists:
                 artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))
@@ -99,7 +99,7 @@ def set_titles(ax: Axes, panel: Panel, point: float) -> None:
     while style.width(", ".join(words), 9.5 * point) > room:
         words.pop()
     ax.set_title(panel.label)
-    ax.set_title(", ".join(words), loc="right", fontweight="normal", fontsize=9.5, color=style.MUTED)
+    panels.note(ax, ", ".join(words))
 
 
 def picture(canvas: FigureCanvasAgg) -> np.ndarray:

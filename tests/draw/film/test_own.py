@@ -35,7 +35,8 @@ def test_a_foreign_model_has_its_picture(tmp_path, name, channels):
     traces = smc.run(runs)
     still = smc.still(traces, 0.1, tmp_path / "a.png", size=(640, 360))
     assert np.asarray(Image.open(still))[60:200].std() > 5.0
-    assert all(path.stat().st_size for path in smc.figure(traces, tmp_path / "a.svg"))
+    smc.figure(traces, tmp_path / "a.svg")
+    assert all((tmp_path / name).stat().st_size for name in ("a.svg", "a.png"))
 
 
 def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture():

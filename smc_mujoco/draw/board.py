@@ -1,0 +1,138 @@
+"""Boards: the medians of a study's laws with their intervals, as dots, by condition."""
+
+import itertools
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
+from smc_mujoco.analysis.paired_runs import SETTLES, Columns, values
+from smc_mujoco.common.errors import ScenarioError, taken, unknown
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import panels as drawing
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Handle, Size
+from smc_mujoco.draw.pareto import MARKS
+from smc_mujoco.mechanisms.plant import catalogue as plants_catalogue
+from smc_mujoco.metrics.catalogue import CATALOGUE
+
+METRICS = ("settling_time", "ultimate_bound", "tv_rate")
+LINE = 0.18  # inches on a full page, height of a law's line
+
+
+def plot(
+    table: Columns,
+    path: str | os.PathLike | None = None,
+    metrics: Sequence[str] = METRICS,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by condition.
+
+    A column a metric, a row of panels a plant. A dot at the right edge, under "never", is a law whose median run does
+    not settle or fails.
+
+    Args:
+      table: a study's runs, as `smc.Table.read` returns them.
+      metrics: names of metrics, or "settles": the share of runs that settle.
+      path, title, size, format, fig: as of `figure`.
+
+    Returns:
+      The figure.
+
+    Raises:
+      ScenarioError: no runs, an unknown metric, or as `figure`.
+    """
+    paths = [] if path is None else pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    names = taken("metrics", metrics)
+    for name in names:
+        if name != SETTLES and name not in CATALOGUE:
+            raise unknown("metric", name, [SETTLES, *CATALOGUE])
+    plants, laws, conditions = (list(dict.fromkeys(table.column(c).tolist())) for c in ("plant", "law", "condition"))
+    if not plants or not names:
+        raise ScenarioError("no runs or no metrics to draw: give a table with rows, and at least one metric")
+    colours = dict(zip(laws, style.law_colours(laws), strict=True))
+    marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
+    with style.page(width):
+        key: list[Handle] = []
+        for law in laws:
+            look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
+            key.append(Line2D([], [], color=colours[law], label=style.law_name(law), **look))
+        key.append(Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median"))
+        tall = [0.5 + LINE * (len(laws) + 1) * len(_there(table, plant, conditions)) for plant in plants]
+        space = pages.head(width, key) + style.points(0.6)
+        page = pages.blank(width, height or space + style.points(sum(tall)), fig)
+        axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
+        for i, plant in enumerate(plants):
+            for k, name in enumerate(names):
+                _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
+                axes[i, k].tick_params(labelleft=k == 0)
+            axes[i, 0].set_title(style.in_words(plant))
+        pages.set_head(page, width, title or "Medians over seeds, by condition", key)
+        pages.write(page, paths)
+    return page
+
+
+def _there(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
+    """Return the conditions in which a plant ran, in order."""
+    ran = set(table.column("condition")[table.column("plant") == plant].tolist())
+    return [condition for condition in conditions if condition in ran]
+
+
+def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, colours, marks) -> None:
+    """Draw a metric of one plant: a block of lines a condition, in each a dot a law."""
+    column, found = values(table, metric), {}
+    of_plant, of_law, of_condition = (table.column(name) for name in ("plant", "law", "condition"))
+    there = _there(table, plant, conditions)
+    for j, condition in enumerate(there):
+        for k, law in enumerate(laws):
+            here = column[(of_plant == plant) & (of_law == law) & (of_condition == condition)]
+            here = here[~np.isnan(here)]
+            if len(here) and metric == SETTLES:
+                found[law, j * (len(laws) + 1) + k] = share_interval(float((here == 0.0).mean()), len(here))
+            elif len(here):
+                found[law, j * (len(laws) + 1) + k] = median_interval(here)
+    sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
+    if metric != SETTLES and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
+        ax.set_xscale("log")
+    for (law, line), one in found.items():
+        _dot(ax, one, line, {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"})
+    for j in range(1, len(there)):
+        ax.axhline(j * (len(laws) + 1) - 1, color=style.RULE, lw=style.points(0.8))
+    middles = [j * (len(laws) + 1) + (len(laws) - 1) / 2 for j in range(len(there))]
+    ax.set_yticks(middles, [name.replace("_", " ") for name in there])
+    ax.set_ylim(len(there) * (len(laws) + 1) - 1, -1)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel(_label(metric, plant))
+
+
+def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
+    """Draw a median with its interval; one that is infinite stands at the right edge, under "never"."""
+    never = {"transform": ax.get_yaxis_transform(), "clip_on": False}
+    if np.isfinite(one.median):
+        ax.plot(one.median, line, **look)
+    else:
+        ax.plot(1.0, line, **look | {"mfc": style.PAPER, "mec": look["color"]}, **never)
+        drawing.note(ax, "never")
+    if np.isfinite(one.low) and np.isfinite(one.high):
+        ax.plot([one.low, one.high], [line, line], color=look["color"], lw=style.points(1.5))
+    elif np.isfinite(one.low):  # reaches to "never"
+        look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
+        ax.annotate("", (1.0, line), (one.low, line), ("axes fraction", "data"), "data", arrowprops=look)
+
+
+def _label(metric: str, plant: str) -> str:
+    """Return a metric's label with its unit on a plant."""
+    if metric == SETTLES:
+        return "share of runs that settle"
+    known = plants_catalogue().get(plant)
+    unit = CATALOGUE[metric].unit_for(known.unit).replace("^2", "²").replace(" ", "·") if known else ""
+    return CATALOGUE[metric].label + (f" ({unit})" if unit not in ("", "1") else "")

@@ -1,0 +1,143 @@
+"""A page of figures: its size, title, legend and files.
+
+A figure is made anew, or drawn into a matplotlib Figure or SubFigure of the caller's, as wide as a page of this package
+(12.8 in), an IEEE page or column, or any size in inches.
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.files import replacing
+from smc_mujoco.draw import style
+
+DPI = 150
+FORMATS = ("svg", "png", "pdf")
+WIDTHS = {"ieee-column": 3.5, "ieee-page": 7.16}  # inches
+SIDES = (2.0, 100.0)  # inches, shortest and longest
+NARROW = 6.0  # inches: narrower pages have one column of panels
+LETTERS, TITLE = 11.0, 17.0  # points on a full page
+Handle = Line2D | Patch
+Size = str | tuple[float, float] | None
+
+
+def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:
+    """Return the width and height of a figure in inches; None for a height that depends on its contents.
+
+    Raises:
+      ScenarioError: another name, other numbers, or a size for a figure that has one.
+    """
+    if fig is not None:
+        if size is not None:
+            raise ScenarioError(f"size is {shown(size)}, and fig has one already: give one of the two")
+        box = fig.bbox.transformed(fig.dpi_scale_trans.inverted())
+        return box.width, box.height
+    if size is None:
+        return style.FULL_PAGE, None
+    if isinstance(size, str):
+        if size not in WIDTHS:
+            raise unknown("size", size, WIDTHS)
+        return WIDTHS[size], None
+    try:
+        width, height = (float(side) for side in size)
+    except (TypeError, ValueError):
+        width = height = 0.0
+    if not all(SIDES[0] <= side <= SIDES[1] for side in (width, height)):
+        raise ScenarioError(f"size is {shown(size)}: give (width, height) in inches, each {SIDES[0]:g} to {SIDES[1]:g}")
+    return width, height
+
+
+def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
+    """Return a page to draw on, of that size in inches: `fig`, with a layout that keeps text apart, or a new one."""
+    layout = ConstrainedLayoutEngine(
+        w_pad=style.points(7.2) / 72, h_pad=style.points(5.0) / 72, wspace=0.02, hspace=0.02
+    )
+    if fig is None:
+        return Figure(figsize=(width, height), layout=layout)
+    if isinstance(fig, Figure) and fig.get_layout_engine() is None:
+        fig.set_layout_engine(layout)
+    return fig
+
+
+def columns(handles: Sequence[Handle], width: float) -> int:
+    """Return the number of columns of a legend on a page of `width` inches: as many as fit."""
+    room, size = 72 * width - 16, style.points(LETTERS)
+    widths = [style.width(text, size) + 4.4 * size for text in _cropped(handles, width)]  # with sample and gap
+    fitting = (n for n in range(len(widths), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
+    return next(fitting, 1)
+
+
+def head(width: float, handles: Sequence[Handle]) -> float:
+    """Return the height of the title and the legend, in inches."""
+    rows = -(-len(handles) // columns(handles, width))
+    return style.points(1.9 * TITLE + 1.45 * LETTERS * rows) / 72
+
+
+def _cropped(handles: Sequence[Handle], width: float) -> list[str]:
+    """Return the labels of a legend, as much of each as fits."""
+    size = style.points(LETTERS)
+    share = 0.45 if width >= NARROW else 0.95
+    return [style.cropped(str(handle.get_label()), share * 72 * width - 4.4 * size, size) for handle in handles]
+
+
+def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle]) -> None:
+    """Draw the title with the legend below it: in as few rows as fit."""
+    size, big, words = style.points(LETTERS), style.points(TITLE), _cropped(handles, width)
+    legend = page.legend(
+        handles=handles,
+        labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
+        title=style.cropped(title, 72 * width - 16, big, bold=True),
+        title_fontproperties={"size": big, "weight": "bold"},
+        alignment="left",
+        loc="outside upper left",
+        ncols=columns(handles, width),
+        fontsize=size,
+        borderpad=0.2,
+        columnspacing=1.5,
+    )
+    legend.get_title().set_parse_math(False)
+    for label, text in zip(legend.get_texts(), words, strict=True):
+        label.set_text(text)
+        label.set_parse_math(False)
+
+
+def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:
+    """Return the files that a figure is written to: as its ending says, SVG and PNG for .svg, .png or none.
+
+    What follows the point in "lam_0.5" or "a.b c" is no ending.
+
+    Raises:
+      ScenarioError: no name, another format, or an ending that is not that of the format.
+    """
+    base = Path(path)
+    if not base.name or "\0" in base.name:
+        raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")
+    if format is not None and format not in FORMATS:
+        raise unknown("format", format, FORMATS)
+    ending = base.suffix[1:]
+    if ending in FORMATS:
+        base = base.with_suffix("")
+    elif ending.isalnum() and ending[0].isalpha():
+        raise ScenarioError(f"cannot draw to {base.name!r}: end the name in .svg, .png or .pdf")
+    if format is not None and ending in FORMATS and ending != format:
+        raise ScenarioError(f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}")
+    several = ("pdf",) if ending == "pdf" else ("svg", "png")
+    return [base.with_name(f"{base.name}.{one}") for one in ((format,) if format else several)]
+
+
+def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
+    """Write a figure to files of these names. The same figure gives the same files."""
+    whole = page.get_figure(root=True)
+    dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": None}, whole.get_layout_engine()
+    for path in paths:
+        with replacing(path) as part:
+            whole.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=dates[path.suffix])
+        whole.set_layout_engine("none")  # laid out once; the other files keep it
+    whole.set_layout_engine(layout)

@@ -1,0 +1,280 @@
+"""Looks of figures, measured: words apart and inside, one width of line, no colour twice, no clipped reference."""
+
+import dataclasses
+import itertools
+
+import matplotlib.text
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+import smc_mujoco as smc
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.figure import figure, signals
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.trace import ARRAYS
+
+PAGE, COLUMN = "ieee-page", "ieee-column"
+TEN = ("observer_free", "classical", "adaptive", "super_twisting", "boundary_layer", "fixed_time", "integral", "pid")
+TEN += ("twisting", "terminal")
+
+
+@pytest.fixture(scope="module")
+def one() -> smc.Trace:
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=1.5, reference=smc.Step(0.5, time=0.3))
+    return smc.run(scenario)
+
+
+def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
+    """The trace as if another law had made it, a little otherwise."""
+    scenario = dataclasses.replace(trace.scenario, law=smc.law(law))
+    return dataclasses.replace(trace, scenario=scenario, x=trace.r + factor * (trace.x - trace.r), v=factor * trace.v)
+
+
+def ten(trace: smc.Trace) -> list[smc.Trace]:
+    return [under(trace, law, 1.0 - 0.05 * k) for k, law in enumerate(TEN)]
+
+
+def failed(trace: smc.Trace, at: int) -> smc.Trace:
+    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
+    for array in arrays.values():
+        array[at:] = np.nan
+    sentence = f"{reference.LEFT_THE_WORLD}, at t = {trace.t[at]:g} s"
+    return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure=sentence)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory) -> list[smc.Trace]:
+    """Seven joints under two laws."""
+    link = '<body pos="0 0 .2"><joint name="j{}" axis="0 1 0"/><geom size=".03" mass=".3" contype="0"/>'
+    bodies = "".join(link.format(i) for i in range(7)) + "</body>" * 7
+    motors = "".join(f'<motor joint="j{i}"/>' for i in range(7))
+    path = tmp_path_factory.mktemp("arm") / "arm.xml"
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>")
+    plant = smc.plant_from(path, [f"j{i}" for i in range(7)])
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3)))
+    return [trace, under(trace, "super_twisting", 0.8)]
+
+
+def texts(page) -> list[matplotlib.text.Text]:
+    """The words on a page that are seen, but for the numbers of a hidden axis."""
+    page.draw_without_rendering()
+    found = [text for text in page.findobj(matplotlib.text.Text) if text.get_visible() and text.get_text().strip()]
+    hidden = set()
+    for ax in page.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
+                out = not low - 1e-12 <= tick.get_loc() <= high + 1e-12
+                hidden |= {id(label) for label in (tick.label1, tick.label2) if out or not label.get_visible()}
+    return [text for text in found if id(text) not in hidden]
+
+
+def check(page) -> None:
+    """No two words overlap, and all are on the page."""
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts(page)]
+    assert len(boxes) > 5
+    for text, box in boxes:
+        assert box.x0 >= -1 and box.y0 >= -1, text  # noqa: PT018
+        assert box.x1 <= page.bbox.x1 + 1 and box.y1 <= page.bbox.y1 + 1, text  # noqa: PT018
+    for (a, one), (b, other) in itertools.combinations(boxes, 2):
+        apart = max(one.x0 - other.x1, other.x0 - one.x1, one.y0 - other.y1, other.y0 - one.y1)
+        assert apart > -1.5, (a, b)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [
+        ("one", None), ("four", COLUMN), ("ten", PAGE), ("ten", COLUMN), ("failed", PAGE), ("jump", COLUMN),
+        ("jump", PAGE), ("short", None), ("arm", None), ("arm", PAGE), ("arm", COLUMN),
+    ],
+)  # fmt: skip
+def test_words_are_apart_and_on_the_page(kind, size, one, arm):
+    jumps = [dataclasses.replace(one.scenario, jump=smc.Jump(at, {"mass": 2.0})) for at in (0.5, 0.6)]
+    traces = {
+        "one": [one],
+        "four": ten(one)[:4],
+        "ten": ten(one),
+        "failed": [one, failed(under(one, "pid", 0.5), 400), failed(under(one, "adaptive", 0.5), 1)],
+        "jump": [dataclasses.replace(one, scenario=jump) for jump in jumps],
+        "short": [dataclasses.replace(one, **{name: getattr(one, name)[:20] for name in ARRAYS})],
+        "arm": arm,
+    }[kind]
+    page = figure(traces, size=size)
+    assert page.get_figwidth() == (12.8 if size is None else pages.WIDTHS[size])
+    check(page)
+
+
+def test_words_of_signals_are_apart(one):
+    several = ten(one)[:2]
+    check(signals([*several, *several], None, ["calm", "calm", "noisy", "noisy"], size=PAGE))
+
+
+def curves(ax) -> list:
+    """The lines of traces, but for single channels of several."""
+    return [line for line in ax.lines if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()]
+
+
+def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
+    for ax in figure(ten(one)).axes:
+        lines = curves(ax)
+        assert len(lines) == 10
+        assert len({line.get_linewidth() for line in lines}) == 1
+        assert len({to_hex(line.get_color()) for line in lines}) == 10
+
+
+def test_ten_laws_have_colours_that_do_not_look_alike():
+    for laws in (TEN, ("super_twisting", "computed_torque"), smc.laws()[:10], smc.laws()[-10:]):
+        colours = style.law_colours(laws)
+        unstated = [c for c, law in zip(colours, laws, strict=True) if style.law_colour(law) in style.OTHERS]
+        for colour in unstated:
+            assert all(style.distance(colour, other) > 0.07 for other in colours if other != colour)
+
+
+def test_no_two_greens():
+    """computed_torque's own green is dark, super_twisting's is bright."""
+    assert style.law_colours(["computed_torque"]) == ["#005A3C"]
+    twisting, torque = style.law_colours(["super_twisting", "computed_torque"])
+    assert twisting == "#009E73"
+    assert torque != "#005A3C"
+    assert style.distance(twisting, torque) > style.ALIKE
+
+
+def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
+    far = dataclasses.replace(one, r=one.r + 100.0)
+    page = figure([far, under(one, "pid", 0.9)], size=COLUMN, panels=["x", "error", "channels", "transient"])
+    drawn = [(ax, line) for ax in page.axes for line in ax.lines if line.get_gid() == panels.REFERENCE]
+    assert drawn
+    for ax, line in drawn:
+        low, high = ax.get_ylim()
+        assert low < line.get_ydata().min() <= line.get_ydata().max() < high
+        assert line.get_zorder() > max(curve.get_zorder() for curve in curves(ax))
+
+
+def test_runs_of_one_law_are_told_apart_by_what_differs(one):
+    scenario = one.scenario
+    slow = dataclasses.replace(one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=2.0)))
+    fast = dataclasses.replace(one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0)))
+    other = under(one, "pid", 0.5)
+    assert style.labels([slow, fast, other], None) == ["Classical: c = 2", "Classical: c = 5", "PID"]
+    noisy = dataclasses.replace(slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005))
+    assert style.labels([slow, noisy], None) == ["Classical: input delay = 0", "Classical: input delay = 0.005"]
+    assert style.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
+
+
+def test_labels_of_laws_are_written_one_way():
+    assert [style.label(name) for name in ("super_twisting", "fixed_time", "my own")] == [
+        "Super-twisting",
+        "Fixed-time",
+        "my own",
+    ]
+    assert not [name for name in map(style.law_name, smc.laws()) if "_" in name]
+
+
+def test_curves_that_coincide_are_all_seen(one):
+    same = [one, under(one, "pid", 1.0), under(one, "adaptive", 0.3)]
+    ax = figure(same, panels=["x"]).axes[0]
+    adaptive, pid, classical = curves(ax)  # the first is on top
+    assert adaptive.get_linestyle() == "-"
+    assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
+    assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
+
+
+def test_each_joint_of_an_arm_has_its_reference_and_its_error(arm):
+    page = figure(arm)
+    labels = [ax.get_ylabel() for ax in page.axes]
+    assert labels[:4] == ["x0 (rad)", "e0 (rad)", "x1 (rad)", "e1 (rad)"]
+    assert "x6 (rad)" in labels
+    assert not [label for label in labels if "mean x" in label]
+    x, e = page.axes[:2]
+    np.testing.assert_allclose(curves(e)[-1].get_ydata(), (arm[0].x - arm[0].r)[:, 0])
+    assert [line.get_gid() for line in x.lines].count(panels.REFERENCE) == 1
+    mean = [ax.get_ylabel() for ax in figure(arm, panels=["x", "spread", "phase"]).axes]
+    assert mean == ["mean x (rad)", "max − min x (rad)", "mean v (rad/s)"]
+
+
+def test_blows_and_jumps_do_not_cover_curves(one):
+    jump = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0})))
+    page = figure([jump])
+    page.draw_without_rendering()
+    (words,) = [text for ax in page.axes for text in ax.texts if "mass" in text.get_text()]
+    assert words.get_window_extent().y0 >= page.axes[0].get_window_extent().y1 - 1
+    hit = dataclasses.replace(one, reaction=np.where(np.arange(len(one.t)) == 700, 500.0, 0.0)[:, None])
+    (ax,) = figure([hit], panels=["reaction"]).axes
+    assert ax.get_title(loc="right") == "|reaction| up to 500 N"
+    (mark,) = [line for line in ax.lines if line.get_marker() == 2]
+    assert mark.get_xdata().tolist() == [one.t[700]]
+    assert mark.get_ydata().tolist() == [ax.get_ylim()[1]]
+
+
+def test_the_close_up_of_the_transient_ends_soon_after_it(one):
+    panel = panels.Panel("x", next(iter(style.split([one]))), [one])
+    until = panels.transient(panel).traces[0].t[-1]
+    assert 0.0 < until <= 0.4 * one.t[-1] + 1e-9
+
+
+def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):
+    page = figure(one, size=(5.0, 4.0))
+    assert isinstance(page, Figure)
+    assert tuple(page.get_size_inches()) == (5.0, 4.0)
+    figure(one, tmp_path / "a", format="pdf", size="ieee-column")
+    figure(one, tmp_path / "b.pdf")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.pdf", "b.pdf"}
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    mine = Figure(figsize=(9.0, 6.0))
+    assert figure(one, fig=mine) is mine
+    left, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(1, 2, squeeze=False)[0]
+    assert figure(one, fig=left) is left
+    assert len(right.axes) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"size": "ieee-colum"}, "unknown size 'ieee-colum': did you mean 'ieee-column'"),
+        ({"size": (5.0,)}, "give \\(width, height\\) in inches"),
+        ({"size": (5.0, 0.1)}, "each 2 to 100"),
+        ({"size": (5.0, 4.0), "fig": Figure()}, "give one of the two"),
+        ({"panels": ["x", "phases"]}, "unknown panel 'phases': did you mean 'phase'"),
+        ({"format": "pdf"}, "give path too"),
+        ({"format": "gif", "path": "a"}, "unknown format 'gif'"),
+        ({"format": "pdf", "path": "a.svg"}, "end the name in .pdf"),
+    ],
+)
+def test_bad_arguments_are_refused(options, sentence, one):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        figure(one, **options)
+
+
+class Rows:
+    """A table of made-up runs."""
+
+    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6):
+        cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
+        self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
+
+    def column(self, name):
+        n = len(self.rows)
+        empty = {"failure": np.full(n, None, object), "diverged_at": np.full(n, np.nan)}
+        if name in empty:
+            return empty[name]
+        if name in ("plant", "condition", "law", "seed"):
+            return np.array([row[("plant", "condition", "law", "seed").index(name)] for row in self.rows], object)
+        never = [name == "settling_time" and row[2] == "pid" for row in self.rows]
+        return np.where(never, np.inf, [row[4] for row in self.rows])
+
+
+@pytest.mark.parametrize("size", [None, "ieee-page"])
+def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
+    page = smc.plot(Rows(), size=size, metrics=["settling_time", "tv_rate", "settles"])
+    check(page)
+    assert len(page.axes) == 6
+    assert [label.get_text() for label in page.axes[0].get_yticklabels()] == ["nominal", "noise"]
+    dots = [line for line in page.axes[1].lines if line.get_marker() not in ("None", None)]
+    assert len(dots) == 6
+    assert len({to_hex(dot.get_color()) for dot in dots}) == 3
+    assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
+    with pytest.raises(smc.ScenarioError, match="unknown metric 'itea': did you mean 'itae'"):
+        smc.plot(Rows(), metrics=["itea"])
