@@ -97,15 +97,15 @@ def figure(
         heights = [1.0] * len(overview), [HEIGHTS[name] for name in column]
         if narrow:  # one below the other
             several = [parts[0]] * bool(small) + [*heights[0], *heights[1]]
-            rest = list(page.add_gridspec(len(several), 1, height_ratios=several))
+            grid = page.add_gridspec(len(several), 1, height_ratios=several)
+            rest = [grid[i] for i in range(len(several))]
             cell = rest.pop(0) if small else None
             cells, others = rest[: len(overview)], rest[len(overview) :]
         else:
             grid = page.add_gridspec(1, len(there), width_ratios=[(1.9, 1.7, 1.0)[i] for i in there])
             cell = grid[0] if small else None
             cells, others = (
-                list(grid[there.index(i + 1)].subgridspec(len(each), 1, height_ratios=each)) if each else []
-                for i, each in enumerate(heights)
+                [] if not each else _column(grid[there.index(i + 1)], each) for i, each in enumerate(heights)
             )
         changes = style.jumps(traces, names)
         if cell is not None:
@@ -116,6 +116,12 @@ def figure(
         pages.set_head(page, width, title or style.plant_name(traces[0]), key)
         pages.write(page, paths)
     return page
+
+
+def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
+    """Return cells one below the other, their heights in proportion."""
+    grid = cell.subgridspec(len(heights), 1, height_ratios=heights)
+    return [grid[i] for i in range(len(heights))]
 
 
 def _default(traces: Sequence[Trace], width: float) -> list[str]:

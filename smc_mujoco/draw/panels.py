@@ -265,7 +265,7 @@ def target(ax: Axes, panel: Panel) -> None:
 def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
     """Mark when plants change, time in s -> words; with the words above the axes if `named`."""
     last, size = ax.get_xlim()[1], style.points(9)
-    room = ax.get_window_extent().width * 72 / ax.get_figure(root=True).dpi  # points
+    room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
         ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=(0, (2, 2)), zorder=1.5)
