@@ -26,7 +26,7 @@ def checked(path: str | os.PathLike) -> Path:
     """Return the path, if its ending is that of a picture."""
     path = Path(path)
     if path.suffix[1:] not in pages.FORMATS or "\0" in path.name:
-        raise ScenarioError(f"cannot draw to {str(path)!r}: end the name in .{', .'.join(pages.FORMATS)}")
+        raise ScenarioError(f"cannot draw to {str(path)!r}: end the name in .svg, .png or .pdf")
     return path
 
 

@@ -204,7 +204,7 @@ def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
     classes, entries = region.classed(weak)
     assert np.array_equal(classes == 4, weak.outcome == DOES_NOT)
     assert sum(float(words.split(": ")[1].rstrip(" %")) for _, words in entries) == pytest.approx(100, abs=1)
-    with pytest.raises(smc.ScenarioError, match=r"end the name in .png or .svg"):
+    with pytest.raises(smc.ScenarioError, match=r"end the name in .svg, .png or .pdf"):
         region.draw([weak], tmp_path / "map.gif")
 
 
