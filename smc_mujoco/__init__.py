@@ -10,6 +10,7 @@
 package costs nothing.
 """
 
+import functools
 import importlib
 import re
 from pathlib import Path
@@ -38,13 +39,18 @@ def __getattr__(name: str) -> object:
         return _SPEC
     if name not in _HOMES and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = _load(name)  # also where the import of an old module has taken the name, see `moved`
+    return value
+
+
+@functools.cache
+def _load(name: str) -> object:
+    """Return a public function, class or module; always the same one."""
     with held_back():
         if name in _MODULES:
-            value = importlib.import_module(_MODULES[name])
-        else:
-            value = getattr(importlib.import_module(_HOMES[name]), name)
-            value = importlib.import_module("smc_mujoco.common.arguments").explained(value)
-    return globals().setdefault(name, value)
+            return importlib.import_module(_MODULES[name])
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+        return importlib.import_module("smc_mujoco.common.arguments").explained(value)
 
 
 def __dir__() -> list[str]:
