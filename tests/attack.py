@@ -97,9 +97,9 @@ def sound(trace: smc.Trace) -> None:
         raise Found(f"diverged_at {trace.diverged_at}, failure {trace.failure}")
     if trace.diverged_at is not None and trace.failure is not None:
         sentence(trace.failure)
-        step = round(trace.diverged_at / scenario.physics_step)
+        step = round(trace.diverged_at / scenario.resolved.physics_step)
         end = -(-step // scenario.steps)
-        if not math.isclose(trace.diverged_at, step * scenario.physics_step, abs_tol=1e-12):
+        if not math.isclose(trace.diverged_at, step * scenario.resolved.physics_step, abs_tol=1e-12):
             raise Found(f"ends between steps, at {trace.diverged_at!r}")
         if not 0 <= step <= scenario.samples * scenario.steps:
             raise Found(f"ends outside the run, at step {step}")
@@ -114,9 +114,9 @@ def sound(trace: smc.Trace) -> None:
         if not np.isfinite(array[:end]).all() or not np.isnan(array[end:]).all():
             raise Found(f"{name} is not finite up to sample {end} and NaN from there: {array[:, 0].tolist()}")
     for name in ("u", "applied"):
-        if not np.all(np.abs(getattr(trace, name)[:end]) <= scenario.u_max):
+        if not np.all(np.abs(getattr(trace, name)[:end]) <= scenario.resolved.u_max):
             raise Found(f"{name} beyond u_max")
-    if end and (tuple(trace.x[0]) != scenario.x0 or tuple(trace.v[0]) != scenario.v0):
+    if end and (tuple(trace.x[0]) != scenario.resolved.x0 or tuple(trace.v[0]) != scenario.resolved.v0):
         raise Found("does not begin at its start")
 
 

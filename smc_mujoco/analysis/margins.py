@@ -183,7 +183,7 @@ def _critical_delay(base: Scenario) -> float | None:
 
 
 def _at_rest(base: Scenario) -> float | None:
-    most = TOLERATED_ERROR * (max(map(abs, base.x0)) or 1.0)
+    most = TOLERATED_ERROR * (max(map(abs, base.resolved.x0)) or 1.0)
     return theory.tolerated_force(base.plant, base.law, most, min(base.limits))
 
 
@@ -305,7 +305,7 @@ def margins(
         for law in listed("laws", laws)
     ]
     for base in bases:
-        if not any(base.x0):
+        if not any(base.resolved.x0):
             cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
             raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {cure}")
     return of(bases, [kinds] if isinstance(kinds, str) else kinds, COARSE if quick else FINE, threads, report)

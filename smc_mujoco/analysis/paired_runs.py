@@ -216,7 +216,7 @@ def floor(scenario: Scenario | None, unit: str) -> float:
     if scenario is None:
         return 0.0
     driven = [group for group in channel_groups(scenario.plant) if group.driven]
-    x0 = max(abs(scenario.x0[i]) for group in driven for i in group.channels)
+    x0 = max(abs(scenario.resolved.x0[i]) for group in driven for i in group.channels)
     limit = max(scenario.limits)
     scale = {"{x}": x0, "{u}": limit, "{u}/s": limit, "%": 100.0}.get(unit, 0.0)
     counts = [scenario.sensor.quantum(group.unit == "rad") for group in driven] if scenario.sensor else []

@@ -36,7 +36,7 @@ def finite(trace: Trace) -> Trace:
     count = int(np.argmax(bad))
     part = {name: getattr(trace, name)[: max(1, count)] for name in ARRAYS}
     if count == 0:
-        part |= {"x": np.array([trace.scenario.x0]), "v": np.array([trace.scenario.v0])}
+        part |= {"x": np.array([trace.scenario.resolved.x0]), "v": np.array([trace.scenario.resolved.v0])}
     return dataclasses.replace(trace, **part)
 
 

@@ -143,7 +143,7 @@ class Live:
         """Simulate the time that is due, at most MAX_FRAME. A run that is over restarts, a failed one is paused."""
         if self.loop.failure or self.step > self.loop.total:
             self.begin(self.loop.scenario)
-        loop, h = self.loop, self.loop.scenario.physics_step
+        loop, h = self.loop, self.loop.scenario.resolved.physics_step
         self.due += min(seconds, MAX_FRAME)
         until, self.late = time.perf_counter() + MAX_FRAME, seconds > MAX_FRAME
         with installed(loop.control), np.errstate(all="ignore"):

@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.envs.tasks import TASKS, Pair, reward, starts, tasks
-from smc_mujoco.mechanisms.custom.channels import within
+from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.plant import Plant, ready
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -24,7 +24,7 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.reference import Failure, evaluate
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Resolved, Scenario
 
 FIELDS = (  # of a Scenario, that an environment accepts
     "duration", "control_period", "physics_step", "integrator", "u_max", "x0", "v0", "reference", "mismatch",
@@ -74,7 +74,7 @@ class Setting:
         if task not in known:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
-        self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
+        self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, which actions are multiplied by")
         fixed = np.array(self.scenario.x0)
@@ -137,9 +137,9 @@ class Setting:
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
-            state = np.array(coerce.state(name, value, self.scenario.plant.n))
+            state = np.array(coerce.per_channel(name, value, self.scenario.plant.n))
             if name == "x0":
-                within(self.scenario.plant.name, self.scenario.plant.ranges, state)
+                check_ranges(self.scenario.plant.name, self.scenario.plant.ranges, state)
             x, v = (state, v) if name == "x0" else (x, state)
         return x, v
 
@@ -231,7 +231,7 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
     return np.array(rotors, int).reshape(-1, 3).T
 
 
-def _references(scenario: Scenario, samples: int) -> np.ndarray:
+def _references(scenario: Resolved, samples: int) -> np.ndarray:
     """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
     times = np.arange(samples) * scenario.control_period
     try:
@@ -244,7 +244,7 @@ def _references(scenario: Scenario, samples: int) -> np.ndarray:
     return references
 
 
-def _compiled(scenario: Scenario, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
+def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
     """Return the model of a scenario, with its mechanism edited."""
     spec = assembly.spec([scenario])
     edit(spec)

@@ -14,7 +14,7 @@ from smc_mujoco.simulation import callback, controller, reference, state
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.trace import Trace, from_log
 
 # isort: split
@@ -32,7 +32,8 @@ class Chunk:
     """Scenarios of one layout in one Batch; to be made and run while the callback is installed."""
 
     def __init__(self, prepared: Sequence[Prepared], threads: int):
-        self.scenarios = scenarios = [one.scenario for one in prepared]
+        self.given = [one.scenario for one in prepared]
+        self.scenarios = scenarios = [one.resolved for one in self.given]
         first, count = scenarios[0], len(scenarios)
         self.compiled = assembly.model(scenarios, nuserdata=callback.USERDATA)
         self.model = assembly.numbered(self.compiled, first)
@@ -135,7 +136,7 @@ class Chunk:
         reason = None if failure == state.FINE else self.reason(i, failure)
         if reason is None and (self.model.npair or scenario.plant.direct) and self.overflowed(i):
             reason, step = OVERFLOWED, 0
-        return from_log(scenario, self.logs[i], step, reason)
+        return from_log(self.given[i], self.logs[i], step, reason)
 
     def overflowed(self, i: int) -> bool:
         """Whether MuJoCo left out contacts of simulation i because its memory for them was full."""
@@ -165,7 +166,7 @@ class Chunk:
         }[failure]
 
 
-def call_again(s: Scenario, record: np.ndarray, packed: Packed) -> str | None:
+def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     """Return why a simulation failed, in the words of Python, which compiled functions lack.
 
     The function that failed is called once more, in Python, with what its record still holds, so the words depend on

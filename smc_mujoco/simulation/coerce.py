@@ -1,180 +1,180 @@
-"""What users give for a scenario's fields, made into what the fields hold, or refused in one sentence."""
+"""Converters from what users give for a scenario's fields to what the fields hold.
 
-import functools
-import math
-from collections.abc import Iterable, Mapping
+Each raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown
-from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.estimator import estimator
-from smc_mujoco.control.law import law
-from smc_mujoco.control.surface import surface
+from smc_mujoco.control.estimator import Estimator, estimator
+from smc_mujoco.control.law import Law
+from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.surface import Surface
+from smc_mujoco.control.surface import surface as find_surface
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.perturbations import Noise, parameter_factors
 from smc_mujoco.simulation.signals import Signal
 
 P = TypeVar("P", bound=Part)
+T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
-LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-REALISTIC_STEP = (
-    2.5e-4  # s; what halving it changes is studied in tests/simulation/test_convergence.py and told in docs/design.md
-)
-U_MAX = 6.0  # N or N m; the study's
-FAR = 1e6  # initial states beyond this have already diverged
+MAX_POSITION = 1e6  # rad or m, also of rates: a run that starts beyond has already diverged
 
 
-class FilledVelocity(Component):
-    """An estimator that was left out; dataclasses.replace finds it anew."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Component) and vars(self) == vars(other)
-
-    def __hash__(self) -> int:
-        return Component.__hash__(self)
-
-    def __reduce__(self):
-        return filled_velocity, (self.name,)
+def plant(value: Plant | str) -> Plant:
+    """Return a plant, from itself or its name."""
+    made = find_plant(value) if isinstance(value, str) else value
+    if not isinstance(made, Plant):
+        raise ScenarioError(f"plant is {shown(made)}: give smc.plant(...) or one of the names smc.plants() lists")
+    return made
 
 
-class FilledStart(tuple):
-    """An x0 that was left out; dataclasses.replace finds it anew."""
+def law(value: Law | Template | str) -> Law:
+    """Return a law, from itself, its template or its name."""
+    return component("law", find_law(value) if isinstance(value, str) else value)
 
 
-def filled_velocity(name: str) -> FilledVelocity:
-    """The estimator of that name with its default gains, marked as left out."""
-    return FilledVelocity(**vars(estimator(name)))
+def surface(value: Surface | Template | str | None) -> Surface | None:
+    """Return a surface, from itself, its template or its name."""
+    return None if value is None else component("surface", find_surface(value) if isinstance(value, str) else value)
 
 
-class FilledNumber(float):
-    """A physics step, or u_max, that was left out; dataclasses.replace finds it anew."""
+def velocity(value: Estimator | Template | str | None) -> Estimator | None:
+    """Return an estimator, from itself, its template or its name."""
+    return None if value is None else component("estimator", estimator(value) if isinstance(value, str) else value)
 
 
-class FilledName(str):
-    """An integrator, or a model, that was left out; dataclasses.replace finds it anew."""
+def component(kind: str, value: object) -> Component:
+    """Return a component of one kind, from itself or its template."""
+    made = value() if isinstance(value, Template) else value
+    if isinstance(made, Component) and made.kind == kind:
+        return made
+    field = "velocity" if kind == "estimator" else kind
+    raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), one of your own, or a name")
 
 
-def component(value: object, kind: str) -> Component:
-    """A law, a surface or an estimator, from one, its template or its name."""
-    if isinstance(value, str):
-        return {"law": law, "surface": surface, "estimator": estimator}[kind](value)
-    if isinstance(value, Template):
-        value = value()
-    if isinstance(value, Component) and value.kind == kind:
-        return value
-    field = {"law": "law", "surface": "surface", "estimator": "velocity"}[kind]
-    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), one of your own, or a name")
+def x0(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Return positions as a tuple, from one number or several."""
+    return None if value is None else numbers("x0", value)
 
 
-def velocity(value: object, sensor: Encoder | None) -> Component:
-    """An estimator; the default one for the sensor where none is given."""
-    if value is None or left_out(value):
-        return filled_velocity("measured" if sensor is None else "filtered_difference")
-    return component(value, "estimator")
+def v0(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Return rates as a tuple, from one number or several."""
+    return None if value is None else numbers("v0", value)
 
 
-def left_out(value: object) -> bool:
-    """Whether a default was filled in that depends on other fields."""
-    return isinstance(value, FilledNumber | FilledName | FilledVelocity | FilledStart)
+def numbers(name: str, value: object) -> tuple[float, ...]:
+    """Return a tuple of floats, from one number or several."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    items = taken(name, value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else [value]
+    return tuple(items)  # type: ignore[return-value]
 
 
-def physics_step(step: object, period: float, realistic: bool, least: float) -> float:
-    """A step that divides the control period; the default one where none is given."""
-    if step is None or isinstance(step, FilledNumber):
-        largest = REALISTIC_STEP if realistic else LARGEST_STEP
-        return FilledNumber(period / math.ceil(period / largest - 1e-9))
-    h = number("physics_step", step, above=0.0, least=least)
+def per_channel(name: str, value: object, n: int) -> tuple[float, ...] | None:
+    """Return n floats, from n numbers or one."""
+    if value is None:
+        return None
+    items = numbers(name, value)
+    if len(items) not in (1, n):
+        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
+    items = items if len(items) == n else items * n
+    return tuple(number(name, item, least=-MAX_POSITION, most=MAX_POSITION) for item in items)
+
+
+def physics_step(value: object, period: float, least: float) -> float | None:
+    """Return a step that divides the control period exactly, from one that does up to rounding; s."""
+    if value is None:
+        return None
+    h = number("physics_step", value, above=0.0, least=least)
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
     return period / round(count)
 
 
-def u_max(value: object, plant: Plant) -> float:
-    """A bound on |u|; the default one for the plant's motors where none is given."""
-    if value is None or isinstance(value, FilledNumber):
-        return FilledNumber(max((limit for limit in plant.limits if limit < math.inf), default=U_MAX))
-    return number("u_max", value, above=0.0, infinite=True)
+def one_of(name: str, value: object, names: Sequence[str]) -> str | None:
+    """Return one of some names, or None."""
+    if value is None or (isinstance(value, str) and value in names):
+        return value
+    raise unknown(name, value, names)
 
 
-def integrator(name: object, realistic: bool) -> str:
-    """The name of one of MuJoCo's integrators; the default one where none is given."""
-    if name is None or isinstance(name, FilledName):
-        return FilledName("implicitfast" if realistic else "RK4")
-    if not isinstance(name, str) or name not in INTEGRATORS:
-        raise unknown("integrator", name, INTEGRATORS)
-    return name
-
-
-def model(value: object, law: Component) -> str:
-    """What the law may know of the plant, "none" or "nominal"; what it needs where nothing is said."""
-    if value is None or isinstance(value, FilledName):
-        return FilledName("nominal" if law.requires_model else "none")
-    if not isinstance(value, str) or value not in MODELS:
-        raise unknown("model", value, MODELS)
+def mechanism(value: object, plant: Plant) -> str:
+    """Return the name of a mechanism that the plant offers."""
+    names = ["equation", *plant.mechanisms]
+    if not isinstance(value, str) or value not in names:
+        raise unknown(f"mechanism of {plant.name}", value, names)
     return value
 
 
-def start(value: object, plant: Plant, kind: str) -> tuple[float, ...]:
-    """x0; where none is given the plant's own, in order from left to right where the pendulums stand in a row."""
-    if value is None or isinstance(value, FilledStart):
-        return FilledStart(sorted(plant.x0) if kind == "bobs" else plant.x0)
-    return state("x0", value, plant.n)
+def instance(name: str, value: T | None, kind: type[T], example: str) -> T | None:
+    """Return a value of a class, or None."""
+    if not isinstance(value, kind | None):
+        raise ScenarioError(f"{name} is {shown(value)}: give {example} or None")
+    return value
 
 
-def state(name: str, value: object, n: int) -> tuple[float, ...]:
-    """n numbers, from one or n of them."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    items = taken(name, value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else [value]
-    if len(items) == 1:
-        items *= n
-    if len(items) != n:
-        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
-    return tuple(number(name, item, least=-FAR, most=FAR) for item in items)
+def noise(value: Noise | None) -> Noise:
+    """Return measurement noise, none of it from None."""
+    return instance("noise", value, Noise, "smc.Noise(position=..., velocity=...)") or Noise()
 
 
-def signals(name: str, value: object) -> tuple[Signal, ...]:
-    """Signals, from one, several or None; of references exactly one."""
-    items: tuple[Any, ...] = several(value)
-    for item in items:
-        if not isinstance(item, Signal):
-            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
-    if name == "reference" and len(items) != 1:
+def mismatch(value: Mapping[str, float] | None) -> Mapping[str, float]:
+    """Return parameter factors, none from None."""
+    return parameter_factors("mismatch", {} if value is None else value)
+
+
+def reference(value: object) -> Signal:
+    """Return one signal, also from a list of one."""
+    items = value if isinstance(value, tuple | list) else [value]
+    if len(items) != 1 or not isinstance(items[0], Signal):
         raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
-    return items
+    return items[0]
 
 
-def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
-    """Parts of one kind, from one, several or None."""
+def disturbance(value: Signal | Sequence[Signal] | None) -> tuple[Signal, ...]:
+    """Return signals, from one, several or None."""
     items = several(value)
     for item in items:
-        if not isinstance(item, kind):
-            raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
+        if not isinstance(item, Signal):
+            raise ScenarioError(
+                f"disturbance is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)"
+            )
     return items
 
 
-def friction(value: object) -> tuple[Friction, ...]:
-    """Frictions, no two of a kind, in one order, whatever the user's."""
+def contact(value: Contact | str | None) -> Contact:
+    """Return a contact, from itself or its kind; none from None."""
+    if value is None or isinstance(value, str):
+        return Contact("none" if value is None else value)
+    if not isinstance(value, Contact):
+        raise ScenarioError(f"contact is {shown(value)}: give smc.Contact(...), its kind or None")
+    return value
+
+
+def friction(value: Friction | Sequence[Friction] | None) -> tuple[Friction, ...]:
+    """Return frictions sorted by kind, from one, several or None. No two are of a kind."""
     items = parts("friction", value, Friction, "smc.Coulomb(0.05)")
-    _once("friction", items, [type(part).__name__ for part in items])
+    check_once("friction", items, [type(part).__name__ for part in items])
     return tuple(sorted(items, key=lambda part: type(part).__name__))
 
 
-def actuator(value: object) -> tuple[Actuator, ...]:
-    """A drive, or a Lag and another in series, in the user's order, and after them a Backlash."""
+def actuator(value: Actuator | Sequence[Actuator] | None) -> tuple[Actuator, ...]:
+    """Return at most two drives in the given order and after them a Backlash, from one, several or None."""
     items = parts("actuator", value, Actuator, "smc.Lag(0.01)")
     drives = [part for part in items if part.drives]
-    _once("actuator", items, [type(part).__name__ for part in items if not part.drives])
+    check_once("actuator", items, [type(part).__name__ for part in items if not part.drives])
     if len(drives) > 2:
         raise ScenarioError(f"actuator has {len(drives)} drives, {shown(items)}: give one, or two in series")
     if len(drives) == 2 and not isinstance(drives[0], Lag):
@@ -185,56 +185,21 @@ def actuator(value: object) -> tuple[Actuator, ...]:
     return tuple(sorted(items, key=lambda part: not part.drives))
 
 
-def _once(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
-    """Raise ScenarioError for two parts that would take each other's place."""
+def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
+    """Return parts of one kind, from one, several or None."""
+    items = several(value)
+    for item in items:
+        if not isinstance(item, kind):
+            raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
+    return items
+
+
+def check_once(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
+    """Raise ScenarioError for two parts of the same kind."""
     if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
         raise ScenarioError(f"{name} has a {twice[0]} twice, {shown(items)}: give one")
 
 
-def contact_fits(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError where a parameter has not the value for which the obstacles stand."""
-    for name, value in plant.placed.items() if contact.kind != "none" else ():
-        is_now = getattr(plant.values(factors), name)
-        if is_now != value:
-            raise ScenarioError(
-                f"contact {contact.kind!r} of {plant.name} stands where {name} is {value:g}, and {name} is {is_now:g}: "
-                f"leave {name} as it is"
-            )
-
-
-def contact(value: object, plant: Plant) -> Contact:
-    """A contact that the plant offers, from one, its kind or None."""
-    if value is None or isinstance(value, str):
-        value = Contact("none" if value is None else value)
-    if not isinstance(value, Contact):
-        raise ScenarioError(f"contact is {shown(value)}: give smc.Contact(...) or one of {', '.join(plant.contacts)}")
-    value.check(plant)
-    return value
-
-
-def mechanism(value: object, plant: Plant) -> str:
-    """The name of a mechanism that the plant offers."""
-    names = ["equation", *plant.mechanisms]
-    if not isinstance(value, str) or value not in names:
-        raise unknown(f"mechanism of {plant.name}", value, names)
-    return value
-
-
-def check_numbers(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError for parameter factors that a plant's mechanism cannot have."""
-    values = plant.values(factors)
-    if name != "equation":
-        list(plant.mechanisms[name].fields(built(plant, name), values))
-
-
-@functools.lru_cache(maxsize=16)
-def built(plant: Plant, name: str) -> mujoco.MjModel:
-    """A plant's other mechanism, compiled."""
-    spec = plant.spec()
-    plant.mechanisms[name].edit(spec)
-    return compiled(spec)
-
-
 def several(value: object) -> tuple[Any, ...]:
-    """One, several or None as a tuple."""
+    """Return one, several or None as a tuple."""
     return () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)

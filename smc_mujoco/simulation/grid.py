@@ -23,7 +23,8 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
 from smc_mujoco.simulation.model import model, numbered, start
-from smc_mujoco.simulation.scenario import QUIET, REST, Scenario
+from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.scenario import REST, U_MAX, Scenario
 
 DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 NOTHING: Mapping[str, Any] = frozen({})
@@ -96,7 +97,7 @@ def case(
     asked, seed = find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
     fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
     if machine.name in sets.STUDY:
-        fields |= {"control_period": CONTROL_PERIOD, "u_max": coerce.U_MAX}
+        fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
     conditioned, around = asked.on(machine, duration), starts or Starts()
     around.check_condition(asked.name, conditioned)
     scenario = Scenario(**fields | conditioned | dict(changes))
@@ -115,8 +116,8 @@ def check_moving(seeds: Sequence[Scenario]) -> None:
 
 def _rests(scenario: Scenario) -> bool:
     """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
-    moved = any(scenario.x0) or any(scenario.v0) or scenario.disturbance or scenario.sensor
-    if moved or scenario.noise != QUIET or scenario.reference != REST:
+    moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
+    if moved or scenario.noise != Noise() or scenario.reference != REST:
         return False
     made = numbered(model([scenario]), scenario)
     data = mujoco.MjData(made)
@@ -130,7 +131,7 @@ def _check_apart(
 ) -> None:
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
     machines = [_plant(plant) for plant in plants]
-    chosen = [law if isinstance(law, str) else coerce.component(law, "law") for law in laws]
+    chosen = [law if isinstance(law, str) else coerce.law(law) for law in laws]
     # name, thing, and what distinguishes it from others
     for what, cure, things in (
         ("plants", "give each a grid of its own", [(p.name, p, (p.build, p.parameters, p.n)) for p in machines]),
@@ -160,7 +161,7 @@ def _plant(plant: str | Plant) -> Plant:
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """Return a law, or the law of a name with its gains for the plant."""
     if not isinstance(law, str):
-        return checked_name(coerce.component(law, "law"))
+        return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
     found, known = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
     if gains != "default" and known is not None and plant.parameters != known.parameters:

@@ -45,7 +45,7 @@ class Starts:
 
     def reach(self, scenario: Scenario) -> float:
         """The largest distance from 0 of any channel at a start, rad or m."""
-        middle = scenario.x0 if self.x0 is None else self.x0
+        middle = scenario.resolved.x0 if self.x0 is None else self.x0
         return max(abs(x) for x in middle) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
@@ -64,7 +64,7 @@ class Starts:
         moves = z if kind == "none" else [-abs(factor) for factor in z]
         x0 = [
             x * (1.0 + self.spread * move) + (self.by if x >= 0.0 else -self.by) * move
-            for x, move in zip(scenario.x0, moves, strict=True)
+            for x, move in zip(scenario.resolved.x0, moves, strict=True)
         ]
         return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
 

@@ -55,8 +55,9 @@ def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
 def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
     """Return the compiled model that scenarios of one structure share, without their numbers."""
     made = ready(spec(scenarios), nuserdata)
-    made.opt.timestep = scenarios[0].physics_step
-    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenarios[0].integrator.upper()}")
+    first = scenarios[0].resolved
+    made.opt.timestep = first.physics_step
+    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
     return made
 
 
@@ -92,7 +93,8 @@ def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.
     """
     key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
     qpos, qvel = (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy(), np.zeros(compiled.nv)
-    for joint, x, v in zip(joint_ids(compiled), scenario.x0, scenario.v0, strict=True):
+    resolved = scenario.resolved
+    for joint, x, v in zip(joint_ids(compiled), resolved.x0, resolved.v0, strict=True):
         rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):
             qpos[compiled.jnt_qposadr[moved]], qvel[compiled.jnt_dofadr[moved]] = x, v
@@ -113,7 +115,7 @@ def check_starts(scenarios: Sequence[Scenario]) -> None:
     scratch, seen = model(scenarios), set()
     compiled, data = copy.copy(scratch), mujoco.MjData(scratch)
     for scenario in scenarios:
-        place = scenario.plant, scenario.x0, frozen(scenario.factors(0))  # all that the check depends on
+        place = scenario.plant, scenario.resolved.x0, frozen(scenario.factors(0))  # all that the check depends on
         if place not in seen:
             seen.add(place)
             put_numbers(scratch, compiled, scenario, 0)
@@ -124,15 +126,15 @@ def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -
     """Raise ScenarioError if a scenario starts inside an obstacle or beyond it."""
     there = start(made, scenario)[0]
     inside, beyond = _overlap(made, data, there), None
-    if not inside and scenario.x0 != scenario.plant.x0:
+    if not inside and scenario.resolved.x0 != scenario.plant.x0:
         home = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
         home = made.qpos0 if _overlap(made, data, home) else home
         path = (_overlap(made, data, (1 - part) * home + part * there) for part in np.linspace(0, 1, PATH_POINTS))
         beyond = next(filter(None, path), None)
     if hit := inside or beyond:
         raise ScenarioError(
-            f"x0 {shown(scenario.x0)} puts {scenario.plant.name}'s {hit[0]} {'inside' if inside else 'beyond'} "
-            f"{hit[1]} of contact {scenario.contact.kind!r}: give another x0"
+            f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {hit[0]} "
+            f"{'inside' if inside else 'beyond'} {hit[1]} of contact {scenario.contact.kind!r}: give another x0"
         )
 
 

@@ -18,7 +18,7 @@ from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Recorded
 
 PERFECT = Encoder(counts=math.inf)
@@ -56,7 +56,7 @@ class Prepared:
     @property
     def bytes(self) -> int:
         """What its simulation takes: its log, its mjData and its record, without the history of a late sensor."""
-        s = self.scenario
+        s = self.scenario.resolved
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
@@ -74,23 +74,24 @@ def prepare(scenario: object) -> Prepared:
         return scenario
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-    for part in (scenario.law, scenario.surface, scenario.velocity):
+    resolved = scenario.resolved
+    for part in (scenario.law, scenario.surface, resolved.velocity):
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     for signal in (scenario.reference, *scenario.disturbance):
         if isinstance(signal, Recorded):
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
     key = (
-        model.structure(scenario), scenario.integrator, scenario.physics_step, scenario.control_period,
+        model.structure(scenario), resolved.integrator, resolved.physics_step, scenario.control_period,
         scenario.samples,
     )  # fmt: skip
     try:
-        return Prepared(scenario, _compile(scenario), "", key)
+        return Prepared(scenario, _compile(resolved), "", key)
     except NotCompilable as error:
         return Prepared(scenario, None, str(error), key)
 
 
-def _compile(s: Scenario) -> Compiled:
+def _compile(s: Resolved) -> Compiled:
     """Every function of a scenario, compiled; NotCompilable names the one that is not for numba."""
     plant = s.plant
     for signal in (s.reference, *s.disturbance):
@@ -130,7 +131,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
 
     `channels` and `log` must outlive the run, too.
     """
-    s, compiled = prepared.scenario, prepared.compiled
+    s, compiled = prepared.scenario.resolved, prepared.compiled
     assert compiled is not None
     n, sensor, tandem, buffer = s.plant.n, s.sensor or PERFECT, s.tandem, state.Buffer()
 

@@ -61,7 +61,7 @@ class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
     def __init__(self, scenario: Scenario):
-        self.scenario, n = scenario, scenario.plant.n
+        self.scenario, n = scenario.resolved, scenario.plant.n
         self.compiled = assembly.model([scenario])
         self.model = assembly.numbered(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
@@ -71,7 +71,7 @@ class Loop:
             encoder.remember(self.model, self.data)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
-        self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, scenario.velocity))
+        self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, self.scenario.velocity))
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.nominal = Values(**scenario.plant.parameters)
         if isinstance(scenario.plant.nominal, Coupled):  # compiles, while there is no Python callback

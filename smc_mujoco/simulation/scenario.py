@@ -1,60 +1,94 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-What the true mechanism is (`plant`, `mismatch`, `jump`, and friction, contact, actuator and sensor) and what the law
-may believe (the plant's nominal parameters) are kept apart. Two scenarios that are equal give the same trace to the
-last bit.
+A scenario keeps what it was given, and None where a default depends on other fields. `scenario.resolved` has these
+defaults, too. The true mechanism (`plant`, `mismatch`, `jump`, friction, contact, actuator and sensor) and what the law
+may know of it (the plant's nominal parameters) are kept apart.
 """
 
 import copy
 import dataclasses
+import functools
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar, dataclass_transform
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, whole
-from smc_mujoco.control.component import Template
-from smc_mujoco.control.estimator import Estimator
-from smc_mujoco.control.law import Law
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, users_frame, whole
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.control.estimator import Estimator, estimator
+from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
+from smc_mujoco.mechanisms.custom.channels import check_ranges
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.mechanisms.hardware.drives import Tandem, tandem
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
-from smc_mujoco.mechanisms.plant import Plant, plant
-from smc_mujoco.simulation import coerce, consistency
-from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Constant, Signal
+from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, Signal
 
 SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
+U_MAX = 6.0  # N or N m, chosen: the bound of every study here
+LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
+REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py studies what halving it changes, docs/design.md tells
+MAX_STEPS = 100_000_000  # per run: minutes of computing
+MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+MAX_ANGLE = 3.0 * math.pi  # rad: chosen, as swing-ups overshoot within a turn and a half, and 10 may be degrees
+MAX_DEGREES = 720.0  # nobody means degrees beyond
+MAX_RATE = 100.0  # rad/s: chosen, 16 turns a second
+MAX_GAP = 0.5  # rad: chosen, 29 degrees of play
+MIN_PERCENT = 10.0  # of a mismatch: chosen, multiples of five from here on may be percent
+MIN_MILLISECONDS = 1.0  # s: chosen, as no plant here tolerates such a delay
 
-REST, QUIET, FREE = Constant(0.0), Noise(), Contact("none")
-MISSING: Any = None  # a field left out, filled in when the scenario is made
+REST = Constant(0.0)
+In = TypeVar("In")
+Out = TypeVar("Out")
+T = TypeVar("T")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+def field(*, converter: Callable[[Any], Out], default: Any = dataclasses.MISSING) -> Out:
+    """Return a dataclass field whose value the converter makes from what the user gives."""
+    return dataclasses.field(default=default, metadata={"converter": converter})
+
+
+@dataclass_transform(
+    eq_default=False, frozen_default=True, kw_only_default=True, field_specifiers=(field, dataclasses.field)
+)
+def converted(cls: type[T]) -> type[T]:
+    """Make a frozen dataclass whose __init__ takes what its fields' converters take."""
+    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+
+@converted
 class Scenario:
     """Everything that defines a run. SI units; angles in radians.
 
     Attributes:
       plant: a Plant or the name of one.
       law: a Law (`smc.law(name, **gains)` or your own), or the name of one.
-      model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "none",
-        and "nominal" for a law that cannot do without.
-      surface: a Surface or the name of one, for the laws that take one; None: the law's own, de + c e.
-      duration: s. The run lasts the whole control periods that fit into it.
+      model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
+        for a law that requires it, else "none".
+      surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
+      duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
         equation, up to 0.25 ms with friction, contact, a mechanism or an actuator.
-      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or of a model of yours whose motors have limits, what
-        the strongest of those gives. A motor's own limit holds too: see `limits`.
-      x0, v0: initial state, one number or n of them. Default: the plant's x0, and 0.
+      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
+        A motor's own limit holds too: see `limits`.
+      x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
       reference: r(t), the same for every channel.
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
-      velocity: the velocity the law sees: an Estimator or the name of one. Default: "measured", and with an encoder,
-        which measures none, "filtered_difference".
+      velocity: an Estimator of the velocity that the law sees, or the name of one. Default: "measured", or
+        "filtered_difference" with an encoder, which measures no velocity.
       mismatch: parameter name -> factor on the true plant's parameter. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
@@ -62,120 +96,125 @@ class Scenario:
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
       mechanism: "equation", or another build of the mechanism that the plant offers.
-      actuator: between command and joint: a drive - Lag, RateLimit, DCMotor - or a Lag and another drive in series, in
-        this order, and a Backlash after them; None: the command is the force. u is bounded before the drives.
+      actuator: between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag followed by another drive, and
+        then a Backlash. None: the command is the force. u is bounded before the drives.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
-      condition: what a grid calls the run's condition, see `named`; no argument, and gone where a field is replaced.
+      condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
+
+    A field is None where nothing was given and its default depends on other fields: model, physics_step, u_max, x0, v0,
+    velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps None, so
+    that a default follows the fields that it depends on. Scenarios whose resolved fields are equal are equal, and give
+    the same trace to the last bit.
 
     Raises:
-      ScenarioError: for anything out of its range, in one sentence.
+      ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
 
     Warns:
-      ScenarioWarning: a hinge's start or reference of more than one and a half turns, up to 720 rad, which may be meant
-        in degrees; a phase, a v0 or a Backlash that may be in degrees too; a mismatch that may be in percent, a delay
-        in ms; a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
+      ScenarioWarning: a value that may be in another unit: a start, reference, phase, v0 or Backlash in degrees, a
+        mismatch in percent, a delay in ms; or a DCMotor that cannot hold a joint where it starts, though a force of
+        u_max could.
     """
 
-    plant: Plant
-    law: Law
-    model: str = MISSING
-    surface: Surface | None = None
+    plant: Plant = field(converter=coerce.plant)
+    law: Law = field(converter=coerce.law)
+    model: str | None = None
+    surface: Surface | None = field(converter=coerce.surface, default=None)
     duration: float = 10.0
     control_period: float = 1e-3
-    physics_step: float = MISSING
-    u_max: float = MISSING
-    x0: tuple[float, ...] = MISSING
-    v0: tuple[float, ...] = MISSING
+    physics_step: float | None = None
+    u_max: float | None = None
+    x0: tuple[float, ...] | None = field(converter=coerce.x0, default=None)
+    v0: tuple[float, ...] | None = field(converter=coerce.v0, default=None)
     reference: Signal = REST
-    disturbance: tuple[Signal, ...] = ()
-    noise: Noise = QUIET
+    disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
+    noise: Noise = field(converter=coerce.noise, default=None)
     input_delay: float = 0.0
-    velocity: Estimator = MISSING
-    mismatch: Mapping[str, float] = MISSING
+    velocity: Estimator | None = field(converter=coerce.velocity, default=None)
+    mismatch: Mapping[str, float] = field(converter=coerce.mismatch, default=None)
     jump: Jump | None = None
     seed: int = 0
-    integrator: str = MISSING
-    friction: tuple[Friction, ...] = ()
-    contact: Contact = FREE
+    integrator: str | None = None
+    friction: tuple[Friction, ...] = field(converter=coerce.friction, default=None)
+    contact: Contact = field(converter=coerce.contact, default=None)
     mechanism: str = "equation"
-    actuator: tuple[Actuator, ...] = ()
+    actuator: tuple[Actuator, ...] = field(converter=coerce.actuator, default=None)
     sensor: Encoder | None = None
-    condition: str | None = dataclasses.field(default=None, init=False, repr=False, compare=False)
-
-    if TYPE_CHECKING:  # what the fields are made from; what they are stands above
-
-        def __init__(
-            self,
-            *,
-            plant: Plant | str,
-            law: Law | Template | str,
-            model: str | None = None,
-            surface: Surface | Template | str | None = None,
-            duration: float = 10.0,
-            control_period: float = 1e-3,
-            physics_step: float | None = None,
-            u_max: float | None = None,
-            x0: float | Sequence[float] | None = None,
-            v0: float | Sequence[float] | None = None,
-            reference: Signal = REST,
-            disturbance: Signal | Sequence[Signal] | None = None,
-            noise: Noise | None = None,
-            input_delay: float = 0.0,
-            velocity: Estimator | Template | str | None = None,
-            mismatch: Mapping[str, float] | None = None,
-            jump: Jump | None = None,
-            seed: int = 0,
-            integrator: str | None = None,
-            friction: Friction | Sequence[Friction] | None = None,
-            contact: Contact | str | None = None,
-            mechanism: str = "equation",
-            actuator: Actuator | Sequence[Actuator] | None = None,
-            sensor: Encoder | None = None,
-        ) -> None: ...
+    condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
     def __post_init__(self):
-        def put(name: str, value: object) -> None:
-            object.__setattr__(self, name, value)
+        self._convert()
+        check(self.resolved)
+        check_new(self.resolved)
 
-        put("plant", plant(self.plant) if isinstance(self.plant, str) else self.plant)
-        if not isinstance(self.plant, Plant):
-            raise ScenarioError(
-                f"plant is {shown(self.plant)}: give smc.plant(...) or one of the names smc.plants() lists"
-            )
-        put("friction", coerce.friction(self.friction))
-        put("contact", coerce.contact(self.contact, self.plant))
-        put("mechanism", coerce.mechanism(self.mechanism, self.plant))
-        put("actuator", coerce.actuator(self.actuator))
-        if not isinstance(self.sensor, Encoder | None):
-            raise ScenarioError(f"sensor is {shown(self.sensor)}: give smc.Encoder(counts=...) or None")
-        put("law", coerce.component(self.law, "law"))
-        put("model", coerce.model(self.model, self.law))
-        put("surface", None if self.surface is None else coerce.component(self.surface, "surface"))
-        put("velocity", coerce.velocity(self.velocity, self.sensor))
-        put("duration", number("duration", self.duration, above=0.0, most=LONGEST))
-        put("control_period", number("control_period", self.control_period, above=0.0, least=SHORTEST))
-        put("u_max", coerce.u_max(self.u_max, self.plant))
-        put("input_delay", number("input_delay", self.input_delay, least=0.0, most=self.duration))
-        put("physics_step", coerce.physics_step(self.physics_step, self.control_period, self.realistic, SHORTEST))
-        put("x0", coerce.start(self.x0, self.plant, self.contact.kind))
-        put("v0", coerce.state("v0", 0.0 if self.v0 is None else self.v0, self.plant.n))
-        put("reference", coerce.signals("reference", self.reference)[0])
-        put("disturbance", coerce.signals("disturbance", self.disturbance))
-        put("noise", QUIET if self.noise is None else self.noise)
-        if not isinstance(self.noise, Noise):
-            raise ScenarioError(f"noise is {shown(self.noise)}: give smc.Noise(position=..., velocity=...) or None")
-        put("mismatch", parameter_factors("mismatch", {} if self.mismatch is None else self.mismatch))
-        if not isinstance(self.jump, Jump | None):
-            raise ScenarioError(f"jump is {shown(self.jump)}: give smc.Jump(time=..., factors=...) or None")
-        put("integrator", coerce.integrator(self.integrator, self.realistic))
-        put("seed", whole("seed", self.seed, 0, 2**53 - 1))
-        consistency.check(self)
+    @classmethod
+    def recorded(cls, **fields: Any) -> "Scenario":
+        """Make the scenario of a recorded run, without the rules and warnings that only new runs must meet.
+
+        Raises:
+          ScenarioError: values that no version of the package could have run.
+        """
+        made = object.__new__(cls)
+        for one in dataclasses.fields(cls):
+            object.__setattr__(made, one.name, fields.get(one.name, one.default))
+        made._convert()
+        check(made.resolved)
+        return made
+
+    def _convert(self) -> None:
+        """Convert every field from what the user gave."""
+        new = {
+            one.name: one.metadata["converter"](getattr(self, one.name))
+            for one in dataclasses.fields(self)
+            if "converter" in one.metadata
+        }
+        vars(self).update(new)
+        self.contact.check(self.plant)
+        new = {
+            "model": coerce.one_of("model", self.model, coerce.MODELS),
+            "integrator": coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS),
+            "mechanism": coerce.mechanism(self.mechanism, self.plant),
+            "reference": coerce.reference(self.reference),
+            "jump": coerce.instance("jump", self.jump, Jump, "smc.Jump(time=..., factors=...)"),
+            "sensor": coerce.instance("sensor", self.sensor, Encoder, "smc.Encoder(counts=...)"),
+            "duration": number("duration", self.duration, above=0.0, most=LONGEST),
+            "control_period": number("control_period", self.control_period, above=0.0, least=SHORTEST),
+            "seed": whole("seed", self.seed, 0, 2**53 - 1),
+            "x0": coerce.per_channel("x0", self.x0, self.plant.n),
+            "v0": coerce.per_channel("v0", self.v0, self.plant.n),
+        }
+        vars(self).update(new)
+        new = {
+            "physics_step": coerce.physics_step(self.physics_step, self.control_period, SHORTEST),
+            "u_max": None if self.u_max is None else number("u_max", self.u_max, above=0.0, infinite=True),
+            "input_delay": number("input_delay", self.input_delay, least=0.0, most=self.duration),
+        }
+        vars(self).update(new)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()
+
+    def __hash__(self) -> int:
+        return hash(self.resolved._values())
+
+    def _values(self) -> tuple:
+        """Return all fields that decide the run."""
+        return tuple(getattr(self, one.name) for one in dataclasses.fields(self) if one.init)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}  # a copy resolves anew
+
+    @functools.cached_property
+    def resolved(self) -> "Resolved":
+        """This scenario with the defaults that depend on other fields."""
+        made = object.__new__(Resolved)
+        vars(made).update(self.__getstate__() | _defaults(self))
+        return made
 
     def named(self, condition: str | None) -> "Scenario":
-        """This scenario under a name for its condition, which tables show and which changes nothing of the run."""
-        found = copy.copy(self)
-        object.__setattr__(found, "condition", condition)
-        return found
+        """Return this scenario with a name for its condition. Tables show it; the run is the same."""
+        made = copy.copy(self)
+        object.__setattr__(made, "condition", condition)
+        return made
 
     @property
     def realistic(self) -> bool:
@@ -184,23 +223,15 @@ class Scenario:
         return bool(parts or not self.plant.smooth)
 
     @property
-    def left_out(self) -> list[str]:
-        """Fields whose defaults depend on others: dataclasses.replace finds them anew."""
-        return [
-            name
-            for name in ("model", "physics_step", "integrator", "velocity", "u_max", "x0")
-            if coerce.left_out(getattr(self, name))
-        ]
-
-    @property
     def limits(self) -> tuple[float, ...]:
-        """The bound on |u| of each driven channel, N or N m: u_max, or its own motor's limit where that is less."""
-        return tuple(min(self.u_max, limit) for limit in self.plant.limits) or (self.u_max,) * self.plant.driven
+        """The bound on |u| of each driven channel, N or N m: the lesser of u_max and its motor's own limit."""
+        u_max = self.resolved.u_max
+        return tuple(min(u_max, limit) for limit in self.plant.limits) or (u_max,) * self.plant.driven
 
     @property
     def steps(self) -> int:
         """Physics steps per control period."""
-        return round(self.control_period / self.physics_step)
+        return round(self.control_period / self.resolved.physics_step)
 
     @property
     def samples(self) -> int:
@@ -210,35 +241,35 @@ class Scenario:
     @property
     def stages(self) -> int:
         """Callbacks per physics step: one a stage of the integrator."""
-        return 4 if self.integrator == "RK4" else 1
+        return 4 if self.resolved.integrator == "RK4" else 1
 
     @property
     def readings(self) -> int:
-        """How many readings of its sensor are under way at once, of which MuJoCo keeps a history."""
-        return 0 if self.sensor is None else self.sensor.readings(self.physics_step)
+        """How many late readings of the sensor MuJoCo keeps."""
+        return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step)
 
     @property
     def delay_steps(self) -> int:
         """The input delay in physics steps."""
-        return round(self.input_delay / self.physics_step)
+        return round(self.input_delay / self.resolved.physics_step)
 
     @property
     def jump_step(self) -> int:
         """The physics step from which the jump holds; -1 without one."""
-        return -1 if self.jump is None else math.ceil(self.jump.time / self.physics_step - 1e-6)
+        return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
     def tandem(self) -> Tandem | None:
-        """What two drives in series do in a physics step; None without a second drive."""
-        return tandem(self.actuator, self.physics_step)
+        """What two drives in series do in a physics step; None for one drive or none."""
+        return tandem(self.actuator, self.resolved.physics_step)
 
     @property
     def work(self) -> int:
-        """Physics steps times channels: what a run costs, by which progress and batches are measured."""
+        """Physics steps times channels: the cost of a run, as progress bars and batches count it."""
         return self.samples * self.steps * self.plant.n
 
     def stream(self, i: int) -> int:
-        """The stream of random numbers of disturbance i, 0 for one that takes none."""
+        """The number of the random stream of disturbance i; 0 for a disturbance without randomness."""
         if not 0 <= i < len(self.disturbance):
             raise ScenarioError(
                 f"there is no disturbance {shown(i)}: the scenario has {len(self.disturbance)}, from 0 on"
@@ -247,9 +278,240 @@ class Scenario:
         return PROCESS + sum(random[:i]) if random[i] else 0
 
     def factors(self, step: int) -> dict[str, float]:
-        """The true plant's parameter factors at a physics step: mismatch, and from its time on the jump."""
+        """Return the true plant's parameter factors at a physics step: the mismatch, and from its time on the jump."""
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
                 factors[name] = factors.get(name, 1.0) * factor
         return factors
+
+
+class Resolved(Scenario):
+    """A scenario whose every default is known: no field that a run needs is None."""
+
+    model: str
+    physics_step: float
+    u_max: float
+    x0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
+    v0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
+    velocity: Estimator  # pyright: ignore[reportIncompatibleVariableOverride]
+    integrator: str
+
+    def _convert(self) -> None:
+        super()._convert()
+        vars(self).update(_defaults(self))
+
+    @property
+    def resolved(self) -> "Resolved":  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The scenario itself."""
+        return self
+
+
+def _defaults(s: Scenario) -> dict[str, Any]:
+    """Return the defaults of the fields that are None."""
+    largest = REALISTIC_STEP if s.realistic else LARGEST_STEP
+    in_order = s.contact.kind == "bobs"  # pendulums in a row must not start across each other
+    defaults = {
+        "model": "nominal" if s.law.requires_model else "none",
+        "physics_step": s.control_period / math.ceil(s.control_period / largest - 1e-9),
+        "u_max": default_u_max(s.plant),
+        "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
+        "v0": (0.0,) * s.plant.n,
+        "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
+        "integrator": "implicitfast" if s.realistic else "RK4",
+    }
+    return {name: value for name, value in defaults.items() if getattr(s, name) is None}
+
+
+def default_u_max(plant: Plant) -> float:
+    """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest motor, else 6."""
+    return max((limit for limit in plant.limits if limit < math.inf), default=U_MAX)
+
+
+def check(s: Resolved) -> None:
+    """Raise ScenarioError for fields that do not fit together."""
+    check_clock(s)
+    check_signals(s)
+    check_law(s)
+    check_mechanism(s)
+
+
+def check_new(s: Resolved) -> None:
+    """Raise ScenarioError, or warn, for what recorded runs may have and new ones should not."""
+    check_ranges(s.plant.name, s.plant.ranges, s.x0)
+    check_names(s)
+    warn_of_degrees(s)
+    warn_of_units(s)
+    warn_of_weak_motors(s)
+
+
+def check_clock(s: Resolved) -> None:
+    """The delay is a whole number of steps, the jump is within the run, and the trace fits into memory."""
+    delay = s.input_delay / s.physics_step
+    if abs(delay - round(delay)) > 1e-6:
+        raise ScenarioError(
+            f"input_delay {s.input_delay:g} s is no whole number of physics steps of {s.physics_step:g} s: "
+            "give a physics_step that divides it"
+        )
+    if s.samples < 1:
+        raise ScenarioError(f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} s")
+    if s.samples * s.steps > MAX_STEPS or (s.samples + 1) * s.plant.n > MAX_VALUES:
+        raise ScenarioError(
+            f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels and "
+            f"{s.samples * s.steps:.3g} physics steps: give a shorter duration or longer periods "
+            f"(at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
+        )
+    if s.jump is not None and s.jump.time >= s.duration:
+        raise ScenarioError(f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s")
+    if s.sensor is not None:
+        s.sensor.check(s.physics_step)
+
+
+def check_signals(s: Resolved) -> None:
+    """Disturbances and reference are signals that can serve as such, and none is shorter than a step."""
+    for d in s.disturbance:
+        most = max(MAX_STEPS, s.work)  # knots in all channels
+        if isinstance(d, OrnsteinUhlenbeck) and s.plant.n * s.duration / d.dt > most:
+            least = s.plant.n * s.duration / most
+            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {least:.3g} s or more")
+        if isinstance(d, Impulse) and d.width < s.physics_step:
+            raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
+    if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
+        raise ScenarioError(
+            f"disturbance {shown(forces[0])} pushes a body, and those of {s.plant.name}, a model of yours, act on its "
+            "joints: give another signal"
+        )
+    if s.reference.cartesian:
+        raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
+    if s.reference.random:
+        raise ScenarioError(f"reference is {type(s.reference).__name__}, which is noise: give a smooth signal")
+
+
+def check_law(s: Resolved) -> None:
+    """The law suits the plant, and the surface suits the law."""
+    if not fits(s.law, s.plant):
+        paired = dataclasses.replace(s.plant, underactuated=True)
+        hint = ": give each channel a partner" if s.plant.direct and fits(s.law, paired) else ""
+        raise ScenarioError(f"law {s.law.name!r} is for {', '.join(s.law.plants)} alone, not for {s.plant.name}{hint}")
+    if s.model == "nominal" and s.plant.unmodelled:
+        raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
+    if s.surface is not None and s.law.relative_degree > 1:
+        raise ScenarioError(
+            f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "
+            "leave it out, or give a law of degree 1"
+        )
+    if s.surface is not None and s.surface.relative_degree != s.law.relative_degree:
+        raise ScenarioError(
+            f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.relative_degree}, "
+            f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another, or leave it out"
+        )
+
+
+def check_names(s: Resolved) -> None:
+    """No parameter is named twice, once by its own name and once as the mass."""
+    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
+        twice = "mass" in factors and s.plant.mass in factors and s.plant.mass != "mass"
+        if twice:
+            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
+            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
+
+
+def check_mechanism(s: Resolved) -> None:
+    """The integrator handles the parts' states; mechanism and contact allow every parameter of the run."""
+    if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
+        raise ScenarioError(
+            f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
+        )
+    for step in (0, s.samples * s.steps):
+        check_numbers(s.plant, s.mechanism, frozen(s.factors(step)))
+        check_contact(s.contact, s.plant, s.factors(step))
+
+
+def check_numbers(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
+    """Raise ScenarioError for parameter factors that the plant's mechanism cannot have."""
+    values = plant.values(factors)
+    if name != "equation":
+        list(plant.mechanisms[name].fields(built(plant, name), values))
+
+
+@functools.lru_cache(maxsize=16)
+def built(plant: Plant, name: str) -> mujoco.MjModel:
+    """A plant's other mechanism, compiled."""
+    spec = plant.spec()
+    plant.mechanisms[name].edit(spec)
+    return compiled(spec)
+
+
+def check_contact(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
+    """Raise ScenarioError where a parameter has not the value for which the obstacles stand."""
+    for name, value in plant.placed.items() if contact.kind != "none" else ():
+        is_now = getattr(plant.values(factors), name)
+        if is_now != value:
+            raise ScenarioError(
+                f"contact {contact.kind!r} of {plant.name} stands where {name} is {value:g}, and {name} is {is_now:g}: "
+                f"leave {name} as it is"
+            )
+
+
+def warn_of_degrees(s: Resolved) -> None:
+    """Warn of a start or a reference's amplitude of several turns, but not of a ramp or time series that long."""
+    amplitude = s.reference.parameters().get("amplitude", 0.0)
+    for what, values in (("x0", s.x0), ("the reference's amplitude", (amplitude,) * s.plant.driven)):
+        for unit, value in zip(s.plant.units, values, strict=False):
+            if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
+                warnings.warn(
+                    f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns: if it is {value:g} degrees, give "
+                    f"math.radians({value:g})",
+                    ScenarioWarning,
+                    users_frame(),
+                )
+                return
+
+
+def warn_of_units(s: Resolved) -> None:
+    """Warn of the first number that is probably in another unit: percent, ms or degrees."""
+    for fact, cure in _other_units(s):
+        warnings.warn(f"{fact}: {cure}", ScenarioWarning, users_frame())
+        return
+
+
+def _other_units(s: Resolved) -> Iterator[tuple[str, str]]:
+    """Yield a sentence about each suspicious number, and what to give instead."""
+    for name, factor in s.mismatch.items():
+        if MIN_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
+            yield (
+                f"mismatch makes {name} {factor:g} times the nominal one",
+                f"if it is {factor:g} % more, give {1 + factor / 100:g}",
+            )
+    if s.input_delay >= MIN_MILLISECONDS:
+        yield f"input_delay is {s.input_delay:g} s", f"if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
+    for signal in (s.reference, *s.disturbance):
+        phase = signal.parameters().get("phase", 0.0)
+        if MAX_ANGLE < abs(phase) <= MAX_DEGREES:
+            yield f"a phase is {phase:g} rad", f"if it is {phase:g} degrees, give math.radians({phase:g})"
+    turning = [v for unit, v in zip(s.plant.units, s.v0, strict=True) if unit == "rad"]
+    for v in turning:
+        if MAX_RATE < abs(v) <= 10 * MAX_DEGREES:
+            yield f"v0 is {v:g} rad/s", f"if it is {v:g} degrees per second, give math.radians({v:g})"
+    for part in s.actuator:
+        if isinstance(part, Backlash) and part.gap > MAX_GAP and "rad" in s.plant.units[: s.plant.driven]:
+            fact = f"Backlash has a gap of {part.gap:g} rad"
+            yield fact, f"if it is {part.gap:g} degrees, give math.radians({part.gap:g})"
+
+
+def warn_of_weak_motors(s: Resolved) -> None:
+    """Warn of a DC motor that cannot hold a joint where it starts, though a force of u_max could."""
+    p, still = s.plant.values({}), np.zeros(s.plant.n)
+    for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
+        for i, limit in enumerate(s.limits):
+            with np.errstate(all="ignore"):
+                f, g = s.plant.nominal(np.array(s.x0), still, i, p)
+            need = abs(f) / abs(g) if g else 0.0
+            if motor.stall < need <= limit:
+                warnings.warn(
+                    f"DCMotor gives at most {motor.stall:.3g} {EFFORT[s.plant.units[i]]} at rest, and channel {i} of "
+                    f"{s.plant.name} needs {need:.3g} to stand where it starts: give it more gear, voltage or current",
+                    ScenarioWarning,
+                    users_frame(),
+                )
+                return

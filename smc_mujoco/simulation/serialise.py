@@ -14,7 +14,6 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.custom.channels import recorded
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
@@ -26,12 +25,14 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Recorded, Signal
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
+DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0")  # None where not given
 PARTS = ("friction", "contact", "actuator", "sensor")
 T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
     """The scenario as plain data that JSON holds without loss."""
+    given, scenario = scenario, scenario.resolved
     return (
         {name: getattr(scenario, name) for name in PLAIN}
         | {
@@ -48,7 +49,7 @@ def describe(scenario: Scenario) -> dict:
             "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
             "mechanism": scenario.mechanism,
             "condition": scenario.condition,
-            "left_out": scenario.left_out,
+            "left_out": [name for name in DEPENDENT if getattr(given, name) is None],
         }
         | {name: _parts(getattr(scenario, name)) for name in PARTS}
     )
@@ -62,33 +63,28 @@ def _versions() -> dict[str, str]:
 
 
 def restore(data: dict) -> Scenario:
-    """The scenario that was described. A law or signal that is not at hand keeps its name and values, not its code.
+    """Return the scenario that was described. A law or signal that is not installed here loses its code, not its name.
 
-    A run that has been is not refused for a start or a mismatch that would be today.
+    Recorded scenarios skip validation rules added after they were recorded.
     """
-    with recorded():
-        return _restore(data)
-
-
-def _restore(data: dict) -> Scenario:
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
-    scenario = Scenario(
-        **fields,
-        plant=_restore_plant(data["plant"]),
-        law=_find(data["law"], "law", laws()),
-        velocity=_find(data["velocity"], "estimator", estimators()),
-        surface=data.get("surface") and _find(data["surface"], "surface", surfaces()),
-        reference=_restore_signal(data["reference"]),
-        disturbance=tuple(_restore_signal(d) for d in data["disturbance"]),
-        noise=Noise(**data["noise"]),
-        mismatch=data["mismatch"],
-        jump=data["jump"] and Jump(**data["jump"]),
-    )
-    again = dataclasses.replace(scenario, **dict.fromkeys(data.get("left_out", ())))
-    found = again if again == scenario else scenario  # the defaults of another version stay what they were
-    return found.named(data.get("condition"))
+    fields |= {
+        "plant": _restore_plant(data["plant"]),
+        "law": _find(data["law"], "law", laws()),
+        "velocity": _find(data["velocity"], "estimator", estimators()),
+        "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
+        "reference": _restore_signal(data["reference"]),
+        "disturbance": tuple(_restore_signal(d) for d in data["disturbance"]),
+        "noise": Noise(**data["noise"]),
+        "mismatch": data["mismatch"],
+        "jump": data["jump"] and Jump(**data["jump"]),
+    }
+    exact = Scenario.recorded(**fields)
+    given = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
+    scenario = given if given == exact else exact  # where this version's defaults differ, keep the recorded values
+    return scenario.named(data.get("condition"))
 
 
 def _plant(plant: Plant) -> dict:

@@ -188,7 +188,7 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     if failure is not None:
         for values in arrays.values():
             values[end:] = np.nan
-        diverged_at = failed_step * scenario.physics_step
+        diverged_at = failed_step * scenario.resolved.physics_step
         failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 

@@ -9,7 +9,6 @@ from typing import Any
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
-from smc_mujoco.mechanisms.custom.channels import recorded
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.conditions import NAMED
@@ -70,7 +69,7 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
         return known[text]
     nominal = json.loads(next(iter(known), "{}"))
     changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
-    differ = [name for name in changed if name not in scenario.left_out]  # not what another field implies
+    differ = [name for name in changed if getattr(scenario, name) is not None]  # the rest are defaults
     name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
     return name if len(name) <= LONGEST else f"{name[:LONGEST]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
@@ -102,7 +101,7 @@ def _conditions(plant: Plant, duration: float) -> dict[str, str]:
     for name in NAMED:
         # ScenarioError: a condition that is not for this plant, or not for runs as short as this.
         # `recorded`: the scenario is not to be run, so its start may be outside a joint's range.
-        with contextlib.suppress(ScenarioError), recorded():
-            scenario = Scenario(**common | scenarios.fields(name, plant, duration))
+        with contextlib.suppress(ScenarioError):
+            scenario = Scenario.recorded(**common | scenarios.fields(name, plant, duration))
             found.setdefault(_compared(described(scenario)), name)
     return found

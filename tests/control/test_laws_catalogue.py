@@ -53,9 +53,9 @@ def traces():
 def test_default_gains_end_within_five_percent_on_every_plant_with_the_model_and_without(name):
     bounds = {}
     for trace in (trace for law, trace in traces() if law == name):
-        case = trace.scenario.plant.name, trace.scenario.model
+        case = trace.scenario.plant.name, trace.scenario.resolved.model
         assert trace.failure is None, (case, trace.failure)
-        bounds[case] = smc.score(trace)["ultimate_bound"] / max(map(abs, trace.scenario.x0))
+        bounds[case] = smc.score(trace)["ultimate_bound"] / max(map(abs, trace.scenario.resolved.x0))
         assert np.abs(trace.u).max() <= 6.0
     assert bounds
     assert max(bounds.values()) <= 0.05, bounds
@@ -66,7 +66,7 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
     ends = {
         trace.scenario.plant.name: np.abs(trace.x[-4000:]).max()
         for law, trace in traces()
-        if law == "none" and trace.scenario.model == "none"
+        if law == "none" and trace.scenario.resolved.model == "none"
     }
     assert ends["inverted_pendulum"] > math.pi
     assert ends["inverted_pendulum_network"] > 1.0

@@ -352,7 +352,7 @@ def test_observer_free_adaptive_survives_the_jump_that_throws_the_plain_law():
     scenarios = [paper.scenario(plant, "observer_free", "jump_hard") for plant in paper.GAINS]
     mended = [dataclasses.replace(x, law=smc.law("observer_free_adaptive", **x.law.gains)) for x in scenarios]
     bounds = np.array([smc.score(trace)["ultimate_bound"] for trace in smc.run(scenarios + mended)])
-    before, after = bounds.reshape(2, -1) / [max(map(abs, x.x0)) for x in scenarios]
+    before, after = bounds.reshape(2, -1) / [max(map(abs, x.resolved.x0)) for x in scenarios]
     assert np.all(after < 0.05), after
     thrown = np.array(list(paper.GAINS)) != "pendulum_network"  # the hanging chain cannot fall
     assert np.all(before[thrown] > 0.9), before

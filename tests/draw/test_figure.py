@@ -107,10 +107,10 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(plant, tmp_path):
     figure([good, gone], tmp_path / "b")
     signals([good, gone], tmp_path / "c", ["all", "all"])
     cut = decimate.finite(gone)
-    assert cut.x.tolist() == [list(gone.scenario.x0)]
+    assert cut.x.tolist() == [list(gone.scenario.resolved.x0)]
     assert np.isnan(cut.u).all()
     low, high = panels.limits([cut], "x")
-    assert low < min(gone.scenario.x0) <= max(gone.scenario.x0) < high
+    assert low < min(gone.scenario.resolved.x0) <= max(gone.scenario.resolved.x0) < high
 
 
 def test_a_jump_is_marked_with_what_has_changed(tmp_path):

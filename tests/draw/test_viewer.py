@@ -114,7 +114,7 @@ def test_what_is_shown_is_where_the_run_is(shown):
         drives = len(view.loop.data.ctrl)
         np.testing.assert_array_equal(view.data.ctrl[:drives], view.loop.data.ctrl)
         assert view.data.ctrl[:drives].any()
-    assert view.step == pytest.approx(12 * FRAME / HARD.physics_step, abs=1.0)
+    assert view.step == pytest.approx(12 * FRAME / HARD.resolved.physics_step, abs=1.0)
     np.testing.assert_allclose(view.model.body_mass, view.loop.model.body_mass)  # after the jump
     assert any(view.model.body_mass != live.Live(HARD).model.body_mass)
     view.begin(HARD)
@@ -285,7 +285,7 @@ def test_a_law_that_fails_is_told_and_paused_and_space_begins_anew(shown, said):
 def test_a_slow_machine_is_told_of_and_never_simulates_much_in_a_frame(shown):
     view, viewer = shown()
     view.frame(viewer, 10.0)
-    assert view.step <= round(live.MAX_FRAME / DUFFING.physics_step) + 1
+    assert view.step <= round(live.MAX_FRAME / DUFFING.resolved.physics_step) + 1
     assert "slower than real time" in viewer.texts[-1]
 
 

@@ -283,7 +283,7 @@ def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
         assert (first.last(), second.last()) == (k == 10, k == 10)
     both = suite.load("duffing", "track", {"time_limit": 0.2}, changes={"u_max": 2.0, "duration": 3.0})
     scenario = both.task.setting.scenario
-    assert (scenario.duration, scenario.u_max) == (0.2, 2.0)
+    assert (scenario.duration, scenario.resolved.u_max) == (0.2, 2.0)
 
 
 def test_a_mujoco_that_dm_control_does_not_know_is_one_sentence(monkeypatch):

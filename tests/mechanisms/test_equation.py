@@ -65,16 +65,16 @@ def oracle(s, factor=1.0):
 
     `factor` multiplies the true mass.
     """
-    equation, law, h = EQUATION[s.plant.name], SMOOTH[s.law.name], s.physics_step
+    equation, law, h = EQUATION[s.plant.name], SMOOTH[s.law.name], s.resolved.physics_step
     delay, jump = round(s.input_delay / h), math.inf if s.jump is None else round(s.jump.time / h)
-    y, commands, states = np.array([s.x0, s.v0]), [], []
+    y, commands, states = np.array([s.resolved.x0, s.resolved.v0]), [], []
     before = s.plant.values({**s.mismatch, "mass": factor * s.mismatch.get("mass", 1.0)})
     after = s.plant.values(s.factors(jump)) if s.jump else before
     for step in range(s.samples * s.steps + 1):
         if step % s.steps == 0:
             r = sine(s.reference, step * h)
             dr = s.reference.amplitude * s.reference.omega * math.cos(s.reference.omega * step * h)
-            commands.append(np.clip(law(s.law.gains, y[0] - r, y[1] - dr), -s.u_max, s.u_max))
+            commands.append(np.clip(law(s.law.gains, y[0] - r, y[1] - dr), -s.resolved.u_max, s.resolved.u_max))
             states.append(y)
         p = after if step >= jump else before
         u = commands[(step - delay) // s.steps] if step >= delay else 0.0
@@ -110,7 +110,7 @@ def test_every_plant_has_its_equation_here():
 @pytest.mark.parametrize("law", sorted(SMOOTH))
 def test_ten_seconds_of_the_closed_loop_follow_the_equation(plant, law):
     scenario = everything(plant, law)
-    assert (scenario.samples, scenario.physics_step, scenario.integrator) == (10_000, 1e-3, "RK4")
+    assert (scenario.samples, scenario.resolved.physics_step, scenario.resolved.integrator) == (10_000, 1e-3, "RK4")
     x, v = error(smc.run(scenario), oracle(scenario))
     assert x < 1e-10  # the requirement is 1e-7
     assert v < 1e-9
@@ -168,7 +168,8 @@ CONDITIONS = {
 
 def disturbance(trace, since):
     """d at each t_k + since, (K, n). What is neither a sine nor process noise is constant within a step here."""
-    rise = np.diff(trace.d, axis=0) * since / trace.scenario.physics_step  # knots at the steps, linear between them
+    step = trace.scenario.resolved.physics_step
+    rise = np.diff(trace.d, axis=0) * since / step  # knots at the steps, linear between them
     d = np.zeros_like(rise)
     for signal in trace.scenario.disturbance:
         if isinstance(signal, smc.Sine):
@@ -199,5 +200,5 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
                 force = trace.applied[part] + disturbance(trace, since)[part]
                 return np.stack([y[1], EQUATION[plant](p, y[0], y[1], force)])
 
-            end = integrated(slope, states[:, part], 0.0, s.physics_step)
+            end = integrated(slope, states[:, part], 0.0, s.resolved.physics_step)
             np.testing.assert_allclose(end, states[:, first + 1 : last + 1], rtol=0, atol=1e-10, err_msg=str(s.law))

@@ -51,7 +51,8 @@ def scenario(name, law="hierarchical", **fields):
 def bound(trace):
     """The largest error of the last fifth, of the cart in m or of what it carries in rad, over the largest x0."""
     assert trace.failure is None
-    return max(each["ultimate_bound"] for each in smc.scores(trace).values()) / max(map(abs, trace.scenario.x0))
+    start = max(map(abs, trace.scenario.resolved.x0))
+    return max(each["ultimate_bound"] for each in smc.scores(trace).values()) / start
 
 
 def surface(trace, law=LAW):
@@ -282,7 +283,7 @@ def turned(y, gains, memory):
 @PLANTS
 def test_the_wrong_sign_fails(name):
     trace = smc.run(scenario(name, turned))
-    assert trace.failure or bound(trace) * max(map(abs, trace.scenario.x0)) > 1.0
+    assert trace.failure or bound(trace) * max(map(abs, trace.scenario.resolved.x0)) > 1.0
 
 
 @PLANTS

@@ -106,7 +106,7 @@ def test_a_condition_of_any_values_has_a_text_and_joins_others():
     array = smc.condition("array", x0=np.array([0.3]))
     assert parse(str(array)) == array
     (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
-    assert run.x0 == (0.3,)
+    assert run.resolved.x0 == (0.3,)
     odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
     with pytest.raises(smc.ScenarioError, match="'odd' and 'noise' both set noise"):
         smc.grid("duffing", "none", odd + find_condition("noise"))
@@ -206,12 +206,12 @@ def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
 def test_starts_are_around_the_plants_own_or_around_a_given_one():
     near = smc.grid("pendulum_network", "none", "nominal", 3)
     x0 = np.array(smc.plant("pendulum_network").x0)
-    assert near[0].x0 == tuple(x0)
-    assert all((np.abs(np.array(s.x0) / x0 - 1.0) <= 0.2).all() for s in near)
+    assert near[0].resolved.x0 == tuple(x0)
+    assert all((np.abs(np.array(s.resolved.x0) / x0 - 1.0) <= 0.2).all() for s in near)
     away = smc.grid("duffing", "none", "nominal", 4, starts=smc.starts(x0=0.0, by=0.3))
-    assert away[0].x0 == (0.0,)
-    assert 0.0 < max(abs(s.x0[0]) for s in away) <= 0.3
-    assert len({s.x0 for s in away}) == 4
+    assert away[0].resolved.x0 == (0.0,)
+    assert 0.0 < max(abs(s.resolved.x0[0]) for s in away) <= 0.3
+    assert len({s.resolved.x0 for s in away}) == 4
 
 
 def test_no_grid_has_the_starts_and_the_noise_of_tuning():
@@ -220,7 +220,7 @@ def test_no_grid_has_the_starts_and_the_noise_of_tuning():
     assert len(tuned) == 7
     with pytest.raises(smc.ScenarioError, match="seed is"):
         smc.grid("duffing", "none", "nominal", [SEEDS])
-    starts = [s.x0[0] for s in Objective().scenarios("duffing", smc.law("classical"), 0)]
+    starts = [s.resolved.x0[0] for s in Objective().scenarios("duffing", smc.law("classical"), 0)]
     assert len(set(starts)) == 7
     assert all(abs(x / 1.5 - 1.0) <= 0.2 for x in starts)
 
@@ -298,7 +298,7 @@ def test_start_is_set_by_condition_or_starts(search):
     more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
     with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
         search("duffing", "classical", **fields, **more)
-    assert [s.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
+    assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
 
 
 def test_grid_asks_where_a_model_at_rest_starts(arm):
@@ -349,7 +349,7 @@ def test_tune_has_the_bound_of_a_grid(arm):
     starts = smc.starts(x0=0.4)
     found = smc.tune(arm, "pid", 2, conditions="nominal", starts=starts)
     (run,) = smc.grid(arm, found.law, starts=starts)
-    assert found.definition.u_max == run.u_max == 20.0
+    assert found.definition.u_max == run.resolved.u_max == 20.0
     assert "|u| <= 20" in str(found.definition)
     assert smc.tune(arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts).definition.u_max == 5.0
 

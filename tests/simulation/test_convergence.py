@@ -19,7 +19,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.metrics.conventions import scale
-from smc_mujoco.simulation.coerce import REALISTIC_STEP
+from smc_mujoco.simulation.scenario import REALISTIC_STEP
 
 LAWS = ("observer_free", "boundary_layer")
 SCORES = ("settling_time", "ultimate_bound", "tv_rate")
@@ -76,7 +76,7 @@ def scenarios(key, law, duration, n, starts):
     first = smc.Scenario(**cases(n)[key], law=made, duration=duration)
     if key[1] not in HUNTING:
         return [first]
-    return [dataclasses.replace(first, x0=[x * (1 - 0.002 * i) for x in first.x0]) for i in range(starts)]
+    return [dataclasses.replace(first, x0=[x * (1 - 0.002 * i) for x in first.resolved.x0]) for i in range(starts)]
 
 
 def brief():
@@ -98,12 +98,12 @@ def scores(trace):
     """The three scores, none below its floor."""
     assert trace.failure is None
     found = smc.score(trace)
-    floors = {"ultimate_bound": FLOOR * scale(trace), "tv_rate": FLOOR * trace.scenario.u_max}
+    floors = {"ultimate_bound": FLOOR * scale(trace), "tv_rate": FLOOR * trace.scenario.resolved.u_max}
     return [max(found[name], floors.get(name, 0.0)) for name in SCORES]
 
 
 def halved(scenario):
-    return dataclasses.replace(scenario, physics_step=scenario.physics_step / 2)
+    return dataclasses.replace(scenario, physics_step=scenario.resolved.physics_step / 2)
 
 
 def study(chosen):
@@ -151,7 +151,7 @@ def test_the_obstacles_of_the_study_are_hit(key, law):
 
 
 def test_realistic_mechanisms_take_the_step_of_the_study_by_default():
-    steps = {group[0].physics_step for key, group in brief().items() if key[1] != "encoder"}
+    steps = {group[0].resolved.physics_step for key, group in brief().items() if key[1] != "encoder"}
     assert steps == {REALISTIC_STEP}
 
 

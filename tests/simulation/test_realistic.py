@@ -16,8 +16,8 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference
-from smc_mujoco.simulation.coerce import REALISTIC_STEP, FilledName, FilledNumber
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.scenario import REALISTIC_STEP
 from smc_mujoco.simulation.trace import ARRAYS
 
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
@@ -375,7 +375,7 @@ def balance(trace, end=-1):
     else:
         u = -gains["k"] * np.clip(gains["c"] * x / gains["phi"], -1.0, 1.0)
     own = [s.plant.nominal(x, 0.0 * x, i, values) for i in range(s.plant.n)]
-    return np.clip(u, -s.u_max, s.u_max) + np.array([f / g for f, g in own])
+    return np.clip(u, -s.resolved.u_max, s.resolved.u_max) + np.array([f / g for f, g in own])
 
 
 def breakaway(friction):
@@ -792,38 +792,43 @@ EVERYTHING = {
 
 def test_what_is_left_out_fits_what_is_there():
     ideal, realistic = scenario(), scenario(friction=smc.Coulomb(0.1))
-    assert (ideal.integrator, ideal.physics_step) == ("RK4", 1e-3)
-    assert (realistic.integrator, realistic.physics_step) == ("implicitfast", REALISTIC_STEP)
+    assert (ideal.resolved.integrator, ideal.resolved.physics_step) == ("RK4", 1e-3)
+    assert (realistic.resolved.integrator, realistic.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)
     for a, b in ((ideal, realistic), (realistic, ideal)):
         there = dataclasses.replace(a, friction=b.friction)
         back = dataclasses.replace(there, friction=a.friction)
         assert there == b
         assert back == a
         assert hash(back) == hash(a)
-    assert dataclasses.replace(realistic, control_period=5e-3).physics_step == REALISTIC_STEP
-    assert dataclasses.replace(realistic, control_period=1e-4).physics_step == 1e-4
+    assert dataclasses.replace(realistic, control_period=5e-3).resolved.physics_step == REALISTIC_STEP
+    assert dataclasses.replace(realistic, control_period=1e-4).resolved.physics_step == 1e-4
 
 
 @pytest.mark.parametrize("field", ["contact", "mechanism", "actuator", "friction"])
 def test_every_realism_brings_its_defaults(field):
     value = {"contact": "stops", "mechanism": "springs", "actuator": smc.Lag(0.01), "friction": LUGRE}[field]
     made = dataclasses.replace(scenario(), **{field: value})
-    assert (made.integrator, made.physics_step) == ("implicitfast", REALISTIC_STEP)
+    assert (made.resolved.integrator, made.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)
 
 
 def test_what_was_given_is_kept():
     given = scenario(integrator="Euler", physics_step=5e-4)
     there = dataclasses.replace(given, friction=smc.Coulomb(0.1))
-    assert (there.integrator, there.physics_step) == ("Euler", 5e-4)
-    assert (dataclasses.replace(there, friction=()).integrator) == "Euler"
+    assert (there.resolved.integrator, there.resolved.physics_step) == ("Euler", 5e-4)
+    assert (dataclasses.replace(there, friction=()).resolved.integrator) == "Euler"
     ideal = scenario(integrator="RK4", physics_step=1e-3)
-    assert dataclasses.replace(ideal, friction=smc.Coulomb(0.1)).integrator == "RK4"
+    assert dataclasses.replace(ideal, friction=smc.Coulomb(0.1)).resolved.integrator == "RK4"
 
 
-def test_filled_in_values_are_plain_values():
+def test_a_scenario_keeps_none_and_resolves_to_the_default():
     s = scenario(friction=LUGRE)
-    assert isinstance(s.physics_step, FilledNumber)
-    assert isinstance(s.integrator, FilledName)
+    assert (s.physics_step, s.integrator, s.x0, s.v0, s.u_max, s.velocity, s.model) == (None,) * 7
+    given = {"physics_step": 5e-4, "integrator": "Euler", "x0": (0.3,), "v0": (0.1,), "u_max": 2.0, "model": "nominal"}
+    kept = scenario(friction=LUGRE, velocity="filtered_difference", **given)
+    for name, value in (given | {"velocity": smc.estimator("filtered_difference")}).items():
+        assert getattr(kept, name) == getattr(kept.resolved, name) == value
+    assert s.resolved.resolved is s.resolved
+    assert dataclasses.replace(s.resolved, physics_step=None).resolved.physics_step == REALISTIC_STEP
     explicit = scenario(friction=LUGRE, integrator="implicitfast", physics_step=REALISTIC_STEP)
     assert s == explicit
     assert hash(s) == hash(explicit)
@@ -835,7 +840,7 @@ def test_a_realistic_scenario_survives_a_pickle_and_stays_refillable():
     assert again == s
     assert hash(again) == hash(s)
     ideal = {"friction": (), "actuator": (), "contact": "none", "mechanism": "equation"}
-    assert dataclasses.replace(again, **ideal, sensor=None, input_delay=0.0).integrator == "RK4"
+    assert dataclasses.replace(again, **ideal, sensor=None, input_delay=0.0).resolved.integrator == "RK4"
 
 
 @PLANTS
@@ -871,5 +876,5 @@ def test_every_channel_starts_with_its_rotor_in_the_middle_of_the_play():
     qpos, qvel = assembly.start(model, s)
     for i, joint in enumerate(joint_ids(model)):
         rotor = model.joint(f"rotor:{model.joint(joint).name}")
-        assert qpos[rotor.qposadr[0]] == qpos[model.jnt_qposadr[joint]] == s.x0[i]
-        assert qvel[rotor.dofadr[0]] == s.v0[i]
+        assert qpos[rotor.qposadr[0]] == qpos[model.jnt_qposadr[joint]] == s.resolved.x0[i]
+        assert qvel[rotor.dofadr[0]] == s.resolved.v0[i]

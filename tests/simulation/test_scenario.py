@@ -112,7 +112,7 @@ def test_absurd_clocks_are_refused_and_not_run(fields):
 
 
 def test_an_infinite_bound_on_the_command_is_fine():
-    assert scenario(u_max=INF).u_max == INF
+    assert scenario(u_max=INF).resolved.u_max == INF
 
 
 @pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=brief)
@@ -129,7 +129,7 @@ def test_anything_that_is_a_number_is_taken_as_a_float(field, number):
 )
 def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond(period, step, steps):
     made = scenario(control_period=period)
-    assert made.physics_step == pytest.approx(step, rel=1e-12)
+    assert made.resolved.physics_step == pytest.approx(step, rel=1e-12)
     assert made.steps == steps
 
 
@@ -161,7 +161,7 @@ def test_one_parameter_under_two_names_is_refused(name):
 def test_a_physics_step_that_divides_up_to_rounding_divides_exactly(count):
     made = scenario(control_period=1e-2, physics_step=1e-2 / count * (1 + 1e-12))
     assert made.steps == count
-    assert made.physics_step == 1e-2 / count
+    assert made.resolved.physics_step == 1e-2 / count
 
 
 @pytest.mark.parametrize("delay", [1e-4, 1.5e-3, 0.0107])
@@ -207,13 +207,13 @@ def test_a_state_of_the_wrong_length_is_refused(field, value):
 )
 def test_a_state_is_one_number_or_one_a_channel(value):
     made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
-    assert made.x0 == made.v0 == (0.5, 0.5, 0.5)
+    assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
 
 
 def test_by_default_the_plant_starts_at_rest_where_the_paper_puts_it():
     made = scenario(plant="inverted_pendulum")
-    assert made.x0 == smc.plant("inverted_pendulum").x0
-    assert made.v0 == (0.0,)
+    assert made.resolved.x0 == smc.plant("inverted_pendulum").x0
+    assert made.resolved.v0 == (0.0,)
 
 
 @pytest.mark.parametrize("n", [2, 5, 12])
@@ -221,7 +221,7 @@ def test_a_network_recycles_the_paper_s_initial_positions(n):
     first = smc.plant("pendulum_network").x0
     assert len(first) == 5
     made = scenario(plant=smc.plant("pendulum_network", n=n))
-    assert made.x0 == tuple(first[i % 5] for i in range(n))
+    assert made.resolved.x0 == tuple(first[i % 5] for i in range(n))
 
 
 @pytest.mark.parametrize(
@@ -291,7 +291,7 @@ def test_a_reference_that_is_not_one_signal_is_refused(value):
 def test_what_is_left_out_or_none_is_quiet():
     made = scenario(disturbance=None, noise=None, velocity=None, mismatch=None, jump=None, x0=None, v0=None)
     assert made == scenario()
-    assert made.velocity == smc.estimator("measured")
+    assert made.resolved.velocity == smc.estimator("measured")
 
 
 def test_a_reference_that_is_noise_is_refused():
@@ -571,9 +571,9 @@ def test_a_law_of_the_error_and_its_rates_takes_no_surface(law):
 
 def test_a_law_that_cannot_do_without_the_model_gets_it_unless_told_otherwise():
     without = smc.Scenario(plant="cart_pole", law="hierarchical")
-    assert without.model == "nominal"
-    assert smc.Scenario(plant="cart_pole", law="hierarchical", model="none").model == "none"
-    assert dataclasses.replace(without, law=smc.law("classical")).model == "none"
+    assert without.resolved.model == "nominal"
+    assert smc.Scenario(plant="cart_pole", law="hierarchical", model="none").resolved.model == "none"
+    assert dataclasses.replace(without, law=smc.law("classical")).resolved.model == "none"
 
 
 def test_a_law_for_other_plants_is_refused():

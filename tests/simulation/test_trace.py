@@ -176,7 +176,7 @@ def test_a_law_of_one_s_own_is_never_taken_for_the_library_s(tmp_path):
 def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
     mine = smc.estimator_function(gains={"a": 1.0})(lambda y, gains, memory: gains.a * y.v)()
     again = smc.load(smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")).scenario
-    assert (again.velocity.name, dict(again.velocity.gains)) == (mine.name, {"a": 1.0})
+    assert (again.resolved.velocity.name, dict(again.resolved.velocity.gains)) == (mine.name, {"a": 1.0})
 
 
 def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):

@@ -49,7 +49,7 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
     found = list(executors.batches(scenarios, threads=2))
     assert sorted(map(id, scenarios)) == sorted(id(one.scenario) for batch in found for one in batch)
     for batch in [[one.scenario for one in batch] for batch in found]:
-        assert len({(s.plant.name, s.integrator, s.physics_step) for s in batch}) == 1
+        assert len({(s.plant.name, s.resolved.integrator, s.resolved.physics_step) for s in batch}) == 1
         assert len(batch) == 1 or sum(s.work for s in batch) <= 2 * steps
 
 

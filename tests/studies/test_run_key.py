@@ -43,7 +43,7 @@ def test_a_condition_that_the_paper_has_not_is_told_by_what_differs():
 
 def test_equal_scenarios_have_one_key_and_others_another():
     s = scenario(smc.law("classical"))
-    same = scenario(smc.law("classical"), physics_step=1e-3, integrator="RK4", x0=s.x0)
+    same = scenario(smc.law("classical"), physics_step=1e-3, integrator="RK4", x0=s.resolved.x0)
     assert same == s
     assert key(same) == key(s)
     others = [

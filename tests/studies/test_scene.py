@@ -249,7 +249,7 @@ def test_a_condition_of_the_study_has_its_numbers_and_changes_nothing_else(plant
         assert (scenario.law.name, dict(scenario.law.gains)) == (name, GAINS[plant][name])
         parameters, x0 = PLANTS[plant]
         assert (scenario.plant.name, dict(scenario.plant.parameters)) == (plant, parameters)
-        assert (scenario.x0, set(scenario.v0)) == (x0, {0.0})
+        assert (scenario.resolved.x0, set(scenario.resolved.v0)) == (x0, {0.0})
 
 
 @pytest.mark.parametrize("plant", PLANTS)

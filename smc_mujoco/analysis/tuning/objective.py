@@ -98,7 +98,7 @@ class Objective:
         cases = [dataclasses.replace(first, **conditioned) for conditioned in fields]
         placed = [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
         for one, case in zip(self.conditions, placed, strict=True):
-            if not any(case.x0):
+            if not any(case.resolved.x0):
                 cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
                 raise ScenarioError(
                     f"{case.plant.name} starts at 0 under {one.name!r}, where a law has nothing to do: {cure}"
@@ -116,7 +116,7 @@ class Objective:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
         tracking = min(metrics.itae(trace) / start, FAILED)
-        bound = trace.scenario.u_max if self.u_max is None else self.u_max
+        bound = trace.scenario.resolved.u_max if self.u_max is None else self.u_max
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
 

@@ -40,7 +40,7 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Scenario, default_u_max
 
 __all__ = ["Tuned", "compare", "load", "tune"]
 
@@ -90,9 +90,9 @@ def tune(
         goal = dataclasses.replace(goal, starts=starts)
     budget = whole("budget", budget, 1, LONGEST)
     whole("seed", seed, 0, 10**9)
-    cases = goal.scenarios(plant, coerce.component(law, "law"), seed)
+    cases = goal.scenarios(plant, coerce.law(law), seed)
     plant, law = cases[0].plant, cases[0].law
-    bound = float(coerce.u_max(goal.u_max, plant))
+    bound = goal.u_max or default_u_max(plant)
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
@@ -190,7 +190,7 @@ def _rounded(gain: float) -> float:
 
 def _cheap(case: Scenario) -> Scenario:
     """Return the case under Euler's method, if its own is RK4."""
-    return dataclasses.replace(case, integrator="Euler") if case.integrator == "RK4" else case
+    return dataclasses.replace(case, integrator="Euler") if case.resolved.integrator == "RK4" else case
 
 
 def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:

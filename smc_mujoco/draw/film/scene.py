@@ -156,7 +156,8 @@ def first_channels(scenario: Scenario) -> Scenario:
     if plant.n <= MAX_CHANNELS or plant.direct:
         return scenario
     plant = dataclasses.replace(plant, n=MAX_CHANNELS, x0=plant.x0[:MAX_CHANNELS])
-    return dataclasses.replace(scenario, plant=plant, x0=scenario.x0[:MAX_CHANNELS], v0=scenario.v0[:MAX_CHANNELS])
+    x0, v0 = (values[:MAX_CHANNELS] for values in (scenario.resolved.x0, scenario.resolved.v0))
+    return dataclasses.replace(scenario, plant=plant, x0=x0, v0=v0)
 
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:

@@ -1,10 +1,8 @@
 """The channels of an own model as its user names them, checked against the model."""
 
-import contextlib
-import contextvars
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 
@@ -14,7 +12,6 @@ from smc_mujoco.mechanisms.custom.mjcf import pick
 BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
-RECORDED = contextvars.ContextVar("RECORDED", default=False)  # whether a run that has been is being read
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 
@@ -98,39 +95,28 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 
 
 def starts(
-    plant: str, model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
-) -> tuple[float, ...]:
-    """Return x0: from the channels, else from the keyframe, else from the model.
+    model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
+) -> tuple[dict[str, float], list[Range]]:
+    """Return joint -> x0, rad or m, and the ranges in which the starts must be.
 
-    Only the model's may be outside a range: nobody asked for it, and a scenario can have another.
+    x0 comes from the channels, else from the keyframe, else from the model. Only the model's own may be outside its
+    range, because the user did not choose it, and a scenario can have another.
     """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
-    asked_for = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
-    asked_for |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
-    x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | asked_for
-    checked = [one for one in ranges(model, joints) if keyframe is not None or one[0] in asked_for]
-    within(plant, checked, [x0[joint] for joint, _, _ in checked])
-    return tuple(x0.values())
+    chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
+    chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
+    x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | chosen
+    return x0, [one for one in ranges(model, joints) if keyframe is not None or one[0] in chosen]
 
 
-def within(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
-    """Raise ScenarioError for a start outside a joint's range, unless the run is a recorded one."""
+def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
+    """Raise ScenarioError for a start outside a joint's range."""
     for (joint, low, high), x in zip(ranges, x0, strict=False):
-        if not (low - BEYOND <= x <= high + BEYOND or RECORDED.get()):
+        if not low - BEYOND <= x <= high + BEYOND:
             raise ScenarioError(
                 f"x0 of joint {joint!r} of {plant} is {x:g}, outside its range from {low:g} to {high:g}: "
                 "give another x0"
             )
-
-
-@contextlib.contextmanager
-def recorded() -> Iterator[None]:
-    """Skip validation of scenarios that are read from a recorded run."""
-    token = RECORDED.set(True)
-    try:
-        yield
-    finally:
-        RECORDED.reset(token)
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:

@@ -26,7 +26,16 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.channels import RECORDED, SIMPLE, Channel, check, coerce, joints_of, ranges, starts
+from smc_mujoco.mechanisms.custom.channels import (
+    SIMPLE,
+    Channel,
+    check,
+    check_ranges,
+    coerce,
+    joints_of,
+    ranges,
+    starts,
+)
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.motors import MOTOR, Motor, motor_of, put
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
@@ -139,9 +148,21 @@ def plant_from(
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
+    return own_plant(source, channels, name, keyframe)
+
+
+def own_plant(
+    source: Source,
+    channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
+    name: str | None,
+    keyframe: str | None,
+    recorded: bool = False,
+) -> Plant:
+    """Return the plant of a model, see `plant_from`; of a recorded run, without the rules for new ones."""
     label, model = source.label, source.compiled(source.read())
-    if not RECORDED.get():
+    if not recorded:
         mjcf.check_model(label, model)
+        check_name(name)
     pairs = coerce(channels)
     joints = joints_of(pairs)
     check(label, model, pairs)
@@ -153,14 +174,17 @@ def plant_from(
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = OwnFields(mass, gravity), tuple(motor.limit for motor in motors)
     units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not, called = missing(model, joints, motors), named(name, label)
+    why_not, called = missing(model, joints, motors), named(label) if name is None else name
+    x0, checked = starts(model, joints, pairs, keyframe)
+    if not recorded:
+        check_ranges(called, checked, [x0[joint] for joint, _, _ in checked])
     return Plant(
         name=called,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
         mass="m",
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
-        x0=starts(called, model, joints, pairs, keyframe),
+        x0=tuple(x0.values()),
         n=len(joints),
         sizes=(len(joints), len(joints)),
         build=build,
@@ -176,16 +200,16 @@ def plant_from(
     )
 
 
-def named(name: str | None, label: str) -> str:
-    """Return the plant's name, which must differ from the library's, because laws and gains refer to plants by name."""
-    if name is None:
-        name = label.removesuffix(".xml")
-        name = name if name not in catalogue() else label
-    if RECORDED.get():
-        return name
-    if errors.name("name", name) in catalogue():
+def named(label: str) -> str:
+    """Return the name of a plant after its model's, and none of the library's."""
+    name = label.removesuffix(".xml")
+    return name if name not in catalogue() else label
+
+
+def check_name(name: str | None) -> None:
+    """Raise ScenarioError for a name of the library's, because laws and gains refer to plants by name."""
+    if name is not None and errors.name("name", name) in catalogue():
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
-    return name
 
 
 def smooth(model: mujoco.MjModel) -> bool:
@@ -261,4 +285,4 @@ def restored(data: Mapping, name: str) -> Plant:
             raise ScenarioError(
                 f"its model {model}, or a file that it names, is another than in the run: put that one back"
             )
-    return plant_from(model, data["channels"], name=name, keyframe=data["keyframe"], assets=assets)
+    return own_plant(mjcf.source(model, assets), data["channels"], name, data["keyframe"], recorded=True)

@@ -17,7 +17,6 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.coerce import U_MAX
 from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
     DIFFERENCED,
     JUMP_HARD,
@@ -30,7 +29,7 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has th
     find_condition,
 )
 from smc_mujoco.simulation.grid import CONTROL_PERIOD, DURATION, NOTHING
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")

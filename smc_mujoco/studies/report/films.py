@@ -67,7 +67,7 @@ class Scene:
 def curve(trace: Trace) -> Curve:
     """Return the channel of a trace that starts farthest out, in few points with every extreme kept."""
     whole = decimate.finite(trace)
-    i = int(np.argmax(np.abs(trace.scenario.x0)))
+    i = int(np.argmax(np.abs(trace.scenario.resolved.x0)))
     t, x, u = whole.t, whole.x[:, i], whole.u[:, i]
     width = decimate.window(trace)
     tu, line = decimate.line(t, u, width)

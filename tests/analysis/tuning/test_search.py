@@ -65,7 +65,7 @@ def test_the_best_of_each_stage_are_run_accurately(found):
 def test_what_is_not_integrated_by_rk4_is_run_as_it_is_in_both_rounds():
     cases = Objective(conditions=("coulomb",)).scenarios("duffing", smc.law("classical"), 0)
     assert search._cheap(cases[0]) == cases[0]
-    assert cases[0].integrator == "implicitfast"
+    assert cases[0].resolved.integrator == "implicitfast"
 
 
 def test_it_stops_exactly_at_the_budget_and_no_set_of_gains_is_paid_for_twice(found):
@@ -227,7 +227,7 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found):
 
 def test_every_law_of_the_paper_is_bounded_by_the_same_u():
     for law in scenarios.LAWS:
-        assert {s.u_max for s in Objective().scenarios("van_der_pol", smc.law(law), 0)} == {6.0}
+        assert {s.resolved.u_max for s in Objective().scenarios("van_der_pol", smc.law(law), 0)} == {6.0}
 
 
 # files

@@ -22,9 +22,9 @@ from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel
-from smc_mujoco.simulation import consistency
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference as plain
+from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.scene import slug
@@ -366,11 +366,11 @@ def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
 def test_u_max_is_what_the_strongest_limited_motor_gives_unless_it_is_said(arm):
     both = arm(rest=ACTUATED.replace('joint="elbow"', 'joint="elbow" ctrlrange="-9 9"'))
     scenario = smc.Scenario(plant=both, law="none")
-    assert (scenario.u_max, scenario.limits) == (9.0, (4.0, 9.0))
+    assert (scenario.resolved.u_max, scenario.limits) == (9.0, (4.0, 9.0))
     assert smc.Scenario(plant=both, law="none", u_max=5.0).limits == (4.0, 5.0)
     elsewhere = dataclasses.replace(scenario, plant=smc.plant("duffing"), v0=0.0)
-    assert (elsewhere.u_max, elsewhere.limits) == (6.0, (6.0,))
-    assert smc.Scenario(plant=arm(["elbow"]), law="none").u_max == 6.0
+    assert (elsewhere.resolved.u_max, elsewhere.limits) == (6.0, (6.0,))
+    assert smc.Scenario(plant=arm(["elbow"]), law="none").resolved.u_max == 6.0
 
 
 def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
@@ -556,7 +556,7 @@ def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
     plant = smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1", partner_x0=0.3)})
     assert plant.x0 == (0.0, 0.3)
     scenario = smc.Scenario(plant=plant, law="hierarchical")
-    assert (scenario.model, scenario.u_max) == ("nominal", 10.0)
+    assert (scenario.resolved.model, scenario.resolved.u_max) == ("nominal", 10.0)
     trace = smc.run(scenario)
     assert np.abs(trace.x[-1]).max() < 1e-5
     assert "hierarchical" in smc.laws(plant)
@@ -612,13 +612,13 @@ def test_a_start_outside_a_joint_s_range_is_refused(bounded):
     with pytest.raises(smc.ScenarioError, match=REFUSED):
         smc.Scenario(plant=other, law="none", x0=(0.0, 1.2))
     free = bounded({"elbow": smc.Channel(x0=1.2)}, '<option><flag limit="disable"/></option>')
-    assert smc.Scenario(plant=free, law="none").x0 == (1.2,)
+    assert smc.Scenario(plant=free, law="none").resolved.x0 == (1.2,)
 
 
 def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
     plant = bounded()
     for x0 in (MOST + 5e-4, LEAST - 5e-4):
-        assert smc.Scenario(plant=plant, law="none", x0=x0).x0 == (x0,)
+        assert smc.Scenario(plant=plant, law="none", x0=x0).resolved.x0 == (x0,)
     for x0 in (MOST + 2e-3, LEAST - 2e-3):
         with pytest.raises(smc.ScenarioError, match="outside its range"):
             smc.Scenario(plant=plant, law="none", x0=x0)
@@ -638,7 +638,7 @@ def test_a_start_that_is_asked_for_is_refused_with_the_plant_and_the_model_s_own
     with pytest.raises(smc.ScenarioError, match="outside its range"):
         smc.Scenario(plant=own, law="none")
     scenario = smc.Scenario(plant=own, law="none", x0=0.0)
-    assert scenario.x0 == (0.0,)
+    assert scenario.resolved.x0 == (0.0,)
     assert run_key.condition(scenario) == "nominal"
 
 
@@ -677,8 +677,8 @@ def test_what_cannot_hang_is_not_asked_to_swing_up(tmp_path, joint):
     if HANGING[joint]:
         found = core.Setting(plant, "swing_up")
         x = found.draw(np.random.default_rng(0))[0]
-        assert abs(smc.Scenario(plant=plant, law="none", x0=x).x0[1] - math.pi) <= 0.1
-        assert found.scenario.u_max == 20.0
+        assert abs(smc.Scenario(plant=plant, law="none", x0=x).resolved.x0[1] - math.pi) <= 0.1
+        assert found.scenario.resolved.u_max == 20.0
 
 
 def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of_its_own(tmp_path):
@@ -692,7 +692,7 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of
     for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
         plant = smc.plant_from(tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True)))
         scenario = core.Setting(plant, "swing_up").scenario
-        assert scenario.u_max == pytest.approx(0.5 * 2.0 * 9.81)
+        assert scenario.resolved.u_max == pytest.approx(0.5 * 2.0 * 9.81)
 
 
 # what was recorded
@@ -701,9 +701,10 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of
 def test_a_recorded_run_is_read_whatever_would_be_refused_today(bounded, tmp_path, monkeypatch):
     """As versions wrote them that looked at neither ranges nor the names of a mass."""
     with monkeypatch.context() as older:
-        for module in (consistency, own_channels):
-            older.setattr(module, "within", lambda *a: None)
-        older.setattr(consistency, "check_names", lambda s: None)
+        older.setattr(scenario_module, "check_new", lambda s: None)
+        older.setattr(
+            importlib.import_module("smc_mujoco.mechanisms.custom.plant_from"), "check_ranges", lambda *a: None
+        )
         for name, fields in {"start": {"x0": 1.2}, "names": {"mismatch": {"m": 1.1, "mass": 1.2}}}.items():
             smc.run(smc.Scenario(plant=bounded(), law="none", duration=0.05, **fields)).save(tmp_path / name)
         smc.run(smc.Scenario(plant=bounded({"elbow": {"x0": 1.2}}), law="none", duration=0.05)).save(tmp_path / "own")

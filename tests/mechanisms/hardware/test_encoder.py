@@ -110,8 +110,8 @@ def test_noise_comes_before_the_rounding():
 
 
 def test_an_encoder_measures_no_velocity():
-    assert scenario(PERFECT).velocity.name == "filtered_difference"
-    assert scenario(None).velocity.name == "measured"
+    assert scenario(PERFECT).resolved.velocity.name == "filtered_difference"
+    assert scenario(None).resolved.velocity.name == "measured"
 
 
 def test_the_velocity_is_the_filtered_difference_of_the_readings():
@@ -134,16 +134,16 @@ def test_replacing_the_sensor_replaces_the_velocity_that_was_left_out():
     with_encoder, without = scenario(PERFECT), scenario(None)
     assert dataclasses.replace(with_encoder, sensor=None) == without
     assert dataclasses.replace(without, sensor=PERFECT) == with_encoder
-    assert dataclasses.replace(with_encoder, duration=2.0).velocity.name == "filtered_difference"
+    assert dataclasses.replace(with_encoder, duration=2.0).resolved.velocity.name == "filtered_difference"
 
 
 def test_replacing_the_sensor_keeps_a_velocity_that_was_asked_for():
     lagged = smc.estimator("filtered_difference", tau=0.02)
     for velocity in (lagged, "measured", "filtered_difference"):
         asked = scenario(None, velocity=velocity)
-        assert dataclasses.replace(asked, sensor=PERFECT).velocity == asked.velocity
+        assert dataclasses.replace(asked, sensor=PERFECT).resolved.velocity == asked.resolved.velocity
         asked = scenario(PERFECT, velocity=velocity)
-        assert dataclasses.replace(asked, sensor=None).velocity == asked.velocity
+        assert dataclasses.replace(asked, sensor=None).resolved.velocity == asked.resolved.velocity
 
 
 # loss
@@ -214,9 +214,9 @@ def test_losses_are_independent_of_the_noise():
 def expected(sensor, changes, name):
     """What a late sensor reads at the samples, from a run whose trace holds every physics step."""
     late = scenario(sensor, **changes)
-    steps = dataclasses.replace(late, sensor=None, velocity="measured", control_period=late.physics_step)
+    steps = dataclasses.replace(late, sensor=None, velocity="measured", control_period=late.resolved.physics_step)
     fine = getattr(smc.run(steps), name)
-    h = late.physics_step
+    h = late.resolved.physics_step
     delay = round(sensor.delay / h)
     found = []
     for k in range(late.samples + 1):
@@ -389,7 +389,7 @@ def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
 
 def test_an_ideal_plant_with_an_encoder_stays_ideal():
     seen = scenario(smc.Encoder(4096, delay=2e-3))
-    assert (seen.integrator, seen.physics_step, seen.realistic) == ("RK4", 1e-3, False)
+    assert (seen.resolved.integrator, seen.resolved.physics_step, seen.realistic) == ("RK4", 1e-3, False)
 
 
 def test_every_channel_of_a_network_has_its_encoder():

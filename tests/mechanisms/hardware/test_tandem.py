@@ -89,7 +89,7 @@ def moved(s, u):
         volts = motor.scale * a - motor.resistance * i - motor.constant * v
         return v, (f + motor.constant * i) / inertia, (u - a) / lag.tau, volts / motor.inductance
 
-    z, x = [s.x0[0], 0.0, 0.0, 0.0], [s.x0[0]]
+    z, x = [s.resolved.x0[0], 0.0, 0.0, 0.0], [s.resolved.x0[0]]
     for held in u[:-1, 0]:
         z = solve_ivp(rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-8, atol=1e-11).y[:, -1]
         x.append(z[0])

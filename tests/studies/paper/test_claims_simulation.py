@@ -71,7 +71,7 @@ def judged(runs: Runs, id: str) -> str:
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
     """Claims 11, 48 and 49 are of min(lambda, u_max)."""
-    runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.u_max, "max_step": 0.021 * s.u_max})
+    runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.resolved.u_max, "max_step": 0.021 * s.resolved.u_max})
     runs.mutated = lambda law: with_gains(law, lam=60.0)
     assert [judged(runs, id) for id in ("11", "49")] == [REFUTED, REFUTED]
 
@@ -158,7 +158,9 @@ def of_ours(metric: str, rate: float, **told: float) -> Told:
 
 
 def estimated_later(ratio: float) -> Told:
-    return lambda s: {"settling_time": 1.0 if s.velocity is None or s.velocity.name == "measured" else ratio}
+    return lambda s: {
+        "settling_time": 1.0 if s.resolved.velocity is None or s.resolved.velocity.name == "measured" else ratio
+    }
 
 
 def sized(several: float, most: float) -> Told:
@@ -188,7 +190,7 @@ SCORED += [
     ("1", estimated_later(1.25), SUPPORTED),
     ("1", estimated_later(0.7), REFUTED),
     ("1", estimated_later(never), REFUTED),
-    ("1", lambda s: {"settling_time": 1.5 if s.velocity.gains.get("tau") == 0.005 else 1.0}, PARTLY),
+    ("1", lambda s: {"settling_time": 1.5 if s.resolved.velocity.gains.get("tau") == 0.005 else 1.0}, PARTLY),
     ("1", lambda s: {"settling_time": never}, REFUTED),
     ("3", by_plant("tv_rate", others=0.009), SUPPORTED),
     ("3", by_plant("tv_rate", duffing=0.01), REFUTED),
@@ -196,8 +198,8 @@ SCORED += [
     ("4", of_ours("max_u", 1.0), SUPPORTED),
     ("4", of_ours("max_u", 1.001), REFUTED),
     ("4", of_ours("max_u", never), REFUTED),
-    ("5", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.x0))}, SUPPORTED),
-    ("5", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.x0))}, REFUTED),
+    ("5", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.resolved.x0))}, SUPPORTED),
+    ("5", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.resolved.x0))}, REFUTED),
     ("7", sized(2.0, 2.0), SUPPORTED),
     ("7", sized(2.0, 2.1), REFUTED),
     ("7", sized(2.1, never), REFUTED),
@@ -209,14 +211,14 @@ SCORED += [
     ("13", joined(0.9, never), SUPPORTED),
     ("13", joined(0.9, 0.9), PARTLY),
     ("13", joined(never, never), REFUTED),
-    ("15", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.x0))}, SUPPORTED),
+    ("15", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.resolved.x0))}, SUPPORTED),
     ("15", lambda s: {"settling_time": never}, REFUTED),
     ("15", lambda s: {"settling_time": never, "ultimate_bound": 9.0}, REFUTED),
     ("20", held_by(0.4), SUPPORTED),
     ("20", held_by(0.9), REFUTED),
     ("20", lambda s: {"ultimate_bound": 9.0}, REFUTED),
     ("21", lambda s: {"ultimate_bound": 0.0}, SUPPORTED),
-    ("25", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.x0))}, REFUTED),
+    ("25", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.resolved.x0))}, REFUTED),
 ]
 
 
@@ -239,7 +241,7 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
 @pytest.mark.parametrize(("shift", "expected"), [(0.049, SUPPORTED), (0.051, REFUTED)])
 def test_a_nonlinear_input_gain_is_compensated_if_it_changes_little(shift, expected):
     """Claim 10: the run on the plant with the gain is shifted."""
-    drawn = lambda s: (0.0 * T + shift * max(map(abs, s.x0)) * s.law.name.endswith("squeezed"), 0.0 * T)  # noqa: E731
+    drawn = lambda s: (0.0 * T + shift * max(map(abs, s.resolved.x0)) * s.law.name.endswith("squeezed"), 0.0 * T)  # noqa: E731
     assert judged(Stub(drawn=drawn), "10") == expected
 
 
@@ -339,7 +341,7 @@ def test_a_cheap_tanh_must_stay_near_the_exact_one_and_settle():
         REFUTED: lambda s: np.exp(-3.0 * T) + (s.law.name != OURS) * 0.5,
     }
     for expected, x in settled.items():
-        drawn = lambda s, x=x: (s.x0[0] * x(s), 0.0 * T)  # noqa: E731
+        drawn = lambda s, x=x: (s.resolved.x0[0] * x(s), 0.0 * T)  # noqa: E731
         assert judged(Stub(drawn=drawn), "55") == expected
 
 
@@ -356,7 +358,11 @@ def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
 @pytest.mark.parametrize(("shift", "expected"), [(0.0, SUPPORTED), (0.02, REFUTED)])
 def test_saturation_is_avoided_if_the_bound_changes_nothing(shift, expected):
     """Claim 56: only the run under half of lambda is shifted, by 2 % of |x0|."""
-    drawn = lambda s: (0.0 * T + (shift * max(map(abs, s.x0)) if math.isfinite(s.u_max) else 0.0), 0.0 * T)  # noqa: E731
+
+    def drawn(s):
+        bounded = math.isfinite(s.resolved.u_max)
+        return 0.0 * T + (shift * max(map(abs, s.resolved.x0)) if bounded else 0.0), 0.0 * T
+
     assert judged(Stub(drawn=drawn), "56") == expected
 
 
@@ -365,8 +371,8 @@ def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected)
     """Claim 57: the rate falls by `slowed` per x0 of distance; from 1 % of x0 it is 4 1/s."""
 
     def drawn(s: Scenario) -> tuple[np.ndarray, np.ndarray]:
-        far = s.x0[0] / s.plant.x0[0]
-        return s.x0[0] * np.exp(-4.0 * (1.0 - slowed * far) * T), 0.0 * T
+        far = s.resolved.x0[0] / s.plant.x0[0]
+        return s.resolved.x0[0] * np.exp(-4.0 * (1.0 - slowed * far) * T), 0.0 * T
 
     found = of(Stub(drawn=drawn), "57")
     assert verdict(found, catalogue()["57"].quantifier) == expected
@@ -393,7 +399,7 @@ def test_a_jump_is_survived_if_x_stays_within_its_start(mild, hard, expected):
         assert s.jump is not None
         factor = max(s.jump.factors.values())
         after = mild if factor <= 3.0 else hard
-        return max(map(abs, s.x0)) * np.where(T < 5.0, 9.0, after), 0.0 * T
+        return max(map(abs, s.resolved.x0)) * np.where(T < 5.0, 9.0, after), 0.0 * T
 
     assert judged(Stub(drawn=drawn), "59") == expected
 
@@ -406,7 +412,7 @@ def tolerating(most: dict[str, float]) -> Told:
     return lambda s: {
         "ultimate_bound": (0.9 if s.input_delay <= most[s.law.name] + 1e-9 else 1.1)
         * TOLERATED_ERROR
-        * max(map(abs, s.x0))
+        * max(map(abs, s.resolved.x0))
     }
 
 

@@ -116,7 +116,7 @@ def exponential(runs: Runs) -> list[Check]:
     """
     checks = []
     for plant in PLANTS:
-        start = runs.scenario(plant, OURS).x0
+        start = runs.scenario(plant, OURS).resolved.x0
         away = [runs.scenario(plant, OURS, x0=tuple(times * x for x in start)) for times in (NEAR, *FAR)]
         near, *rates = map(decay_rate, runs.traces(away))
         for times, rate in zip(FAR, rates, strict=True):

@@ -49,7 +49,7 @@ Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> wha
 
 def scale(scenario: Scenario) -> float:
     """Return the largest |x0|, of which percentages are; the scale of a run that is to come to rest at 0."""
-    return max(map(abs, scenario.x0)) or 1.0
+    return max(map(abs, scenario.resolved.x0)) or 1.0
 
 
 class Result(NamedTuple):
@@ -154,7 +154,7 @@ def long_run(runs: Runs, plant: str, lam: float, position: float, rate: float = 
 
 def command_bound(runs: Runs, plant: str) -> float:
     """Return min(lambda, u_max), the bound on the u of the paper's law, N or N m; of a mutant with its |lambda|."""
-    return min(abs(runs.law(plant, OURS).gains["lam"]), runs.scenario(plant, OURS).u_max)
+    return min(abs(runs.law(plant, OURS).gains["lam"]), runs.scenario(plant, OURS).resolved.u_max)
 
 
 def comes_to_rest(runs: Runs, grid: Mapping[str, Scenario]) -> list[Check]:
