@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from conftest import QUICK
 
 import smc_mujoco as smc
 
@@ -252,3 +253,8 @@ def test_no_file_names_a_folder_of_one_machine(path):
         r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users""", path.read_text()
     )
     assert found == []
+
+
+def test_every_quick_file_is_there():
+    tests = Path(__file__).parent
+    assert [name for name in QUICK if not (tests / name).is_file()] == []

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import wild
+from wild import nested
 
 import smc_mujoco as smc
 from smc_mujoco.common import arguments
@@ -24,13 +25,6 @@ from smc_mujoco.common.errors import shown
 class Shy:
     def __repr__(self):
         raise KeyError("no")
-
-
-def nested(depth: int) -> list:
-    value: list = []
-    for _ in range(depth):
-        value = [value]
-    return value
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.episodes import columns, dm_control_suite, driven_by_dm, run_of
+from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_of
 
 import smc_mujoco as smc
 from smc_mujoco.control import policy
@@ -23,11 +23,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.Plain
 
 
 Y = Measurement(t=0.0, dt=0.001, x=0.5, v=0.0, e=0.5, de=0.0, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
-
-
-def flat(timestep):
-    """An observation as one array, as gymnasium has it."""
-    return np.concatenate([*timestep.observation.values()])
 
 
 def proportional(observation):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import wild
 from dm_env import StepType, test_utils
-from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, run_of, start
+from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, flat, run_of, start
 
 import smc_mujoco as smc
 from smc_mujoco.common import extras, gl
@@ -208,11 +208,6 @@ def test_seeds_reproduce_starts_and_different_seeds_differ():
     starts = [suite.load("cart_pole", "swing_up", random=seed).reset().observation["position"] for seed in (3, 3, 4)]
     assert np.array_equal(starts[0], starts[1])
     assert not np.array_equal(starts[0], starts[2])
-
-
-def flat(timestep):
-    """An observation as one array, as gymnasium has it."""
-    return np.concatenate([*timestep.observation.values()])
 
 
 # what dm_control and dm_env have

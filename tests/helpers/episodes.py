@@ -66,3 +66,8 @@ def run_of(found, law, fields=None):
     own = {name: getattr(found.scenario, name) for name in (*FIELDS, "plant")}
     own |= {"x0": found.low}  # the tests fix it
     return smc.Scenario(**own, law=law, **(fields or {}))
+
+
+def flat(timestep):
+    """An observation as one array, as gymnasium has it."""
+    return np.concatenate([*timestep.observation.values()])

@@ -11,6 +11,7 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
+from helpers.runs import assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
@@ -49,13 +50,6 @@ def start(plant):
     return {"x0": 0.9 * plant.x0[0], "v0": 3.0} if plant.n == 1 else APART
 
 
-def same(a, b):
-    """Fail unless two traces hold the same bits and ended the same way."""
-    assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
-    for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
-
-
 # the compiled callback and the reference loop
 
 
@@ -85,7 +79,7 @@ def test_callback_equals_plain_loop_with_every_part(name):
     scenarios = [scenario(name, "super_twisting", **fields) for fields in PARTS.values()]
     for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert trace.failure is None
-        same(trace, reference.run(s))
+        assert_same(trace, reference.run(s))
 
 
 @PLANTS
@@ -100,7 +94,7 @@ def test_callback_equals_plain_loop_in_every_contact_and_mechanism(name):
     ]
     for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert trace.failure is None
-        same(trace, reference.run(s))
+        assert_same(trace, reference.run(s))
 
 
 def pick(rng, *options):
@@ -168,7 +162,7 @@ def scattered(number):
 def test_callback_equals_plain_loop_in_scattered_realistic_scenarios():
     scenarios = [scattered(number) for number in range(24)]
     for s, trace in zip(scenarios, smc.run(scenarios, threads=2), strict=True):
-        same(trace, reference.run(s))
+        assert_same(trace, reference.run(s))
 
 
 # one batch
@@ -224,7 +218,7 @@ def one_batch(scenarios):
     alone = [smc.run(s, threads=1) for s in scenarios]
     for threads in (1, 3):
         for a, b in zip(alone, smc.run(scenarios, threads=threads), strict=True):
-            same(a, b)
+            assert_same(a, b)
     return alone
 
 
@@ -234,7 +228,7 @@ def test_scenarios_that_differ_in_numbers_are_one_batch(name, part):
     scenarios = [scenario(name, **fields) for fields in NUMBERS[part]]
     traces = one_batch([scenarios[i] for i in (0, 1, 2, *range(3, len(scenarios)), 0)])
     assert len({trace.u.tobytes() for trace in traces}) == len(scenarios)  # and the numbers arrive
-    same(traces[0], traces[-1])
+    assert_same(traces[0], traces[-1])
 
 
 @pytest.mark.parametrize(("name", "kind"), CONTACT_NUMBERS)
@@ -271,7 +265,7 @@ def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
     ideal, realistic = scenario(**common), scenario(**common, **fields)
     assert prepare(ideal).key != prepare(realistic).key
     for s, trace in zip((realistic, ideal, realistic), smc.run([realistic, ideal, realistic]), strict=True):
-        same(trace, smc.run(s))
+        assert_same(trace, smc.run(s))
 
 
 # with every realism at zero
@@ -749,7 +743,7 @@ def test_a_voltage_that_mujoco_would_drop_ends_the_run():
     weak = smc.DCMotor(torque_constant=1e-10, gear=12.0, resistance=1e3, rotor_inertia=0.0, voltage=math.inf)
     trace = smc.run(scenario(actuator=weak, u_max=math.inf))
     assert trace.failure is not None
-    same(trace, reference.run(trace.scenario))
+    assert_same(trace, reference.run(trace.scenario))
 
 
 @pytest.mark.parametrize("fields", [{"mismatch": {"alpha": -5.0}}, {"jump": smc.Jump(0.05, {"alpha": -5.0})}])
@@ -852,8 +846,8 @@ def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     again = smc.load(trace.save(tmp_path / "a.npz"))
     assert again.scenario == trace.scenario
     assert hash(again.scenario) == hash(trace.scenario)
-    same(again, trace)
-    same(smc.run(again.scenario), trace)
+    assert_same(again, trace)
+    assert_same(smc.run(again.scenario), trace)
 
 
 def test_a_loaded_scenario_still_finds_its_defaults_anew(tmp_path):

@@ -17,33 +17,13 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
 
 UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
 LOGGED = ("x", "v", "u", "applied", "s", "d")
 ARRAYS = (*LOGGED, "r")
-
-
-def scenario(law="classical", **fields):
-    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
-
-
-def made(function, gains=None, memory=8):
-    """A law of a function."""
-    return smc.law_function(gains=gains, memory=memory)(function)()
-
-
-def same(a, b) -> bool:
-    """Whether two traces are equal to the last bit."""
-    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ("t", *ARRAYS))
-
-
-def plainly(*args, **kwargs):
-    """`smc.run` of something that takes the reference loop, without the warning about it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.PlainLoopWarning)
-        return smc.run(*args, **kwargs)
 
 
 def failed(trace, at: float, *words: str):

@@ -25,6 +25,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers.runs import made, plainly, same, scenario
 from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
@@ -42,27 +43,6 @@ PACKAGE = Path(smc.__file__).parent
 RUN = importlib.import_module("smc_mujoco.simulation.run")  # the module; the public name is the function
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 THREE = smc.plant("pendulum_network", n=3)
-
-
-def scenario(law="classical", **fields):
-    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
-
-
-def made(function, gains=None, memory=8):
-    """A law of a function."""
-    return smc.law_function(gains=gains, memory=memory)(function)()
-
-
-def same(a, b) -> bool:
-    """Whether two traces are equal to the last bit."""
-    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ARRAYS)
-
-
-def plainly(*args, **kwargs):
-    """`smc.run` of something that takes the reference loop, without the warning about it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.PlainLoopWarning)
-        return smc.run(*args, **kwargs)
 
 
 # (a) the cache

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.runs import scenario
 from pyarrow import parquet
 from scipy.io import loadmat
 
@@ -50,10 +51,6 @@ def my_law(y, gains, memory):
 def classical(y, gains, memory):
     """A user's own law under the name and with the gains of one of the library."""
     return 0.0, 0.0
-
-
-def scenario(**fields):
-    return smc.Scenario(**{"plant": "duffing", "law": "classical", "duration": 0.02} | fields)
 
 
 def network(**fields):

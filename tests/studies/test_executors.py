@@ -1,7 +1,6 @@
 """Where runs are computed makes no difference to what a study finds."""
 
 import json
-import math
 import os
 import pickle
 import signal
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.runs import fails_late
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.grid import grid
@@ -27,11 +27,6 @@ ROOT = Path(__file__).parents[2]
 
 def mixed() -> list[smc.Scenario]:
     return grid(["duffing", "pendulum_network"], ["classical", "none"], ["nominal", "coulomb"], 3, "study", 0.05)
-
-
-@smc.law_function(gains={"when": 0.02})
-def fails_late(y, gains, memory):
-    return (math.nan if y.t > gains.when else -y.e), y.e
 
 
 @smc.law_function
@@ -215,15 +210,24 @@ def test_a_law_without_a_module_cannot_be_sent():
 # a cluster
 
 CLIENT = """
-import sys
+import sys, time
 from pathlib import Path
 import smc_mujoco as smc
 from smc_mujoco.studies import executors
 from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.study import study
 
 out, address, executors.STEPS, executors.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
 scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)
+add = Store.add
+
+def add_and_wait(store, rows):  # at the third part for the file "go", so that there is work left until then
+    add(store, rows)
+    while len(list(store.parts.glob("*.parquet"))) == 3 and not (out / "go").exists():
+        time.sleep(0.02)
+
+Store.add = add_and_wait
 try:
     study(scenarios, out / "remote", executor=address)
 except smc.ScenarioError as error:
@@ -272,8 +276,8 @@ def dask(tmp_path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
 
 @pytest.fixture
 def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
-    """A study whose first parts the cluster has written."""
-    client = start("-c", CLIENT, str(tmp_path), dask[0], "60", log=tmp_path / "client.log")
+    """A study whose first three parts are written, and that waits for the file "go"."""
+    client = start("-c", CLIENT, str(tmp_path), dask[0], "100", log=tmp_path / "client.log")
     parts = tmp_path / "remote" / "parts"
     try:
         wait(lambda: client.poll() is not None or len(list(parts.glob("*.parquet"))) >= 3)
@@ -288,6 +292,7 @@ def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
     _, (_, *workers) = dask
     workers[0].send_signal(signal.SIGKILL)
+    (tmp_path / "go").touch()
     said, _ = half_done.communicate(timeout=300)
     assert (said, half_done.returncode) == ("True\n", 0), (tmp_path / "client.log").read_text()
     assert (workers[0].poll(), workers[1].poll()) == (-signal.SIGKILL, None)
@@ -296,6 +301,7 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp
 def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
     _, (scheduler, *_) = dask
     scheduler.send_signal(signal.SIGKILL)
+    (tmp_path / "go").touch()
     half_done.communicate(timeout=300)
     log = (tmp_path / "client.log").read_text()
     assert half_done.returncode == 1, log

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from helpers import runs
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
@@ -20,10 +21,7 @@ from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.study import condition, key
 
 ROOT = Path(__file__).parents[2]
-
-
-def scenario(law: smc.Law, **fields) -> smc.Scenario:
-    return smc.Scenario(**({"plant": "duffing", "law": law, "duration": 0.05} | fields))
+scenario = functools.partial(runs.scenario, duration=0.05)
 
 
 @pytest.mark.parametrize("plant", scenarios.PLANTS)

@@ -1,13 +1,15 @@
 """A study loses nothing: whatever befalls it, it ends with the same table, bit for bit."""
 
 import dataclasses
-import math
+import functools
 import os
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers import runs
+from helpers.runs import fails_late
 
 import smc_mujoco as smc
 from smc_mujoco.cli.commands.studies import bench
@@ -20,14 +22,11 @@ from smc_mujoco.studies.study import condition, study
 from smc_mujoco.studies.table import Table
 
 ROOT = Path(__file__).parents[2]
+scenario = functools.partial(runs.scenario, duration=0.05)
 
 
 def small(seeds: int = 2, conditions: tuple[str, ...] = ("nominal", "noise"), duration: float = 0.05) -> list:
     return grid(["duffing"], ["observer_free", "classical"], conditions, seeds, "study", duration)
-
-
-def scenario(law: smc.Law, **fields) -> smc.Scenario:
-    return smc.Scenario(**({"plant": "duffing", "law": law, "duration": 0.05} | fields))
 
 
 def bytes_of(out: Path) -> bytes:
@@ -42,11 +41,6 @@ def none_runs(monkeypatch):
         raise AssertionError("a finished run is run again")
 
     return lambda: monkeypatch.setattr(executors, "simulated", refuse)
-
-
-@smc.law_function(gains={"k": 1.0, "when": 0.02})
-def fails_late(y, gains, memory):
-    return (math.nan if y.t > gains.when else -gains.k * y.e), y.e
 
 
 @smc.law_function
@@ -154,10 +148,10 @@ def test_the_command_takes_no_names_for_none(tmp_path, capsys):
 
 
 def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path, monkeypatch):
-    runs = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
-    study(runs, tmp_path / "together")
+    failing = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
+    study(failing, tmp_path / "together")
     monkeypatch.setattr(executors, "STEPS", 1)
-    table = study(runs, tmp_path / "alone")
+    table = study(failing, tmp_path / "alone")
     assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
     said = table.column("failure")
     assert ["returned" in said[i] for i in range(3)] == [True] * 3

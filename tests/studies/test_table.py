@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from helpers.runs import fails_late
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.grid import grid
@@ -19,11 +20,6 @@ from smc_mujoco.studies.table import Table, content
 
 def small(seeds: int = 2) -> list[smc.Scenario]:
     return grid(["duffing"], ["observer_free", "classical"], ["nominal", "noise"], seeds, "study", duration=0.05)
-
-
-@smc.law_function(gains={"when": 0.02})
-def fails_late(y, gains, memory):
-    return (math.nan if y.t > gains.when else -y.e), y.e
 
 
 def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):

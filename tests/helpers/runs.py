@@ -1,0 +1,45 @@
+"""Short runs and how to compare them: what the tests of simulations and studies share."""
+
+import math
+import warnings
+
+import numpy as np
+
+import smc_mujoco as smc
+
+ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
+
+
+def scenario(law="classical", **fields):
+    """A Duffing oscillator for 20 ms, unless fields say otherwise."""
+    return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
+
+
+def made(function, gains=None, memory=8):
+    """A law of a function."""
+    return smc.law_function(gains=gains, memory=memory)(function)()
+
+
+def plainly(*args, **kwargs):
+    """`smc.run` of something that takes the reference loop, without the warning about it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        return smc.run(*args, **kwargs)
+
+
+def same(a, b) -> bool:
+    """Whether two traces are equal to the last bit."""
+    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ARRAYS)
+
+
+def assert_same(a, b):
+    """Fail unless two traces hold the same bits and ended the same way."""
+    assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
+
+
+@smc.law_function(gains={"k": 1.0, "when": 0.02})
+def fails_late(y, gains, memory):
+    """Returns NaN after a time in s."""
+    return (math.nan if y.t > gains.when else -gains.k * y.e), y.e
