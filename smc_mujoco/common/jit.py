@@ -230,10 +230,19 @@ def reason(error: Exception) -> str:
     return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
 
 
+# Raises out of bounds and at division by zero. Without wrappers for Python, which would take half the time to compile.
+_checked = njit(error_model="python", boundscheck=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once for all laws
+
+
 @functools.cache
 def jit(function: Callable) -> Callable:
     """Compile a function, and the compiled functions that it calls, to raise out of bounds and at division by zero."""
-    try:
-        return remade(function, njit(error_model="python", boundscheck=True))
-    except Exception as error:
-        raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
+    with global_compiler_lock:
+        copies = dict(_shared)
+        try:
+            return remade(function, _checked, copies)
+        except Exception as error:
+            raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
+        finally:
+            _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})

@@ -11,15 +11,21 @@ from typing import Any
 from numba.core.dispatcher import Dispatcher
 
 
-def remade(function: Any, finish: Callable[[Any], Any]) -> Any:
-    """Return `finish` of a function as it was written, after doing the same to the compiled functions that it calls."""
-    return _remade(getattr(function, "py_func", function), finish, {})
+def remade(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
+    """Return `finish` of a function as it was written, after doing the same to the compiled functions that it calls.
+
+    Args:
+      made: functions that are finished already. Those of this call are added.
+    """
+    return _remade(getattr(function, "py_func", function), finish, {} if made is None else made)
 
 
 def _remade(function: Any, finish: Callable, made: dict) -> Any:
-    if not isinstance(function, FunctionType) or not _reaches(function):
+    if not isinstance(function, FunctionType):
         return finish(function)
-    if function not in made:
+    if function not in made and not _reaches(function):
+        made[function] = finish(function)
+    elif function not in made:
         space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
         made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))

@@ -12,12 +12,12 @@ that reaches u or s, the run ends.
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
-import contextlib
 import functools
 import math
 from collections.abc import Callable
 
-from numba import carray
+from numba import carray, types
+from numba.extending import intrinsic
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import AtAddress, Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
@@ -31,29 +31,34 @@ from smc_mujoco.simulation.signals import Signal
 def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return the velocity alone."""
     body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
+    alone_allowed = kind == "estimator"
 
-    def compiled(pair: bool) -> Function:
-        def native(y, g, m, out):
-            ok, result = attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))))
-            if ok:
-                output = carray(pointer(out), (2,))
-                if pair:
-                    first, second = result
-                    output[0], output[1] = first, second
-                else:
-                    output[0], output[1] = result, math.nan  # no acceleration
-            return not ok
+    def native(y, g, m, out):
+        ok, result = attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))))
+        if ok:
+            if alone_allowed:
+                first, second = pair(result)
+            else:
+                first, second = result
+            output = carray(pointer(out), (2,))
+            output[0], output[1] = first, second
+        return not ok
 
-        return Function(native)
+    return Function(native)
 
-    if kind != "estimator":
-        return compiled(pair=True)
-    try:
-        return compiled(pair=False)
-    except NotCompilable:
-        with contextlib.suppress(NotCompilable):
-            return compiled(pair=True)
-        raise
+
+@intrinsic
+def pair(typingctx, result):
+    """Return (v, NaN) for a number v, which is a velocity without acceleration; anything else as it is."""
+    if not isinstance(result, types.Float | types.Integer | types.Boolean):
+        return result(result), lambda context, builder, signature, args: args[0]
+    numbers = types.UniTuple(types.float64, 2)
+
+    def codegen(context, builder, signature, args):
+        v = context.cast(builder, args[0], result, types.float64)
+        return context.make_tuple(builder, numbers, [v, context.get_constant(types.float64, math.nan)])
+
+    return numbers(result), codegen
 
 
 @functools.cache
