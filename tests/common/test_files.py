@@ -1,5 +1,6 @@
 """JSON has one way to write NaN and infinity, and older ways are read; damaged files are one sentence."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -18,7 +19,7 @@ from smc_mujoco.analysis.margins import save as save_margins
 from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
-from smc_mujoco.common.files import from_json, plain, reading, to_json
+from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.paper.claims.audit import document
 from smc_mujoco.studies.paper.claims.verdict import Claim
@@ -189,3 +190,24 @@ def test_what_a_report_kept_is_computed_again_where_it_is_damaged(damage, tmp_pa
     path.write_text(damage)
     assert get() == get() == [odd]
     assert len(made) == 2
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path):
+    """Who has the old file open goes on reading it: nothing is written into it."""
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    with path.open() as reader:
+        with replacing(path) as part:
+            part.write_text("new")
+        assert (reader.read(), path.read_text()) == ("old", "new")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_whose_writing_fails_stays_as_it_was(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    with contextlib.suppress(ZeroDivisionError), replacing(path) as part:
+        part.write_text("half")
+        raise ZeroDivisionError
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
