@@ -156,11 +156,7 @@ def disturbance(value: Signal | Sequence[Signal] | None) -> tuple[Signal, ...]:
 
 def contact(value: Contact | str | None) -> Contact:
     """Return a contact, from itself or its kind; none from None."""
-    if value is None or isinstance(value, str):
-        return Contact("none" if value is None else value)
-    if not isinstance(value, Contact):
-        raise ScenarioError(f"contact is {shown(value)}: give smc.Contact(...), its kind or None")
-    return value
+    return Contact(value) if isinstance(value, str) else Contact("none") if value is None else value
 
 
 def friction(value: Friction | Sequence[Friction] | None) -> tuple[Friction, ...]:

@@ -168,6 +168,9 @@ class Scenario:
             if "converter" in one.metadata
         }
         vars(self).update(new)
+        if not isinstance(self.contact, Contact):
+            kinds = ", ".join(self.plant.contacts)
+            raise ScenarioError(f"contact is {shown(self.contact)}: give smc.Contact(...) or one of {kinds}")
         self.contact.check(self.plant)
         new = {
             "model": coerce.one_of("model", self.model, coerce.MODELS),

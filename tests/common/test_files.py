@@ -119,7 +119,7 @@ def test_maps_of_both_versions(tmp_path):
 
 def test_tunings_of_both_versions(tmp_path):
     shipped = result.shipped("duffing", "classical")
-    worst = dataclasses.replace(shipped.history[0], objective=math.inf, tracking=math.inf)
+    worst = shipped.history[0]._replace(objective=math.inf, tracking=math.inf)
     odd = dataclasses.replace(shipped, before=math.nan, history=(worst, *shipped.history[1:]))
     text = odd.save(tmp_path / "a.json").read_text()
     strict(text)

@@ -20,7 +20,7 @@ from smc_mujoco.envs.tasks import tasks, toppling
 from smc_mujoco.envs.vector_env import BatchEnv
 from smc_mujoco.mechanisms import fidelity
 from smc_mujoco.mechanisms.custom.nominal_model import prepared
-from smc_mujoco.simulation import batch, callback, coerce
+from smc_mujoco.simulation import batch, callback, scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 
@@ -73,7 +73,7 @@ COMPILES = {
 def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
     trace = run_of("none", own)
     trace.save(tmp_path / "own.npz")
-    for kept in (coerce.built, prepared, toppling):  # as the first time in a process
+    for kept in (scenario.built, prepared, toppling):  # as the first time in a process
         kept.cache_clear()
     asked, found = [], []
 

@@ -5,7 +5,7 @@ import itertools
 
 import pytest
 
-from smc_mujoco.analysis.tuning import result, search, search_space
+from smc_mujoco.analysis.tuning import objective, result, search, search_space
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.law import catalogue
@@ -30,7 +30,7 @@ def test_all_laws_were_tuned_alike(gain_set, plant, seed):
     assert {t.rule for t in board} == {search.RULE}
     assert {t.seed for t in board} == {seed}
     assert {t.budget for t in board} == {len(t.history) for t in board} == {96}
-    goal = search.find_objective(gains.OBJECTIVES[gain_set])
+    goal = objective.OBJECTIVES[gains.OBJECTIVES[gain_set]]
     assert {t.definition for t in board} == {dataclasses.replace(goal, u_max=scenarios.U_MAX)}
 
 

@@ -79,8 +79,8 @@ def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_ar
 
 def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
     first = pair[0]
-    failed = [dataclasses.replace(one, tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.finals]
-    resting = [dataclasses.replace(one, variation=0.0) for one in pair[1].finals]
+    failed = [one._replace(tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.finals]
+    resting = [one._replace(variation=0.0) for one in pair[1].finals]
     both = [dataclasses.replace(first, finals=tuple(failed)), dataclasses.replace(pair[1], finals=tuple(resting))]
     svg, _ = pareto(both, tmp_path / "fronts")
     assert "Observer-free: every run failed" in svg.read_text()

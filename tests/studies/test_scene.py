@@ -244,7 +244,7 @@ def test_a_condition_of_the_study_has_its_numbers_and_changes_nothing_else(plant
     comparison = smc.paper.comparison(plant, condition)
     assert list(comparison) == LAWS
     for name, scenario in comparison.items():
-        fields = {field: getattr(scenario, field) for field in COMMON}
+        fields = {field: getattr(scenario.resolved, field) for field in COMMON}
         assert fields == stated(plant, condition)
         assert (scenario.law.name, dict(scenario.law.gains)) == (name, GAINS[plant][name])
         parameters, x0 = PLANTS[plant]

@@ -446,7 +446,7 @@ def test_a_calm_control_has_no_band():
 
 def test_fronts_and_gains_taken_are_of_the_accurate_runs(monkeypatch):
     cheap, taken, best = (Evaluation(gains=(k,), objective=k, tracking=k, variation=1 / k) for k in (0.5, 1.0, 0.8))
-    taken = dataclasses.replace(taken, objective=0.7)
+    taken = taken._replace(objective=0.7)
     tuned = SimpleNamespace(history=(cheap, taken, best), finals=(best, taken), front=[best, taken])
     monkeypatch.setattr(stages.result, "shipped", lambda plant, law: tuned)
     (front,) = stages.fronts(dataclasses.replace(TINY, laws=("classical",)))
