@@ -1,15 +1,25 @@
 """Helpers that laws call: this package's are compiled once for all laws, a user's anew with each law."""
 
+from collections.abc import Callable
+from typing import Any
+
 from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.common.jit import jit
 
 
+def names(function: Callable[..., Any] | None) -> dict[str, Any]:
+    """Return what the names in a compiled function stand for."""
+    compiled: Any = function
+    return getattr(compiled, "py_func", compiled).__globals__
+
+
 def test_laws_share_the_package_s_helpers():
-    one, other = (jit(smc.law(name).function).py_func.__globals__ for name in ("classical", "super_twisting"))
+    plain = smc.law("classical").function
+    one, other = (names(jit(smc.law(name).function)) for name in ("classical", "super_twisting"))
     assert one["sliding"] is other["sliding"]
-    assert one["sliding"] is not smc.law("classical").function.__globals__["sliding"]
+    assert one["sliding"] is not names(plain)["sliding"]
 
 
 def test_a_user_s_helper_follows_a_change_of_its_globals():
@@ -19,5 +29,5 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
     laws = []
     for _ in range(2):
         exec("def mine(y, gains, memory):\n    return helper(y.e), y.e", space)
-        laws.append(jit(space["mine"]).py_func.__globals__["helper"])
+        laws.append(names(jit(space["mine"]))["helper"])
     assert laws[0] is not laws[1]
