@@ -44,7 +44,7 @@ def shortened(s, duration):
 @STUDY
 @pytest.mark.parametrize("condition", smc.paper.CONDITIONS)
 def test_callback_equals_plain_loop_in_every_condition_of_the_study(plant, condition):
-    scenarios = [shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.1) for law in STUDIED]
+    scenarios = [shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.2) for law in STUDIED]
     for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert trace.failure is None
         assert_same(trace, reference.run(scenario))
