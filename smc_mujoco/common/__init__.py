@@ -1,1 +1,1 @@
-"""What every room may use, and which knows nothing of control."""
+"""Helpers for every room. They know nothing of control."""

@@ -1,9 +1,9 @@
-"""Calls of public names: where Python would complain, the argument that does not fit is named instead.
+"""Errors of public calls: an exception of Python becomes a sentence that names the wrong argument.
 
-A public function checks what it is given where it uses it, and says so in a sentence of its own. This module covers the
-rest, once for every public name: when Python raises an exception, the call's arguments are compared with the
-annotations of the signature. The first that does not fit is named, with its value and with what to give. If all fit,
-the exception stays as it is. A call without an exception is not looked at.
+Public functions check the values of their arguments themselves. This module covers the rest, once for every public
+name: when a call raises any other exception, its arguments are compared with the annotations of the signature. The
+error then names the first argument that does not fit, its value, and what to give instead. If all arguments fit, the
+exception stays as it is. A call without an exception is not checked.
 
     kind_of(Sequence[float] | None).takes([1.0, "a"])        # False
     kind_of(Sequence[float] | None).one                      # "a list of numbers or None"
@@ -30,7 +30,7 @@ from smc_mujoco.common.errors import MOST, ScenarioError, number, shown, unknown
 
 OURS = "smc_mujoco"
 LONGEST = 255  # bytes of a file's name
-_KNOWN: set[type] = set()  # classes whose methods explain themselves
+_explained_types: set[type] = set()  # classes whose methods are wrapped already
 
 
 def explained(value: Any) -> Any:
@@ -42,7 +42,7 @@ def explained(value: Any) -> Any:
         value = _explained(value)
         value.__module__ = OURS  # where pickle finds this one
     if isinstance(value, type) and not issubclass(value, BaseException):
-        _open(value)
+        _explain_methods(value)
     if isinstance(value, types.ModuleType):
         for name, held in list(vars(value).items()):
             own = isinstance(held, types.FunctionType) and held.__module__ == value.__name__
@@ -51,17 +51,16 @@ def explained(value: Any) -> Any:
     return value
 
 
-def _open(kind: type) -> None:
-    """Make the methods of one of our classes explain themselves."""
-    if kind in _KNOWN or kind.__module__.partition(".")[0] != OURS:
+def _explain_methods(kind: type) -> None:
+    """Replace the public methods of one of our classes by ones whose calls name the argument that does not fit."""
+    if kind in _explained_types or kind.__module__.partition(".")[0] != OURS:
         return
-    _KNOWN.add(kind)
+    _explained_types.add(kind)
     for name, held in list(vars(kind).items()):
         function = held.__func__ if isinstance(held, classmethod | staticmethod) else held
         if not isinstance(function, types.FunctionType):
             continue
-        asks = name == "__init__" or (not name.startswith("_") and len(function.__annotations__) > 1)
-        if asks:
+        if name == "__init__" or (not name.startswith("_") and len(function.__annotations__) > 1):
             method = _explained(function, kind)
             setattr(kind, name, method if held is function else type(held)(method))
 
@@ -74,7 +73,7 @@ def _explained(function: Callable, home: type | None = None) -> Callable:
         with _explaining(function, home, args, named):
             result = function(*args, **named)
         for one in result[:1] if isinstance(result, list) else (result,):
-            _open(type(one))
+            _explain_methods(type(one))
         return result
 
     @functools.wraps(function)
@@ -82,9 +81,9 @@ def _explained(function: Callable, home: type | None = None) -> Callable:
         with _explaining(function, home, args, named):
             return (yield from function(*args, **named))
 
-    found = iterate if inspect.isgeneratorfunction(function) else call
-    found.explains = function  # pyright: ignore[reportFunctionMemberAccess]
-    return found
+    wrapper = iterate if inspect.isgeneratorfunction(function) else call
+    wrapper.explains = function  # pyright: ignore[reportFunctionMemberAccess]
+    return wrapper
 
 
 @contextlib.contextmanager
@@ -145,7 +144,7 @@ def _unbound(
 
 
 class _Names(dict):
-    """Names in annotations: those of the function's module, then public ones, then those of any loaded module."""
+    """Names in annotations, looked up in the function's module, the public names, then every loaded module."""
 
     def __missing__(self, name: str) -> Any:
         if hasattr(builtins, name):
@@ -156,7 +155,7 @@ class _Names(dict):
         for module in [module for key, module in list(sys.modules.items()) if key.startswith(f"{OURS}.")]:
             if name in vars(module):
                 return vars(module)[name]
-        return type(name, (), {})  # of a module that is not loaded, so that no value is of this type
+        return type(name, (), {})  # a type of a module that is not loaded: no value can be of it
 
 
 class Kind(NamedTuple):
@@ -167,7 +166,7 @@ class Kind(NamedTuple):
     several: str
 
     def takes(self, value: Any) -> bool:
-        """Return whether a value is of this kind; the items of an iterator are not looked at."""
+        """Return whether a value is of this kind; the items of an iterator are not checked."""
         try:
             return self.fits(value)
         except Exception:  # whatever `number`, `whole` and the value's own methods raise
@@ -188,7 +187,7 @@ def _path(value: Any) -> bool:
 
 
 def _number(value: Any) -> bool:
-    plain = isinstance(value, float | np.floating) or math.isfinite(float(value))  # an int beyond floats is no number
+    plain = isinstance(value, float | np.floating) or math.isfinite(float(value))  # raises where an int is too large
     return plain and not isinstance(value, np.ndarray) and number("", value, infinite=True) is not None
 
 
@@ -232,8 +231,8 @@ def kind_of(hint: Any) -> Kind:
 
 
 def _either(arms: Sequence[Kind]) -> Kind:
-    """Return the kind of what is of one of these kinds."""
-    if KINDS[os.PathLike] in arms:  # which takes texts too, if they are paths
+    """Return the union of these kinds."""
+    if KINDS[os.PathLike] in arms:  # a text that is a path fits it
         arms = [arm for arm in arms if arm is not KINDS[str]]
     one, several = _joined([arm.one for arm in arms]), _joined([arm.several for arm in arms])
     return Kind(lambda value: any(arm.takes(value) for arm in arms), one, several)
@@ -246,7 +245,7 @@ def _joined(words: Sequence[str]) -> str:
 
 
 def _mapping(kinds: Sequence[Kind]) -> Kind:
-    """Return the kind of dicts from the first kind to the second."""
+    """Return the kind of dicts whose keys are of the first kind and whose values are of the second."""
     keys, values = kinds
 
     def test(value: Any) -> bool:
@@ -268,7 +267,7 @@ def _several(origin: type, held: list[Kind], count: int | None) -> Kind:
         if count not in (None, len(value)):
             return False
         kinds = itertools.repeat(held[0]) if count is None and held else held
-        items = itertools.islice(value, MOST)  # of a range without end the beginning
+        items = itertools.islice(value, MOST)  # a long range would take minutes
         return all(kind.takes(item) for kind, item in zip(kinds, items, strict=False))
 
     plural = held[0].several if held else "values"

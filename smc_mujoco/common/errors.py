@@ -1,4 +1,4 @@
-"""The one error users see: a sentence that names the thing, the value and the cure; and the checks that raise it."""
+"""ScenarioError, the error that users see: one sentence with thing, value and cure; and the checks that raise it."""
 
 import difflib
 import itertools
@@ -13,7 +13,7 @@ import numpy as np
 T = TypeVar("T")
 LONGEST_NAME = 100  # characters: chosen, for tables and figures
 MOST = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-LONGEST = 1500  # characters of a message: a path may have any number
+LONGEST = 1500  # characters of a message, which may hold a long path
 
 
 class ScenarioError(ValueError):
@@ -37,7 +37,7 @@ def shown(value: object) -> str:
     """Return a value's repr on one line of at most 60 characters; its class in <> if the repr fails."""
     try:
         text = " ".join(_brief(value).split())
-    except Exception:  # of a user's class, in a list too; RecursionError where lists nest deep
+    except Exception:  # from a __repr__ of the user's; RecursionError in deeply nested lists
         text = f"<{type(value).__name__}>"
     text = text if len(text) <= 60 else f"{text[:57]}..."
     return printable(text)
@@ -75,7 +75,7 @@ def one_line(text: str, most: int = 200) -> str:
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:
-    """Return known[name], or raise the error of `unknown`."""
+    """Return known[name]; raise ScenarioError, which names the nearest key, if there is none."""
     if not isinstance(name, str) or name not in known:
         raise unknown(kind, name, known)
     return known[name]

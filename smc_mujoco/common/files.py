@@ -1,4 +1,4 @@
-"""Files: those of the package, atomic writing, reading what may be damaged, JSON with NaN and infinity."""
+"""Files: folders of the package, atomic writing, reading of damaged files, JSON with NaN and infinity."""
 
 import contextlib
 import json
@@ -33,7 +33,7 @@ def ended(path: str | os.PathLike, ending: str) -> Path:
 
 
 def writable(path: str | os.PathLike) -> None:
-    """Raise ScenarioError for a file that cannot be written, before minutes go by."""
+    """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
     path = Path(path)
     if path.is_dir():
         raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
@@ -54,7 +54,7 @@ def _writing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
-    """Read a file that may be damaged: whatever goes wrong in the block is one sentence.
+    """Read a file that may be damaged: an exception in the block becomes one sentence.
 
     Args:
       path: of a regular file; a pipe or a device, which may never end, is refused.
@@ -79,7 +79,10 @@ def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words for NaN and the infinities, which JSON lacks; a text that is such a word gets a '."""
+    """Return the data with words for NaN and infinities, which JSON lacks.
+
+    A text that is such a word itself gets the prefix ', which `from_json` removes.
+    """
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
@@ -92,7 +95,7 @@ def plain(data: Any) -> Any:
 
 
 def _restored(data: Any) -> Any:
-    """Undo `plain`, but for tuples, which become lists."""
+    """Undo `plain`, except that tuples become lists."""
     if isinstance(data, dict):
         return {name: _restored(value) for name, value in data.items()}
     if isinstance(data, list):

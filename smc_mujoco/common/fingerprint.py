@@ -26,7 +26,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.jit import AtAddress
-from smc_mujoco.common.remade import names_in
+from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
 BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
@@ -102,7 +102,7 @@ class _CodePickler(pickle._Pickler):
             super().memoize(obj)
 
     def persistent_id(self, obj: Any) -> str | None:
-        """Return the name of what a name identifies, or None."""
+        """Return the name of an object that is identified by its name; None for others."""
         obj = _as_written(obj)
         if isinstance(obj, ModuleType):
             return f"module {obj.__name__}"
@@ -131,7 +131,7 @@ class _CodePickler(pickle._Pickler):
 
 
 def _as_written(thing: Any) -> Any:
-    """Return the function that the user wrote, of one that is compiled, a static method, cached or explained."""
+    """Return the function that the user wrote, without its wrappers: compiled, static, cached or `explained`."""
     if isinstance(thing, FunctionType):
         return getattr(thing, "explains", thing)
     if not isinstance(thing, MethodType | type):

@@ -1,4 +1,4 @@
-"""A dict that cannot change, so that checked data stay as they were checked."""
+"""An immutable dict: data that were checked cannot change afterwards."""
 
 from collections.abc import Mapping
 from typing import NoReturn, TypeVar

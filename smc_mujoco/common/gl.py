@@ -60,8 +60,8 @@ def choice() -> Choice:
 def choose_gl() -> str:
     """Set MUJOCO_GL to a backend that loads here, and return its name ("disabled" for none).
 
-    Call it before mujoco is imported, for renderers of your own; afterwards, and on other systems than Linux, it sets
-    nothing. Films, stills and environments of this package render without it.
+    Call it before mujoco is imported, if you make your own renderers. Later, and on other systems than Linux, it sets
+    nothing. Films, stills and environments of this package do not need it.
     """
     backend = choice().backend
     if sys.platform == "linux" and "mujoco" not in sys.modules:
@@ -101,7 +101,7 @@ def note() -> str | None:
 def missing() -> str | None:
     """Return None if pictures can be rendered, else one sentence: why not, and what to do.
 
-    Renders for real, in a process of its own: a broken driver can end the process it runs in.
+    It renders an empty model in a child process, because a broken driver can end the process that it runs in.
     """
     chosen = choice()
     if chosen.wish in OFF:
@@ -143,10 +143,11 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
     renderer is made, and put back.
 
     Args:
-      height, width: of the picture, px.
+      model: the model that it renders.
+      height, width: size of the picture, px.
 
     Raises:
-      ScenarioError: nothing renders here; the sentence of `missing`.
+      ScenarioError: no backend renders here; the sentence of `missing`.
     """
     import mujoco
 
@@ -160,7 +161,7 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
     backend = choice().backend
     theirs = sys.modules[mujoco.Renderer.__module__].gl_context
     with _LOCK:
-        before = getattr(theirs, "GLContext", None)  # none where MUJOCO_GL turned rendering off
+        before = getattr(theirs, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
         try:
             theirs.GLContext = importlib.import_module(
                 f"mujoco.{backend if backend in LIBRARIES else 'glfw'}"
@@ -178,6 +179,6 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
 
 
 def _close_all() -> None:
-    """Close the renderers that are still open, while OpenGL is there."""
+    """Close the renderers that are still open, before OpenGL ends."""
     for opened in list(_RENDERERS):
         opened.close()

@@ -1,4 +1,4 @@
-"""The machinery of compilation: intrinsics for addresses and calls, and functions compiled so that mistakes show."""
+"""Compilation with numba: intrinsics for addresses and calls, C functions, and laws that check array bounds."""
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
@@ -23,12 +23,12 @@ from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 from smc_mujoco.common.interrupts import held_back
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST = hashlib.sha256().digest_size
 
-if hasattr(os, "register_at_fork"):  # a child would wait for ever for a thread that compiled in its parent
+if hasattr(os, "register_at_fork"):  # else a child would wait for ever for a lock that a thread of its parent held
     os.register_at_fork(
         before=global_compiler_lock.acquire,
         after_in_parent=global_compiler_lock.release,
@@ -41,7 +41,7 @@ class NotCompilable(Exception):
 
 
 def _at(kind: types.Type) -> Callable:
-    """Return a compiled function that takes an address for a pointer of this type."""
+    """Return a compiled function that turns an address into a pointer of this type."""
 
     @intrinsic
     def at(typingctx, address):
@@ -73,7 +73,7 @@ def record_at(dtype: Any) -> Callable:
 
 
 def _calling(bits: int) -> Callable:
-    """Return a compiled function that calls the C function at an address, whose status has so many bits."""
+    """Return a compiled function that calls the C function at an address; its status has this many bits."""
 
     @intrinsic
     def call(typingctx, address, inputs, parameters, memory, outputs):
@@ -136,7 +136,7 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
     Args:
-      cache: whether to keep it on disk, if that can be written, and to load it from there.
+      cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written.
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
@@ -148,7 +148,7 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
 
 
 class Cache(FunctionCache):
-    """Cache of a compiled function on disk. A damaged file is compiled again; a disk without room holds none."""
+    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is no error."""
 
     def __init__(self, body: Callable):
         super().__init__(body)
@@ -156,7 +156,7 @@ class Cache(FunctionCache):
         self._cache_file = Sealed(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write it, unless the disk is full or the files are somebody else's."""
+        """Write it, unless the disk is full or the files belong to another user."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
@@ -179,7 +179,7 @@ class Sealed(IndexDataCacheFile):
 
 
 def _whole(path: str) -> bool:
-    """Return whether a file of the cache is there and as it was written."""
+    """Return whether a file of the cache exists and is undamaged."""
     try:
         content = Path(path).read_bytes()
     except OSError:
@@ -193,13 +193,13 @@ class Function:
     def __init__(self, body: Callable):
         try:
             self._cfunc = compiled(SIGNATURE, body)
-        except Exception as error:  # numba raises many kinds; each means the same to the caller
+        except Exception as error:  # numba raises many types; each means that it cannot compile the function
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address
 
 
 class AtAddress:
-    """Base of laws that are C functions of the callback's type already.
+    """Base of laws that are C functions with the callback's signature already.
 
     Attributes:
       address: of the function, valid as long as this object lives.
@@ -211,7 +211,7 @@ class AtAddress:
 
 
 class Uncompiled:
-    """Base of laws that only run in Python; `why` is the reason, to be put after the law's name."""
+    """Base of laws that only run in Python. `why` is the reason, worded to follow the law's name."""
 
     why: str
 
@@ -241,7 +241,7 @@ def jit(function: Callable) -> Callable:
     with global_compiler_lock:
         copies = dict(_shared)
         try:
-            return remade(function, _checked, copies)
+            return rebuild(function, _checked, copies)
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
         finally:

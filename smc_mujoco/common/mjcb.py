@@ -52,8 +52,8 @@ def installed(control: Any) -> Iterator[None]:
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile a spec.
 
-    A Python callback is removed meanwhile. The thread whose run installed it does so at once, as when a policy makes an
-    environment; other threads wait until that run is over. They do not wait for native callbacks.
+    A Python callback is removed meanwhile. The thread that installed it, as of a policy that makes an environment, does
+    so at once; other threads wait until its run is over. Nobody waits for native callbacks.
 
     Raises:
       ValueError: MuJoCo cannot compile it.

@@ -4,11 +4,11 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
-Report = Callable[[float, float], None]  # called with the work done and the whole, as far as it is known
+Report = Callable[[float, float], None]  # called with the work done and the whole work, as estimated so far
 
 
 class Bar:
-    """Receiver of a piece of work's progress. This one shows nothing; `bar` yields those that do."""
+    """A progress bar. This one draws nothing; `bar` yields one that does."""
 
     def advance(self, work: float) -> None:
         """Add work that is done."""
@@ -56,7 +56,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
-    """Return a function of single pieces of work, which adds them to the work done before and reports the sum."""
+    """Return a function that adds a piece of work to the work done so far, and reports the sum."""
 
     def add(work: float) -> None:
         nonlocal done

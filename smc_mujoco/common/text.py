@@ -4,7 +4,7 @@ import math
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits; "never" for inf; "<1e-9" where little but rounding is left."""
+    """Return a number with this many significant digits; "never" for inf; "<1e-9" below that, which is rounding."""
     if math.isinf(value):
         return "never"
     if 0.0 < abs(value) < 1e-9:

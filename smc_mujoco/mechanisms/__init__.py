@@ -1,1 +1,1 @@
-"""Physics without a controller: plants, and what makes them real."""
+"""Physics without a controller: plants, and the parts that make them real."""

@@ -1,4 +1,4 @@
-"""How far a mechanism that is built by other means departs from its plant's equation."""
+"""Deviation of a plant's alternative mechanism, such as real springs, from the plant's equation."""
 
 import mujoco
 import numpy as np
@@ -16,13 +16,13 @@ SEED = 0
 def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) -> float:
     """Return the largest |x'' - f| over the largest |f|, for states with |x| and |v| up to `reach`, without a command.
 
-    x'' is the mechanism's, f the plant's equation with the same parameters. One channel takes a grid of states, a
-    network random ones.
+    x'' is the mechanism's, f the plant's equation with the same parameters. The states of one channel lie on a grid,
+    those of a network are random.
 
     Args:
       plant: the plant with its parameters, or its name.
       mechanism: one of plant.mechanisms.
-      reach: m or rad, and the same number a second. Default: the farthest of plant.x0.
+      reach: m or rad for x, m/s or rad/s for v. Default: the largest |x| in plant.x0.
     """
     plant = find_plant(plant) if isinstance(plant, str) else plant
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)

@@ -1,9 +1,8 @@
 """A plant: a MuJoCo mechanism, its equation x'' = f(x, v) + g u, and the map between them.
 
-A plant file states the mechanism's parameters once, in three readings that tests hold together:
-the MJCF beside it (what MuJoCo simulates), `fields` (which model fields a parameter sets) and
-`nominal` (the f and g that a model-based law uses). A channel is one actuated degree of
-freedom: its actuator, its two sensors and its body are read off the compiled model.
+A plant's file describes the mechanism in three ways, and tests check that they agree: its MJCF (what MuJoCo simulates),
+`fields` (which model fields a parameter sets) and `nominal` (the f and g that a model-based law uses). A channel is one
+actuated degree of freedom. Its actuator, its two sensors and its body are found in the compiled model.
 """
 
 import abc
@@ -24,7 +23,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.registry import modules
 
-DIRECTLY = "smc:direct"  # a text in the MJCF of own models: disturbances act on their joints, not on bodies
+DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
 EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
 LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
@@ -37,18 +36,18 @@ class Field(NamedTuple):
     name: str
     at: Any
     value: Any
-    adds: bool = False  # to what the fields before it have written
+    adds: bool = False  # whether the value is added to the present one
 
 
 class Variant(NamedTuple):
-    """Another build of a plant's mechanism: an edit of its MjSpec, and the fields its parameters then set."""
+    """An alternative mechanism of a plant: an edit of its MjSpec, and the fields that its parameters then set."""
 
     edit: Callable[[mujoco.MjSpec], None]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
 
 
 class Nominal(Protocol):
-    """f and g of channel i from all channels' x and v, (n,) each; p: the nominal parameters."""
+    """Function that returns f and g of channel i, from x and v of all channels, (n,) each, and nominal parameters p."""
 
     def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
 
@@ -62,17 +61,17 @@ class Native(NamedTuple):
 
 
 class Coupled(abc.ABC):
-    """Base of compiled nominal models that also depend on the last commands of the other channels."""
+    """Base of nominal models that also depend on the last commands of the other channels."""
 
     @abc.abstractmethod
     def __call__(
         self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
     ) -> tuple[float, float]:
-        """As Nominal, with the last commands u, (n,), of which that of channel i does not count; None: 0."""
+        """Return f and g of channel i, given the last commands u, (n,); u[i] is ignored. None: all are 0."""
 
     @abc.abstractmethod
     def native(self, parameters: Mapping[str, float]) -> Native:
-        """The same for the compiled path, for one simulation."""
+        """Return the C function of the nominal model for one simulation."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -82,27 +81,27 @@ class Plant:
     Attributes:
       name: as in `smc.plants()`.
       parameters: name -> value, SI units; the nominal ones, which laws may know.
-      mass: which parameter the name `mass` stands for in a mismatch or a jump.
-      unit: unit of x, "rad" or "m"; of its first channel where they differ.
-      mixed: units of all channels where they differ, (n,), else (); `units` has them in either case.
-      x0: initial positions of the paper study, (n,), recycled when n is larger.
+      mass: parameter that is meant by "mass" in a mismatch or a jump.
+      unit: unit of x, "rad" or "m"; that of the first channel if they differ.
+      mixed: units of all channels if they differ, (n,), else (); `units` has them in both cases.
+      x0: default initial positions, those of the paper study, (n,).
       n: number of channels.
       sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
       build: n -> MjSpec of the ideal mechanism with the default parameters.
       fields: (model, parameters) -> the model fields which the parameters set.
       nominal: the plant's own f and g.
       lane: offset in metres between machines that stand side by side in a film, (3,).
-      contacts: kind of contact -> the edit of the MjSpec that brings its obstacles and contact pairs.
-      mechanisms: name -> the Variant that realises the equation, or a part of it, by other means.
-      underactuated: whether channels without an actuator come after those with one.
-      placed: parameter -> the value for which the obstacles of its contacts stand.
-      direct: whether disturbances act on its joints themselves, and not on the bodies that they carry.
-      smooth: whether its equation is without limits, contacts and dry friction of its own.
+      contacts: kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs.
+      mechanisms: name -> Variant, which realises the equation, or a part of it, by other means.
+      underactuated: whether it has channels without an actuator, which come after those with one.
+      placed: parameter -> its value in the geometry of the contacts, which another value would not fit.
+      direct: whether disturbances act on its joints, not on the bodies that they carry.
+      smooth: whether its model has no limits, contacts, dry friction and equality constraints.
       unmodelled: why there is no nominal model, or "".
-      limits: what the motors of the driven channels give at most, N m or N each; empty: no limits of their own.
-      label, short: its name in figures, and where there is less room; "": its name in words.
-      jumps: size, "mild" or "hard" -> parameter -> factor on it, of the suite's conditions of that name.
-      ranges: joint, least and largest position of each channel, rad or m; empty: none has limits of its own.
+      limits: largest force of each driven channel's motor, N m or N; empty: no limits.
+      label, short: long and short name in figures; "": made from its name.
+      jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
+      ranges: joint, least and largest position of each channel, rad or m; empty: no joint has limits.
     """
 
     name: str
@@ -141,17 +140,17 @@ class Plant:
 
     @property
     def positive(self) -> frozenset[str]:
-        """Parameters without which there is no mechanism."""
+        """Parameters that must be greater than 0: masses and lengths."""
         return frozenset({self.mass, "M", "m", "l"}) & frozenset(self.parameters)
 
     @property
     def driven(self) -> int:
-        """The number of channels with an actuator: the first ones. Each has at most one joint that moves with it."""
+        """The number of channels with an actuator, which come first. Each has at most one partner without actuator."""
         return self.n // 2 if self.underactuated else self.n
 
     @property
     def free(self) -> int:
-        """The number of channels that are only measured: the last ones."""
+        """The number of channels without an actuator, which come last and are only measured."""
         return self.n - self.driven
 
     @property
@@ -161,17 +160,17 @@ class Plant:
 
     @property
     def network(self) -> bool:
-        """Whether several channels have an actuator, and one unit: then they can be compared with each other."""
+        """Whether several channels have an actuator and the same unit, so that they can be compared with each other."""
         return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
     @property
     def argument(self) -> str:
-        """How the command line calls it: its name, or of a model of the user's FILE.xml:joint+joint."""
+        """Its name on the command line; for a user's model FILE.xml:joint+joint."""
         return getattr(self.build, "argument", self.name)
 
     @property
     def unscaled(self) -> str:
-        """Why tuning cannot take its scales from the plant, or ""."""
+        """Why tuning cannot derive its scales from the plant, or ""."""
         if self.underactuated or self.mixed:
             return "it has free joints, or channels of two units: choose a plant that has neither"
         return f"it has no nominal model, of which tuning takes its scales: {self.unmodelled}" * bool(self.unmodelled)
@@ -211,7 +210,7 @@ class Plant:
 def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
-    # otherwise MuJoCo would start a run that diverges again, from the initial state
+    # else MuJoCo would reset a diverging run to the initial state and go on
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
     return compiled(spec)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from smc_mujoco.common import jit
 from smc_mujoco.common.errors import one_line, shown
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
@@ -256,7 +256,7 @@ class PythonComponent:
 
     def __init__(self, c: Component, n: int):
         self.name, self.returns = f"{c.kind} {c.name!r}", RETURNS[c.kind]
-        self.function = remade(c.function, lambda function: function)
+        self.function = rebuild(c.function, lambda function: function)
         self.memory = np.zeros((n, c.memory))
         self.bind(c)
 

@@ -8,7 +8,7 @@ from scipy.linalg import solve_discrete_are
 from scipy.signal import savgol_coeffs
 
 import smc_mujoco as smc
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading, catalogue
 from smc_mujoco.simulation import reference
 from smc_mujoco.studies.paper import scenarios
@@ -23,7 +23,7 @@ SECOND = ("extended_state_observer", "kalman", "integral_chain", "savitzky_golay
 def both(estimator, x, v=None, h=H):
     """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
     function, gains, memory = (
-        remade(estimator.function, lambda f: f),
+        rebuild(estimator.function, lambda f: f),
         reference.gains_of(estimator),
         np.zeros(estimator.memory),
     )

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.simulation import reference
 
@@ -120,7 +120,7 @@ def chain(law, d, x, h, duration, sign=1.0, noise=None, f=0.0, g=1.0, model=0.0,
       limit: bound on |u|.
     """
     count, n = round(duration / h), len(x)
-    function, gains, memory = remade(law.function, lambda f: f), reference.gains_of(law), [0.0] * law.memory
+    function, gains, memory = rebuild(law.function, lambda f: f), reference.gains_of(law), [0.0] * law.memory
     errors = None if noise is None else np.broadcast_to(np.reshape(noise, (count, -1)), (count, n)).tolist()
     taylor = [h**j / math.factorial(j) for j in range(n + 1)]
     # plain lists and one tuple a sample: this loop is most of what the tests of laws take

@@ -1,4 +1,4 @@
-"""The channels of an own model as its user names them, checked against the model."""
+"""Channels of a user's model: the joints that the user names, checked against the model."""
 
 import dataclasses
 import math
@@ -9,7 +9,7 @@ import mujoco
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, taken
 from smc_mujoco.mechanisms.custom.mjcf import pick
 
-BEYOND = 1e-3  # rad or m, chosen: how far beyond a joint's range a start may be, as limits give way by so much
+BEYOND = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
@@ -20,12 +20,13 @@ class Channel:
     """How a joint of a user's model is driven.
 
     Attributes:
-      actuator: name of the motor that drives it; None: the only one that does.
-      motor: whether an ideal motor takes the place of whatever actuators drive the joint, servos or none.
-      partner: a joint without an actuator that moves with it, as a pole on its cart: measured and scored as a channel
-        of its own, after the driven ones, and seen by this one's law in y.q, y.dq, y.fq, y.gq. An actuator that it has
-        nevertheless stays at ctrl = 0, where a motor does nothing, and a servo holds.
-      x0, partner_x0: rad or m, where it starts, and its partner; None: where the keyframe, or the model, has it.
+      actuator: name of the motor that drives the joint; None: its only actuator.
+      motor: whether to replace the joint's actuators, if it has any, by an ideal motor.
+      partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
+        scored as a channel of its own, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
+        y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
+      x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of the keyframe, or of
+        the model.
     """
 
     actuator: str | None = None
@@ -39,7 +40,7 @@ Pairs = tuple[tuple[str, Channel], ...]  # a joint and its Channel, each
 
 
 def coerce(channels: object) -> Pairs:
-    """Return a user's channels as pairs of joint and Channel."""
+    """Coerce a user's channels to pairs of joint and Channel."""
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
     named = isinstance(channels, Mapping)
@@ -56,7 +57,7 @@ def joints_of(channels: Pairs) -> list[str]:
 
 
 def channel(joint: object, value: object) -> Channel:
-    """Return a Channel, a dict of its fields, or None as a Channel."""
+    """Coerce a Channel, a dict of its fields, or None to a Channel."""
     if isinstance(value, Mapping):
         for key in value:
             find("field of a Channel", key, {field.name: None for field in dataclasses.fields(Channel)})
@@ -97,10 +98,10 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 def starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
-    """Return joint -> x0, rad or m, and the ranges in which the starts must be.
+    """Return joint -> x0, rad or m, and the ranges in which positions that the user chose must be.
 
-    x0 comes from the channels, else from the keyframe, else from the model. Only the model's own may be outside its
-    range, because the user did not choose it, and a scenario can have another.
+    x0 comes from the channels, else from the keyframe, else from the model. The model's own x0 may be outside its
+    range, because the user did not choose it, and a scenario can replace it.
     """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}

@@ -1,7 +1,7 @@
-"""Users' models: read from a file, a text, an MjSpec or PyMJCF, tried in a child process, checked, identified by hash.
+"""Users' models: read from a file, text, MjSpec or PyMJCF, tried in a child process, checked, identified by a hash.
 
-MuJoCo compiles a model in its own process, which a model may crash, or whose memory it may fill. So `tried` compiles
-each model once in a child process first, with bounds on time and memory. That takes some hundredths of a second.
+A model may crash the process that compiles it, or fill its memory. So `tried` first compiles each model once in a child
+process, with bounds on time and memory. That takes some hundredths of a second.
 """
 
 import dataclasses
@@ -29,18 +29,20 @@ from smc_mujoco.mechanisms.plant import LARGEST
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
-MEMORY = 4 * 2**30  # bytes of address space that a model may take where it is tried: chosen
-DIGITS = 17  # of numbers in a text made of an MjSpec: all
-SAME = 1e-12  # how far numbers of a model may move when it is written and read: rounding
+MEMORY = 4 * 2**30  # bytes of address space of the child process that tries a model: chosen
+DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
+SAME = 1e-12  # relative and absolute: change of a model's numbers when it is written and read, which is rounding
 
-RESERVED = ("smc:", PLAY, ROTOR)  # beginnings of the names of our own parts
-NAMED = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # the kinds that our own parts are of
-UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")  # in fields that set no motion, or follow
-KINDS = {"body": "BODY", "jnt": "JOINT", "geom": "GEOM", "site": "SITE"}  # how a field's name begins -> what it is of
+RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
+NAMED = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
+# Parts of names of fields that do not affect the motion, or that MuJoCo computes.
+UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
+# Prefix of a field's name -> kind of object it belongs to.
+KINDS = {"body": "BODY", "jnt": "JOINT", "geom": "GEOM", "site": "SITE"}
 KINDS |= {"actuator": "ACTUATOR", "tendon": "TENDON", "eq": "EQUALITY"}
 
 _tried: set[str] = set()  # hashes of models that passed
-_lock = threading.Lock()  # held while MuJoCo writes another number of digits
+_lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Source:
 
     Attributes:
       path: of the file, absolute; "" for a text.
-      sha256: of all that the model is made of, 64 hex digits.
+      sha256: of the model and all files that it names, 64 hex digits.
       text: the MJCF, where there is no file.
       assets: name and content of each file that the text names.
     """
@@ -61,14 +63,14 @@ class Source:
 
     @property
     def label(self) -> str:
-        """The file's name; of a text the name that its file would have."""
+        """The file's name; for a text, the name that the model gives itself, as a file's name."""
         return Path(self.path).name if self.path else f"{_modelname(self.text)}.xml"
 
     def read(self) -> mujoco.MjSpec:
         """Return the model as an editable MjSpec.
 
         Raises:
-          ScenarioError: MuJoCo cannot read it, or the file is another than it was.
+          ScenarioError: MuJoCo cannot read it, or the file has changed.
         """
         try:
             if not self.path:
@@ -100,8 +102,8 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
       assets: name -> content of the files that a text names.
 
     Raises:
-      ScenarioError: none of these, no such file, a file that a text names and nobody gives, or an MjSpec that XML does
-        not hold.
+      ScenarioError: none of these, no such file, a text that names a file which is not in `assets`, or an MjSpec that
+        cannot be written as XML without loss.
     """
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
@@ -120,7 +122,7 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
     path = Path(os.path.abspath(os.fspath(model)))  # pyright: ignore[reportArgumentType]
     try:
         there = path.is_file()
-    except (OSError, ValueError):  # no name that a file can have
+    except (OSError, ValueError):  # not a valid file name
         there = False
     if not there:
         raise ScenarioError(f"no model at {path}: give the path of an MJCF file (.xml)")
@@ -153,7 +155,7 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
     own = spec.copy()
     try:
         model = mjcb.compiled(own)
-        text = _exactly(own)
+        text = _full_precision_xml(own)
     except (ValueError, mujoco.FatalError) as error:
         raise broken("the MjSpec", str(error)) from None
     elements = _elements(text)
@@ -169,12 +171,12 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
     return made
 
 
-def _exactly(spec: mujoco.MjSpec) -> str:
-    """Return the XML of a compiled spec, with all digits where this MuJoCo can write them."""
+def _full_precision_xml(spec: mujoco.MjSpec) -> str:
+    """Return the XML of a compiled spec, with all digits if this version of MuJoCo can write them."""
     library = libmujoco.library()
     try:
         get, put = library._mjPRIVATE__get_xml_precision, library._mjPRIVATE__set_xml_precision
-    except AttributeError:  # `_difference` finds what is lost then
+    except AttributeError:  # the caller checks what is lost, with `_difference`
         return spec.to_xml()
     with _lock:
         before = get()
@@ -205,13 +207,13 @@ def fields(model: mujoco.MjModel) -> list[str]:
 
 
 def tried(source: Source, timeout: float) -> None:
-    """Compile a model in a process of its own, unless this process has done so before.
+    """Compile a model in a child process, unless this process has done so before.
 
     Args:
       timeout: s.
 
     Raises:
-      ScenarioError: MuJoCo cannot read it, dies of it, or takes more time or memory than it may.
+      ScenarioError: MuJoCo cannot read it, crashes, or takes more than the allowed time or memory.
     """
     if source.sha256 in _tried:
         return
@@ -230,18 +232,18 @@ def tried(source: Source, timeout: float) -> None:
             code = process.timed(command, timeout, output=False).returncode
         except process.Late:
             code = None
-        except OSError:  # this process may start none
+        except OSError:  # this process may not start others
             return
         last = (report.read_text(errors="replace") if report.exists() else "").splitlines() or ["loading"]
-    if last[-1].startswith("error") and "plugin" in last[-1]:  # one that its user has loaded here, perhaps
+    if last[-1].startswith("error") and "plugin" in last[-1]:  # the user may have loaded this plugin here
         return
-    if last[-1] not in ("fine", "loading"):  # of the latter no model is to blame
+    if last[-1] not in ("fine", "loading"):  # "loading": MuJoCo did not load, which is not the model's fault
         raise _complaint(source, last[-1], code, timeout)
     _tried.add(source.sha256)
 
 
 def _complaint(source: Source, last: str, code: int | None, timeout: float) -> ScenarioError:
-    """Return what is wrong with a model, from the last line of a trial and how its process ended."""
+    """Return the error for a model, from the last line of its trial and the exit code, None if it was stopped."""
     stage, _, words = last.partition(" ")
     full = code == -getattr(signal, "SIGKILL", 0) or re.search(r"unknown exception|bad_alloc|memory|allocat", words)
     if full:
@@ -259,13 +261,13 @@ def _complaint(source: Source, last: str, code: int | None, timeout: float) -> S
 
 
 def broken(where: str, error: str) -> ScenarioError:
-    """Return MuJoCo's complaint about a model in one line: what, and where."""
+    """Return the error for MuJoCo's message about a model, with the line in the file."""
     text = " ".join(error.split())
     line = re.search(r"[Ll]ine(?: number=)? ?(\d+)", text)
     place = f", line {line[1]}" if line and line[1] != "0" else ""
-    if "Include error" in text or (line and not place):  # MuJoCo does not say in which
+    if "Include error" in text or (line and not place):  # MuJoCo does not say which file
         place = f" in a file that it includes{place}"
-    if parsed := re.search(r"XML_ERROR_(\w+)", text):  # of the parser, before MuJoCo has looked at it
+    if parsed := re.search(r"XML_ERROR_(\w+)", text):  # from the XML parser
         element = re.search(r"XMLElement name=(\S+)", text)
         text = parsed[1].replace("_", " ").lower().replace("parsing", "error in") + (
             f" <{element[1]}>" if element else ""
@@ -286,11 +288,11 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 def digest(path: Path) -> str:
     """Hash the file and every file that it names (includes, attached models, meshes, textures): SHA-256, 64 hex digits.
 
-    Where a name may stand for several files, all of them count.
+    If a name fits several files, all of them are hashed.
     """
     texts, files = [path], {path.resolve(): None}
     names, folders, inner = [], {}, {"": None}
-    for text in texts:  # to which those are added that they name
+    for text in texts:  # grows as files name further files
         folders[text.parent] = None
         elements = _elements(text)
         names += _files(elements)
@@ -308,7 +310,7 @@ def _sha256(parts: Iterable[bytes]) -> str:
 
 
 def _elements(model: Path | str | bytes) -> list[ET.Element]:
-    """Return the elements of an XML file or text; none where it cannot be parsed, which MuJoCo reports."""
+    """Return the elements of an XML file or text; [] if it cannot be parsed, which MuJoCo reports."""
     try:
         return list(ET.fromstring(model.read_bytes() if isinstance(model, Path) else model).iter())
     except (OSError, ValueError, ET.ParseError):
@@ -328,7 +330,7 @@ def _modelname(text: str) -> str:
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for NaN or enormous numbers, and for names that plants use themselves."""
+    """Raise ScenarioError for NaN or enormous numbers, and for names that this package uses itself."""
     check_numbers(label, model)
     for name in [text.decode() for text in model.names.split(b"\0")]:
         for start in filter(name.startswith, RESERVED):
@@ -342,7 +344,7 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
 
 def check_numbers(label: str, model: mujoco.MjModel) -> None:
     """Raise ScenarioError for a number that is NaN, infinite or beyond 1e15 SI units; ranges may be infinite."""
-    named = sorted(fields(model), key=lambda name: name.partition("_")[0] not in KINDS)  # what has names first
+    named = sorted(fields(model), key=lambda name: name.partition("_")[0] not in KINDS)  # objects with names first
     arrays = [(name, getattr(model, name)) for name in named]
     arrays += [(f"opt.{name}", np.atleast_1d(getattr(model.opt, name))) for name in ("gravity", "wind", "density")]
     for field, values in arrays:
@@ -358,7 +360,7 @@ def check_numbers(label: str, model: mujoco.MjModel) -> None:
 
 
 def _where(model: mujoco.MjModel, field: str, i: int) -> str:
-    """Return the body, joint, ... to which a number in a field belongs."""
+    """Return " at" and the body, joint, ... to which number i of a field belongs; "" if it has no name."""
     owner = field.partition("_")[0]
     if owner == "dof":
         owner, i = "jnt", int(model.dof_jntid[i])

@@ -25,7 +25,7 @@ def limit(memory: int) -> None:
     except ImportError:  # Windows
         return
     for kind, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
-        with contextlib.suppress(OSError, ValueError):  # it is bounded more narrowly already
+        with contextlib.suppress(OSError, ValueError):  # the system sets a lower bound already
             resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
 
 

@@ -1,4 +1,4 @@
-"""Motors of an own model's channels: which of its actuators drives a joint, and a motor of gear 1 in its place."""
+"""Motors of a user's model: the actuator that drives each channel's joint, replaced by a motor of gear 1."""
 
 import math
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from smc_mujoco.mechanisms.custom.channels import Channel
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
 
-MOTOR = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # what drives a single joint
+MOTOR = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # they drive a single joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
-STILL = mujoco.mjtDyn.mjDYN_NONE.value
-GROUP = 31  # of motors: none that actuatorgroupdisable can turn off
+NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
+GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
@@ -22,9 +22,9 @@ class Motor(NamedTuple):
     """The motor of a channel.
 
     Attributes:
-      joint: its name.
-      limit: the bound on its force, N m or N.
-      replaced: numbers of the actuators that it replaces.
+      joint: name of the joint.
+      limit: bound on its force, N m or N.
+      replaced: indices of the actuators that it replaces.
     """
 
     joint: str
@@ -36,7 +36,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     """Return the motor that drives a joint.
 
     Raises:
-      ScenarioError: there is none, there are several, or it is no motor that pushes both ways.
+      ScenarioError: the joint has no actuator, has several, or has one that is no motor or pushes one way only.
     """
     number, wanted = model.joint(joint).id, channel.actuator
     bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
@@ -67,10 +67,10 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
-    """Return what an actuator is, if it is not a motor."""
+    """Return why an actuator is not a motor; "" if it is one."""
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
         return "is a servo, a damper or a muscle"
-    if model.actuator_dyntype[i] != STILL or model.actuator_delay[i]:
+    if model.actuator_dyntype[i] != NO_DYNAMICS or model.actuator_delay[i]:
         return "has dynamics or a delay of its own"
     if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
         return "has armature or damping of its own"
@@ -82,7 +82,7 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
 
 
 def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
-    """Return the force that all ranges allow in both directions, N m or N: |u| has one bound."""
+    """Return the largest force that all ranges allow in both directions, N m or N, because |u| has one bound."""
     low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
     if not low < 0.0 < high:
         raise ScenarioError(f"{who} {low:g} to {high:g}, and a law pushes both ways: {cure}")
@@ -90,7 +90,7 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
 
 
 def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
-    """Return the least and the largest force of an actuator at its joint."""
+    """Return the least and the largest force of an actuator at its joint, N m or N."""
     gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
     low, high = -math.inf, math.inf
     clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
@@ -110,8 +110,8 @@ def put(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
         if i in replaced:
             spec.delete(actuator)
         else:
-            actuator.name = f"{PASSIVE}smc:{i}"  # no joint is called so
-    for motor in motors:  # named by joints, as actuators' names may be anything
+            actuator.name = f"{PASSIVE}smc:{i}"  # no joint has this name
+    for motor in motors:  # named after joints: names of actuators may be missing
         made = spec.add_actuator(name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         made.set_to_motor()
         limit = motor.limit if math.isfinite(motor.limit) else 0.0

@@ -5,9 +5,10 @@ x'' = M^-1 (tau + u). The nominal model of channel i is
 
     x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
 
-with u_j the latest command of channel j: of this sample for j < i, of the one before for j > i. So laws of single
-channels, run one after the other, solve M u = v - ... by one Gauss-Seidel sweep per sample, and these converge for
-every positive definite M. A joint q without an actuator that moves with channel i has g = (M^-1)_qi.
+with u_j the latest command of channel j: that of this sample for j < i, that of the sample before for j > i. The laws
+of the channels run one after the other, so each sample is one Gauss-Seidel sweep on the equations of all channels. The
+sweeps converge for every positive definite M. A joint q without an actuator that moves with channel i has g =
+(M^-1)_qi.
 
 The compiled path calls MuJoCo's own functions by address, with a copy of the model that has the nominal parameters and
 an mjData for each simulation. Constraints are left out: contacts, limits, dry friction. A state that is not measured,
@@ -37,7 +38,7 @@ _lock = threading.Lock()
 
 
 class Places(NamedTuple):
-    """The addresses of the channels in qpos, qvel and ctrl, (n,) each; ctrl of the driven ones, (driven,)."""
+    """Indices of the channels in qpos and qvel, (n,) each, and of the driven ones in ctrl, (driven,)."""
 
     qpos: np.ndarray
     qvel: np.ndarray
@@ -50,7 +51,7 @@ class NominalModel(Coupled):
 
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
-    why_not: str = ""  # why there is none
+    why_not: str = ""  # why there is no nominal model
 
     def __call__(self, x, v, i, p, /, u=None):
         """Return f and g of channel i; NaN where there is no nominal model."""
@@ -79,7 +80,7 @@ class NominalModel(Coupled):
             return Native(unknown().address, (), ())
         model, places, _, spare = prepared(self, frozen(parameters))
         try:
-            data = spare.pop()  # each simulation writes whatever it reads before it reads it
+            data = spare.pop()  # used before, but a simulation writes every field before it reads it
         except IndexError:
             data = mujoco.MjData(model)
         borrowed, seen = BorrowedData(data, spare), np.full(2 * len(places.qpos), np.nan)
@@ -106,7 +107,7 @@ class BorrowedData:
 def prepared(
     nominal: NominalModel, parameters: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
-    """Return the model with nominal parameters, its channels' addresses, an MjData for Python, and the pool."""
+    """Return the model with nominal parameters, its channels' indices, an MjData for Python, and the pool."""
     model = ready(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
@@ -155,9 +156,9 @@ def native() -> Function:
         solved = carray(pointer(int(own[11])), (2 * nv,))
         fresh = False
         for j in range(2 * n):
-            if seen[j] != state[j]:  # always true of NaN
+            if seen[j] != state[j]:  # NaN, the initial value, differs from everything
                 fresh, seen[j] = True, state[j]
-        if fresh:  # the same for all channels of a sample
+        if fresh:  # the first channel of a sample; the others have the same state
             for j in range(n):
                 qpos[table[j]], qvel[table[n + j]] = state[j], state[n + j]
             positions(model, data)

@@ -1,14 +1,14 @@
-"""A plant from any MJCF: name the joints that are its channels, and the rest is found in the model.
+"""A plant from any MJCF: the user names the joints that are its channels, and the model supplies the rest.
 
     arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
     trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0), model="nominal"))
 
-A channel's command u is the force on its joint, N m or N: the joint's one motor is put there with gear 1, and what its
-ranges and the joint's actuatorfrcrange allow both ways bounds |u|, beside the scenario's u_max: laws are told so in
-y.limit. Position and velocity sensors are added; the model's own are taken off. Its
-other actuators stay, at ctrl = 0, and joints without a channel move as the model says. Integrator, step and start are
-the scenario's. Disturbances act on the joints themselves. Parameters are m, kg, the mass of all that moves, which
-scales all masses and inertias, and grav, m/s^2.
+A channel's command u is the force on its joint, N m or N. Its motor gets gear 1. |u| is bounded by the scenario's u_max
+and by what the motor's ranges and the joint's actuatorfrcrange allow in both directions; a law reads the bound in
+y.limit. The model's sensors are replaced by a position and a velocity sensor per channel. Other actuators stay at ctrl
+= 0, and joints without a channel move as the model says. Integrator, step and initial state are the scenario's.
+Disturbances act on the joints themselves. The parameters are m in kg, the mass of all that moves, which scales all
+masses and inertias, and grav in m/s^2.
 """
 
 import base64
@@ -48,12 +48,12 @@ if TYPE_CHECKING:
 LONGEST = 86_400.0  # s, of a timeout
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT = "give a law without a model"
-CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # the state of an actuator that moves while ctrl is 0
+CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
 
 
 @dataclasses.dataclass(frozen=True)
 class OwnModel:
-    """The builder of a user's mechanism. It ignores n, which the channels decide."""
+    """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
 
     source: Source
     keyframe: str | None
@@ -61,14 +61,14 @@ class OwnModel:
     motors: tuple[Motor, ...]
 
     def __call__(self, n: int) -> mujoco.MjSpec:
-        """The model with a motor and two sensors a channel.
+        """Return the model with a motor and two sensors per channel.
 
         Raises:
-          ScenarioError: the file is gone, or another than it was.
+          ScenarioError: the file is gone or has changed.
         """
         spec = self.source.read()
-        while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that go
-            spec.delete(named[0])  # from MuJoCo 4 on with the tuples that name it: ask again for what is left
+        while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
+            spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them anew
         put(spec, self.motors)
         for joint in joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
@@ -89,7 +89,7 @@ class OwnModel:
         return f"{path}:{'+'.join(joint for joint, _ in self.channels)}"
 
     def about(self) -> dict:
-        """Return all that plant_from needs to make it again, as plain data."""
+        """Return the arguments with which `restored` makes this plant again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
         data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
         return data if self.source.path else data | _inside(self.source)
@@ -97,14 +97,14 @@ class OwnModel:
 
 @functools.lru_cache(maxsize=32)
 def _inside(source: Source) -> dict:
-    """Return a model's text and the files that it names, as JSON holds them."""
+    """Return a model's text and the files that it names, as data for JSON."""
     assets = {name: base64.b64encode(content).decode() for name, content in source.assets}
     return {"text": source.text, "assets": assets}
 
 
 @dataclasses.dataclass(frozen=True)
 class OwnFields:
-    """The fields that m and grav set: all masses and inertias, and gravity, in proportion to the model's own."""
+    """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and gravity."""
 
     mass: float
     gravity: float
@@ -130,21 +130,21 @@ def plant_from(
 
     Args:
       path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
-      channels: joint -> Channel, or a dict of its fields, or None for what is found; or joints' names alone. Their
-        order is that of the plant's channels.
-      name: of the plant; default: the file's, or the model's.
-      keyframe: one of the model's, by name, at whose positions runs start, at rest but for the scenario's v0; default:
-        the model's initial positions.
+      channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of joints' names. The
+        plant's channels have the same order.
+      name: name of the plant; default: the file's or the model's.
+      keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
+        unless the scenario has a v0.
       assets: name -> content of the files that a text names.
-      timeout: s that MuJoCo may take to compile the model, which is tried in a process of its own first.
+      timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
-      ScenarioError: a model that cannot be read, that ends MuJoCo or takes more than its time or 4 GiB; numbers in it
-        that are NaN, infinite or beyond 1e15; a joint, actuator or keyframe that is not there or does not serve; or a
-        start that is asked for and outside its joint's range.
+      ScenarioError: a model that cannot be read, crashes MuJoCo, or takes more time or memory (4 GiB) than allowed; a
+        number in it that is NaN, infinite or beyond 1e15; an unknown or unsuitable joint, actuator or keyframe; or an
+        x0 outside its joint's range.
 
-    Laws may have model="nominal" where all joints that move with the channels are channels or partners, and no equality
-    constraint holds any; `plant.unmodelled` says why not. Films show the model plainly, in its own colours.
+    A scenario may have model="nominal" if every joint that moves with the channels is a channel or a partner, and no
+    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours.
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
@@ -158,7 +158,7 @@ def own_plant(
     keyframe: str | None,
     recorded: bool = False,
 ) -> Plant:
-    """Return the plant of a model, see `plant_from`; of a recorded run, without the rules for new ones."""
+    """Return the plant of a model, see `plant_from`. `recorded` skips checks added after a run was recorded."""
     label, model = source.label, source.compiled(source.read())
     if not recorded:
         mjcf.check_model(label, model)
@@ -201,13 +201,13 @@ def own_plant(
 
 
 def named(label: str) -> str:
-    """Return the name of a plant after its model's, and none of the library's."""
+    """Return the file's name without .xml as a plant's name; with .xml if the library has a plant of that name."""
     name = label.removesuffix(".xml")
     return name if name not in catalogue() else label
 
 
 def check_name(name: str | None) -> None:
-    """Raise ScenarioError for a name of the library's, because laws and gains refer to plants by name."""
+    """Raise ScenarioError for the name of a plant of the library, because laws and gains refer to plants by name."""
     if name is not None and errors.name("name", name) in catalogue():
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
 
@@ -246,7 +246,7 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
 
 
 def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: int) -> str:
-    """Return what to say about joints, by number, that move with driven joints and their partners, and are neither."""
+    """Return why there is no nominal model: these joints, by index, move with the channels and are not measured."""
     for number in loose:
         kind = mujoco.mjtJoint(model.jnt_type[number])
         if kind not in SIMPLE:
@@ -258,21 +258,21 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: i
     partners += len(bare)
     driven += len(loose) - len(bare)
     first = model.joint(loose[0]).name
-    said = f"joint {first!r} moves with its channels and is not measured"
+    problem = f"joint {first!r} moves with its channels and is not measured"
     if partners not in (0, driven):
         return (
-            f"{said}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take one "
-            f"partner each or none: {WITHOUT}"
+            f"{problem}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take "
+            f"one partner each or none: {WITHOUT}"
         )
     cure = f"a partner with smc.Channel(partner={first!r})" if loose[0] in bare else "a channel"
-    return f"{said}: make it {cure}, or {WITHOUT}"
+    return f"{problem}: make it {cure}, or {WITHOUT}"
 
 
 def restored(data: Mapping, name: str) -> Plant:
     """Return the plant that `OwnModel.about` describes.
 
     Raises:
-      ScenarioError: the file is gone, or another than it was.
+      ScenarioError: the file is gone or has changed.
     """
     if "text" in data:
         model = data["text"]

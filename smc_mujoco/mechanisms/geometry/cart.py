@@ -1,7 +1,7 @@
-"""What a cart on a rail runs into or slides over: end stops, a post on the rail, a rough bed under its block.
+"""Contacts of a cart on a rail: end stops, a post on the rail, a rough bed under its block.
 
-The cart carries rubber buffers at its ends, above the two rails: blows go straight along x. On the bed it has no
-wheels: its block lies on a lining, pressed by its weight through the joint `lift`, and slides by Coulomb's law.
+The cart has rubber buffers at its ends, above the two rails, so that blows act along x. On the bed it has no wheels:
+its block lies on a lining, pressed down by its weight through the joint `lift`, and slides with Coulomb friction.
 """
 
 from collections.abc import Iterator
@@ -12,29 +12,29 @@ from smc_mujoco.mechanisms.hardware.contact import SOLREF_RUB, SPRINGY, bar, box
 from smc_mujoco.mechanisms.plant import Field, Values
 
 STOPPING = 0.5  # restitution of rubber buffers: chosen
-FRICTION = 0.1  # of the block on its bed: chosen, so that 1 N stands against springs of 1 to 3 N and commands of 6 N
+FRICTION = 0.1  # of the block on its bed: chosen, 1 N beside springs of 1 to 3 N and commands of 6 N
 GRAVITY = 9.81  # m/s^2
 
-RAIL = 0.26  # m, the rails' and the cart's height, and
-SIDES = {"front": -0.10, "back": 0.10}  # where they lie across
+RAIL = 0.26  # m, height of the rails and of the cart
+SIDES = {"front": -0.10, "back": 0.10}  # m, y of the rails
 END = 0.20  # m, half the block's length
-LOW, MIDDLE, HIGH = 0.292, 0.342, 0.392  # m, heights of the block
+LOW, MIDDLE, HIGH = 0.292, 0.342, 0.392  # m, heights of the block's bottom, middle and top
 BUFFER = 0.030  # m, radius
-DEEP = 1.0  # m, a stop behind its face: holds 100 m/s
-REACH = END + BUFFER  # m, from the cart's middle to where it hits
+DEEP = 1.0  # m, depth of a stop behind its face, enough for a blow of 100 m/s
+REACH = END + BUFFER  # m, from the cart's middle to the face of its buffers
 PIN = 0.020  # m, radius of the post
-SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, the block in its bed at rest, on the four corners of a box
+SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, how deep the block's four corners sink in at rest
 
 
 def mass_fields(model: mujoco.MjModel, p: Values) -> Iterator[Field]:
-    """Yield the fields that the mass M of a cart that moves by itself sets."""
+    """Yield the fields that the mass M of a cart sets, if nothing else moves with the cart."""
     body = model.body("cart").id
     yield Field("body_mass", body, p.M)
     yield Field("dof_M0", model.dof_bodyid == body, p.M)  # MuJoCo reads a lone slide's inertia here
 
 
 def stops(spec: mujoco.MjSpec, x: float) -> None:
-    """Add end stops that let the cart's middle reach -x and x."""
+    """Add end stops that the cart hits when its middle is at -x or x, m."""
     machine = spec.body("machine")
     for side, sign in (("left", -1), ("right", 1)):
         buffers(spec, side, sign)
@@ -51,7 +51,7 @@ def stops(spec: mujoco.MjSpec, x: float) -> None:
 
 
 def peg(spec: mujoco.MjSpec, x: float) -> None:
-    """Add a post on the front rail that stops a cart coming from the right at x."""
+    """Add a post on the front rail that the cart, coming from the right, hits when its middle is at x, m."""
     machine, place, y = spec.body("machine"), x - REACH - PIN, SIDES["front"]
     buffers(spec, "left", -1)
     box(machine, "peg_clamp", (place - 0.045, y - 0.042, 0.224), (place + 0.020, y + 0.042, 0.300), "graphite")
@@ -68,7 +68,7 @@ def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
 
 
 def bed(spec: mujoco.MjSpec, length: float) -> None:
-    """Replace the rails by a rough bed of half that length, m, on which the block lies."""
+    """Replace the rails by a rough bed from -length to length, m, on which the block lies."""
     for geom in [g for g in spec.geoms if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")]:
         spec.delete(geom)
     machine, cart = spec.body("machine"), spec.body("cart")

@@ -1,4 +1,4 @@
-"""Drawn springs and dampers: a helix of wire or a tube whose ends follow two bodies. Looks only: no mass, no force."""
+"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies. No mass, no force."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     """Add a coil spring to spec, as the skin `name`.
 
     Args:
-      start, end: (body, where the body is, where the wire ends), metres in the world with every joint at 0.
-        A point at s in [0, 1] between them follows the bodies by 1 - s and s: the coil stretches evenly.
+      start, end: (body, position of the body, position of the wire's end), metres in the world with every joint at 0. A
+        point at s in [0, 1] between them follows the bodies with weights 1 - s and s, so the coil stretches evenly.
       radius, wire: radii of the coil and of its wire, m.
       turns: whole turns of the coil.
-      material: its material's name.
+      material: name of its material.
     """
     first, last, axis, up = _line(start, end)
     s = np.linspace(0.0, 1.0, turns * STEPS + 1)
@@ -27,9 +27,10 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
 
 
 def tube(spec, name, start, end, *, span, radius, material):
-    """Add a round tube to spec, as the skin `name`, over the part `span`, (from, to) in [0, 1], of the way to the end.
+    """Add a round tube to spec, as the skin `name`.
 
-    The other arguments as in `draw`. The tube stretches with the way.
+    It covers the part `span`, (from, to) in [0, 1], of the line from start to end, and stretches with the line. The
+    other arguments are as in `draw`.
     """
     first, last, axis, up = _line(start, end)
     s = np.array([span[0], span[0], span[1], span[1]])
@@ -41,13 +42,13 @@ def tube(spec, name, start, end, *, span, radius, material):
 
 
 def _line(start, end):
-    """Return the way between two places in the world, its direction, and up."""
+    """Return the ends of the line between two positions in the world, its direction, and up."""
     first, last = np.array(start[2], float), np.array(end[2], float)
     return first, last, (last - first) / np.linalg.norm(last - first), np.array([0.0, 0.0, 1.0])
 
 
 def _skin(spec, name, start, end, material, vertices, s):
-    """Add a skin of rings of vertices (rings, SIDES, 3), which follow the two bodies by 1 - s and s, (rings,)."""
+    """Add a skin of rings of vertices (rings, SIDES, 3) that follow the bodies with weights 1 - s and s, (rings,)."""
     ring = np.arange(len(s) - 1)[:, None] * SIDES
     a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)

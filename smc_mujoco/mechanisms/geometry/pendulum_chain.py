@@ -4,12 +4,12 @@ Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p
 tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the shaft that
 carries the pendulums transmits nothing.
 
-Contact `bobs` puts the pivots side by side in the plane of motion: bobs that hang touch nearly, as in Newton's cradle.
-The torsion springs act all the same, their torques carried from pivot to pivot.
+Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in Newton's cradle.
+The torsion springs still act, with torques carried from pivot to pivot.
 
-Mechanism `springs` joins neighbouring rods by a real spring at `HOOK` from their pivots: k = kc / HOOK^2. Where the
-pivots are one behind the other its rest length is 0 and its torque kc sin(x_j - x_i); where they are side by side its
-rest length is the pitch.
+Mechanism `springs` joins neighbouring rods by a real spring at `HOOK` from their pivots: k = kc / HOOK^2. If the pivots
+are one behind the other, its rest length is 0 and its torque kc sin(x_j - x_i). If they are side by side, its rest
+length is the pitch.
 """
 
 import itertools
@@ -20,16 +20,16 @@ from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit
 from smc_mujoco.mechanisms.plant import Field, model_path
 
-PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass freely
-HEIGHT = 0.8  # m, the shaft above the floor: as the single pendulum's
-HUB = 0.02  # m, half a hub: where a spring's wire ends
+PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each other
+HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
+HUB = 0.02  # m, half the length of a hub, where a spring's wire ends
 KC = 0.5  # N m/rad: chosen for the paper study
-DRAWN = 50  # pendulums up to which springs are drawn: each has a thousand vertices to move a frame
+DRAWN = 50  # most pendulums for which springs are drawn: each has a thousand vertices
 HOOK = 0.25  # m from pivot to real spring: chosen, half a rod
 
-ROW = 0.16  # m between pivots side by side: bobs of 0.13 m that hang leave a gap of 0.03 m, chosen
+ROW = 0.16  # m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
 CLACK = 0.95  # restitution of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
-BEAM = (0.085, 0.125)  # m, where the beam that carries the pivots side by side lies, behind the bobs
+BEAM = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the pivots side by side
 
 
 def compose(single, n, x0):
@@ -60,9 +60,9 @@ def compose(single, n, x0):
 
 
 def strip(unit, pendulum):
-    """Leave only the pendulum in `unit`, and return geom name -> the material it had.
+    """Delete everything but the pendulum from `unit`, and return geom name -> the material it had.
 
-    An attached body brings its file's assets and keyframes: a thousand copies would carry a thousand floors.
+    An attached body brings its file's assets and keyframes, so a thousand copies would bring a thousand floors.
     """
     material = {geom.name: geom.material for geom in pendulum.geoms}
     for geom in pendulum.geoms:
@@ -101,7 +101,7 @@ def stand(spec, n):
 
 
 def pivot(spec, i):
-    """Return where pendulum i hangs or stands, m."""
+    """Return the position of pendulum i's pivot, m."""
     return tuple(spec.body(f"p{i}/pendulum").frame.pos)
 
 
@@ -122,7 +122,7 @@ def draw_spring(spec, i, start, end, radius, turns):
 
 
 def fields(model, p):
-    """Yield the fields that p sets where torsion springs join the pendulums."""
+    """Yield the fields that p sets if torsion springs join the pendulums."""
     springs = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
     yield from pendulum_fields(model, p)
     yield Field("tendon_stiffness", springs, p.kc)
@@ -144,12 +144,12 @@ def pendulum_fields(model, p):
 
 
 def size(model):
-    """Return how many pendulums a chain's model has; actuators may have added joints of their own."""
+    """Return the number of pendulums in a chain's model. It counts bodies, because a Backlash adds joints."""
     return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))
 
 
 def above(bob):
-    """Return +1 where a bob stands above its pivot, -1 where it hangs."""
+    """Return 1 if a bob stands above its pivot, -1 if it hangs."""
     return 1.0 if bob.pos[2] > 0.0 else -1.0
 
 
@@ -187,7 +187,7 @@ def springs(spec):
 
 
 def spring_fields(model, p):
-    """Yield the fields that p sets where the springs are real ones."""
+    """Yield the fields that p sets if real springs join the pendulums."""
     couplings = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
     pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
     yield from pendulum_fields(model, p)

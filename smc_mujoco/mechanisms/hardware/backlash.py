@@ -1,4 +1,4 @@
-"""Backlash: play between what an actuator drives and the channel's joint, as a rotor of its own and MuJoCo's limits."""
+"""Backlash: play between a rotor, which the actuator drives, and the channel's joint. Its stops are MuJoCo's limits."""
 
 import dataclasses
 import math
@@ -21,20 +21,20 @@ from smc_mujoco.mechanisms.hardware.part import (
 from smc_mujoco.mechanisms.plant import Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
-LEAST_INERTIA = 1e-9  # kg m^2 (kg): below, the rotor is lighter than rounding
+LEAST_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class Backlash(Actuator):
     """Play between a rotor, which the actuator drives, and the joint: |rotor - joint| <= gap/2.
 
-    The stops of the play are limits of MuJoCo's, as hard as it takes and critically damped: the flanks meet without
-    bounce. At first the rotor stands in the middle of the play. With no gap the rotor is rigid on the joint, and adds
-    its inertia and damping to it.
+    The stops of the play are MuJoCo's limits, as hard as it allows and critically damped, so the flanks do not bounce.
+    The rotor starts in the middle of the play. With gap 0 the rotor is rigid on the joint, and adds its inertia and
+    damping to it.
 
     Attributes:
       gap: rad (m), the whole play; 0 or more.
-      rotor_inertia: kg m^2 (kg) at the joint, greater than 0, without a DCMotor's own. The default is chosen: 1 % of
+      rotor_inertia: kg m^2 (kg) at the joint, greater than 0; that of a DCMotor is added. The default is chosen: 1 % of
         the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m), 0 or more.
     """

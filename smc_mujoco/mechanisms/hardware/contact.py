@@ -1,22 +1,22 @@
-"""Contact: what a mechanism runs into, falls on or slides over, with its friction and its restitution.
+"""Contact: obstacles that a mechanism hits, falls on or slides over, with friction and restitution.
 
 A plant offers kinds of contact; each is an edit of its MjSpec that brings obstacles and explicit contact pairs, made
 with the helpers below. Two sorts of pair:
 
-- `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and dashpot that push and
-  never pull: r'' = -2 zeta w r' - w^2 r while that pushes. What leaves it at the instant the force is zero keeps
-  e = exp(-2 a cot a) of its speed, with cos a = zeta (zeta > 1: cosh instead): T. Schwager and T. Poeschel,
-  Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9, 2007. It goes sqrt(e)/w deep for
-  each m/s. e chooses zeta; w is chosen for 5 mm per m/s, 1.5 mm between bobs, whatever e is.
-- `rub:...`: sliding under a normal force, by Coulomb's law, with the elliptic cone. MuJoCo's cone pushes what slides
-  also away, with an acceleration mu b v where it sticks by b v: beyond g (1 - d) / d the block hops. So the normal is
-  soft (d = 0.01), and friction is made stiff by impratio: the force then is mu m g within 1 % up to mu v = 0.4 m/s,
-  and within 4 % up to 1 m/s. A stuck block creeps at 2.5e-7 s of the acceleration held back. Under mu g / b, 5 mm/s
-  for mu = 0.1, friction is viscous.
+- `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and dashpot that only push:
+  r'' = -2 zeta w r' - w^2 r, with r the depth, as long as this pushes. The bodies part when the force is zero, with the
+  share e = exp(-2 a cot a) of the speed before, where cos a = zeta (for zeta > 1: cosh): T. Schwager and T. Poeschel,
+  Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9, 2007. The depth is sqrt(e)/w per
+  m/s. The wanted e gives zeta; w is chosen for a depth of 5 mm per m/s, 1.5 mm between bobs, at any e.
+- `rub:...`: sliding under a normal force with Coulomb friction and the elliptic cone. Friction that holds by the
+  acceleration b v at a speed v also pushes a sliding block off the surface, by mu b v. Above g (1 - d) / d the block
+  hops. So the normal is soft (impedance d = 0.01), and impratio makes friction stiff: it is mu m g within 1 % up to mu
+  v = 0.4 m/s, and within 4 % up to 1 m/s. A stuck block creeps at 2.5e-7 s times the acceleration that friction holds
+  back. Below the speed mu g / b, 5 mm/s for mu = 0.1, friction is viscous.
 
-MuJoCo's spring is one of acceleration: its stiffness is that of the mass which the blow meets. Where this mass changes
-during the blow, as between two swinging bobs that graze each other, such a spring would give more than it took; a low
-impedance makes it a spring of force.
+MuJoCo's contact spring sets an acceleration: its stiffness is proportional to the mass that the blow meets. If this
+mass changes during the blow, as between two swinging bobs that graze each other, such a spring would create energy.
+With a low impedance it sets a force instead.
 """
 
 import dataclasses
@@ -32,20 +32,20 @@ from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 HIT, RUB = "hit:", "rub:"
-DEPTH = 0.005  # m for each m/s of a blow: chosen, so that 2 m/s goes 1 cm deep, and e is met within 4 % at 0.25 ms
-# m: chosen, so that no rod of a falling chain slips through a bob. So short a blow meets e within 5 % from 0.5 on; at
-# 0.2 and 0.25 ms it keeps up to 9 % less, at 0.1 up to 12 %.
+DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is met within 4 % at h = 0.25 ms
+# m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a short blow meets e
+# within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at 0.1.
 DEPTH_OF_BOBS = 0.0015
-LIVELIEST = 0.98  # restitution: above, the steps' own error, 1e-3 of a blow's energy, could outdo what the blow loses
-DEAD = 0.01  # restitution below which the dashpot would be too stiff for a step of 1 ms; less is taken as this
+LIVELIEST = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
+DEAD = 0.01  # smallest restitution, used for smaller ones: below, the dashpot is too stiff for a step of 1 ms
 MOST_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
-# Constant impedances d: of blows against what stands still; of blows between bobs, and of sliding. 1 - d of a steady
-# load remains for the spring to carry: enough that what leans on an obstacle lies still, within 0.1 mm; at 0.99 it
+# Constant impedances d: FIRM for blows against a fixed obstacle, SPRINGY for blows between bobs and for sliding. The
+# spring carries 1 - d of a steady load. With FIRM a body that leans on an obstacle rests within 0.1 mm; at 0.99 it
 # rattles.
 FIRM, SPRINGY = 0.95, 0.01
-REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # without effect where d is constant
-SOLREF_RUB = (0.008, 1.0)  # s and damping ratio of the normal: 8 steps of 1 ms, without which the block trembles
-STICKING = 200.0  # 1/s, b: chosen; half of it creeps twice as much, twice of it makes friction waver 4 times as much
+REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # no effect if d is constant
+SOLREF_RUB = (0.008, 1.0)  # s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
+STICKING = 200.0  # 1/s, b: chosen; half makes the block creep twice as fast, twice makes friction vary 4 times as much
 SOLREF_SLIDE = (2.0 / (SPRINGY * STICKING), 1.0)  # s and damping ratio across the normal
 IMPRATIO = 5e3 / SPRINGY  # how much stiffer friction is than the normal
 UNTWISTED = (0.005, 0.0001, 0.0001)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
@@ -58,8 +58,8 @@ class Contact(Part):
 
     Attributes:
       kind: its name, or "none".
-      friction: Coulomb's coefficient of what slides, 0 or more. None: the plant's own.
-      restitution: the speed after a blow over that before, 0 .. 0.98; less than 0.01 is taken as 0.01. None: the
+      friction: coefficient of Coulomb friction where bodies slide, 0 or more. None: the plant's own.
+      restitution: ratio of the speeds after and before a blow, 0 .. 0.98; values below 0.01 count as 0.01. None: the
         plant's own.
     """
 
@@ -74,10 +74,10 @@ class Contact(Part):
         self.check_numbers("restitution", least=0.0, most=LIVELIEST)
 
     def check(self, plant: Plant) -> None:
-        """Raise ScenarioError where the plant does not offer it, or takes no such numbers.
+        """Check that the plant offers this contact.
 
         Raises:
-          ScenarioError: an unknown kind, or a number that nothing of this kind takes.
+          ScenarioError: an unknown kind, or a friction or restitution that this kind does not have.
         """
         if self.kind != "none" and self.kind not in plant.contacts:
             raise unknown(f"contact of {plant.name}", self.kind, ["none", *plant.contacts])
@@ -109,7 +109,7 @@ def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
 
 @functools.cache
 def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco.MjSpec], None]) -> set[str]:
-    """Return which numbers the pairs of a contact take."""
+    """Return which of friction and restitution the pairs of a contact have."""
     spec = build(n)
     edit(spec)
     sorts = {pair.name.partition(":")[0] + ":" for pair in spec.pairs}
@@ -117,8 +117,8 @@ def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco
 
 
 def damping_ratio(restitution: float) -> float:
-    """Return zeta of the spring and dashpot that give a restitution, 0.01 .. 1."""
-    aim = -0.5 * math.log(max(restitution, DEAD))  # of zeta a / sin a, which grows with zeta: 0 at 0, 1 at 1
+    """Return the damping ratio zeta of a spring and dashpot with this restitution, 0.01 .. 1."""
+    aim = -0.5 * math.log(max(restitution, DEAD))  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
     low, high = 0.0, 1.0 + aim
     high *= high
     while high - low > 1e-12 * high:
@@ -128,7 +128,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _loss(zeta: float) -> float:
-    """Return -ln(e) / 2 of a damping ratio."""
+    """Return -ln(e) / 2, with e the restitution at a damping ratio."""
     if abs(zeta - 1.0) < 1e-6:
         return 1.0 + 2.0 / 3.0 * (zeta - 1.0)
     if zeta < 1.0:
@@ -137,10 +137,11 @@ def _loss(zeta: float) -> float:
 
 
 def solref(restitution: float, impedance: float) -> tuple[float, float]:
-    """Return MuJoCo's time constant in s, and damping ratio, of a restitution between bodies that move along a line.
+    """Return solref, MuJoCo's time constant in s and damping ratio, for a restitution of bodies that move on a line.
 
-    In a = a0 + A f, A the inverse mass that the blow meets, MuJoCo makes f = (aref - a0) / (A + R), R = A' (1 - d) / d
-    and A' its own guess of A, the mean over three directions: A / 3. Spring and dashpot act by A / (d A + (1 - d) A').
+    The acceleration is a = a0 + A f, with A the inverse mass that the blow meets. MuJoCo sets f = (aref - a0) / (A + R)
+    with R = A' (1 - d) / d. Its estimate A' of A is the mean over three directions, here A / 3. So the spring and the
+    dashpot act with the share A / (d A + (1 - d) A').
     """
     e = max(restitution, DEAD)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
@@ -149,7 +150,7 @@ def solref(restitution: float, impedance: float) -> tuple[float, float]:
     return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
 
 
-# for plants: pairs and obstacles
+# helpers for plants: pairs and obstacles
 
 
 def hit(spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False) -> None:
@@ -187,7 +188,7 @@ def _pair(
 
 
 def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float]) -> None:
-    """Add an invisible box that can be hit: the depth behind a face, so thick that no blow goes through."""
+    """Add an invisible box to hit, behind a visible face: so deep that no blow passes through it."""
     block = box(body, name, low, high, "ink")
     block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
 

@@ -1,13 +1,13 @@
 """Drives, which turn a law's command u, in N m (N on a slide), into force: lag, rate limit, DC motor.
 
-A scenario takes one, or a Lag and another in series (`tandem`), and a Backlash after them. Numbers are for
-implicitfast, whose steps integrate the drives' states exactly for a held u.
+A scenario takes one drive, or a Lag and another drive in series (`tandem`), and a Backlash after them. The limits below
+hold for implicitfast, whose steps integrate the drives' states exactly for a held u.
 
-Of two in series the second is MuJoCo's own, and the first one's output a is what it is asked for. The first is a lag,
-tau1 a' = u - a from a = 0, which the callback moves on step by step. In between, MuJoCo holds what the second is asked
-for over a physics step of length h, while a moves. It holds the mean of a with the weights exp(-(h - t)/tau2) that the
-second's own lag gives it: this brings the second to where the moving a would. So the output of two lags is exact at the
-end of each step for a held u, as that of one lag is.
+Of two drives in series, MuJoCo simulates the second, and the callback the first: a lag, tau1 a' = u - a from a = 0,
+whose output a is the second's command. MuJoCo holds that command over a physics step of length h, although a moves. So
+it gets the mean of a over the step with the weights exp(-(h - t)/tau2) of the second's own lag, which has the same
+effect at the end of the step. The output of two lags is then exact at the end of each step for a held u, as is that of
+one lag.
 """
 
 import dataclasses
@@ -24,17 +24,17 @@ from smc_mujoco.mechanisms.plant import LARGEST, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
-SUDDEN = 1e-12  # s: a winding that is faster lets MuJoCo divide by nearly nothing
-LEAST_RESISTANCE = 1e-9  # ohm: with less, a command is hardly a voltage that a number can hold
-LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this one, as in MuJoCo
-LEAST_CONSTANT = 1e-9  # N m/A at the joint: a weaker motor is none
+SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
+LEAST_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
+LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this, as in MuJoCo
+LEAST_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
 
 @dataclasses.dataclass(frozen=True)
 class Drive(Actuator):
-    """Base of what turns a command into force."""
+    """Base of drives."""
 
     stateful = True
 
@@ -44,7 +44,7 @@ class Lag(Drive):
     """First-order lag, tau f' = u - f, from f = 0: the force at the end of each physics step, exact for a held u.
 
     Limits: implicitfast or Euler. Under RK4 MuJoCo's filter errs by h/(2 tau), and diverges below tau = h/2.8.
-    tau = 0 is the plant's own actuator, in a model of its own.
+    tau = 0 is the plant's own actuator; it is compiled into another model than tau > 0.
 
     Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u / (mu p + 1)^2: exact
     for a held u too. A Lag may stand before a RateLimit or a DCMotor as well.
@@ -81,8 +81,8 @@ class Lag(Drive):
 class RateLimit(Drive):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
-    MuJoCo's dcmotor in torque mode, with a slew limit; its motor is too weak to notice. Limits: implicitfast or Euler;
-    under RK4 f lags within a step, and slopes near the rate are cut.
+    It is MuJoCo's dcmotor in torque mode, with a slew limit and a back-EMF too small to notice. Limits: implicitfast or
+    Euler; under RK4 f lags within a step, and slopes near the rate are cut.
 
     Attributes:
       rate: N m/s (N/s), greater than 0; math.inf for no limit.
@@ -112,26 +112,27 @@ class DCMotor(Drive):
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
         torque = gear k i + gear cogging sin(gear poles x)        |torque| <= gear k current
-        inertia at the joint: gear^2 rotor_inertia more
+        inertia added at the joint: gear^2 rotor_inertia
 
-    The law is not told: back-EMF takes (gear k)^2/R v, inductance delays by L/R. As gear k goes to 0 without limits
-    the torque becomes u. The current's limit cuts the torque; i itself runs on, and is back within a few L/R.
+    The law does not know it: back-EMF takes (gear k)^2/R v, inductance delays by L/R. Without limits, the torque tends
+    to u as gear k goes to 0. The current's limit cuts the torque, not i, which is back within a few L/R.
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
-    slide gear is in rad/m: a pinion of 82 mm. The gearbox loses nothing: give a friction. A scenario warns of a motor
-    whose torque at rest, `stall`, is less than a joint needs to stand where it starts.
+    slide gear is in rad/m: a pinion of 82 mm. The gearbox has no losses: add a friction. A scenario warns of a motor
+    whose torque at rest, `stall`, is less than a joint needs to stay at its initial position.
 
-    Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is a model of its own.
+    Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is compiled into
+    another model.
 
     Attributes:
       resistance: ohm, 1e-9 or more.
       inductance: H, 0 (current at once) or more.
       torque_constant: k, N m/A, which is V s/rad; greater than 0.
-      gear: turns of the motor a turn of the joint, rad/m on a slide; greater than 0.
+      gear: turns of the motor per turn of the joint, rad/m on a slide; greater than 0.
       rotor_inertia: kg m^2 at the motor, 0 or more.
       cogging: N m at the motor, the amplitude; 0 or more.
-      poles: periods of cogging a turn of the motor, 0 or more; the default is chosen.
+      poles: periods of cogging per turn of the motor, 0 or more; the default is chosen.
       voltage: V, the supply; math.inf for no limit.
       current: A, the amplifier's limit; math.inf for none.
     """
@@ -220,11 +221,11 @@ class Tandem(NamedTuple):
 
 
 def tandem(actuator: tuple[Actuator, ...], step: float) -> Tandem | None:
-    """Return what two drives in series do in a physics step of `step` s; None without a second drive."""
+    """Return the effect of two drives in series in a physics step of `step` s; None without a second drive."""
     both = [part for part in actuator if part.drives]
     if len(both) < 2:
         return None
-    first, second = (step / max(drive.delay, LEAST_LAG) for drive in both)  # in their time constants
+    first, second = (step / max(drive.delay, LEAST_LAG) for drive in both)  # the step, in units of each time constant
     apart = abs(second - first)
     mean = -math.expm1(-apart) / apart if apart else 1.0
     held = second * math.exp(-min(first, second)) * mean / -math.expm1(-second)

@@ -4,9 +4,9 @@ Of a channel's position x the controller reads, j counting the readings,
 
     x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
 
-every `period`, each `delay` later; a reading that gets lost leaves the one before it in place. MuJoCo's sensors have
-the period and the delay; the callback rounds readings and loses them. An encoder measures no velocity: by default the
-controller differentiates what it reads.
+every `period`, each `delay` later. If a reading is lost, the one before it stays. MuJoCo's sensors have the period and
+the delay; the callback rounds and drops readings. An encoder measures no velocity: by default the controller
+differentiates the positions.
 """
 
 import dataclasses
@@ -19,9 +19,9 @@ from smc_mujoco.common.errors import ScenarioError, number, whole
 from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
-# Share of a physics step by which readings are taken early: MuJoCo compares sums of steps, which drift by rounding.
+# Share of a physics step by which readings are taken early, because MuJoCo compares times, which have rounding errors.
 EARLY = 0.5
-MOST_READINGS = 100_000  # not yet arrived: chosen, 6 MB a channel
+MOST_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,12 +30,13 @@ class Encoder(Part):
 
     Attributes:
       counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
-      bias: rad or m, added to every reading: the error of its zero.
-      dropout: probability that a reading gets lost, 0 .. 1; the first arrives.
+      bias: zero error, added to every reading, rad or m.
+      dropout: probability that a reading is lost, 0 .. 1; the first never is.
       period: s between readings, a whole number of physics steps; None: one at every control sample.
-      delay: s until a reading arrives, a whole number of physics steps. Before the first arrives it reads x0.
+      delay: s until a reading arrives, a whole number of physics steps. Until the first arrives, the controller reads
+        x0.
 
-    With the velocity estimator "measured" there is a tachometer beside it, read, delayed and lost with it.
+    With the velocity estimator "measured" there is also a tachometer, with the same period, delay and losses.
     """
 
     counts: float = 4096
@@ -57,13 +58,13 @@ class Encoder(Part):
         return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
 
     def readings(self, step: float) -> int:
-        """Return how many readings MuJoCo must keep, with one a physics step of `step` s; 0 where no sensor is late."""
+        """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay and period."""
         if not self.delay and not self.period:
             return 0
         return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
 
     def check(self, step: float) -> None:
-        """Raise ScenarioError for times that are no whole number of physics steps, or too many to remember."""
+        """Raise ScenarioError for a time that is no whole number of physics steps, or too many readings under way."""
         number("step", step, above=0.0)
         if self.delay / (self.period or step) > MOST_READINGS:
             raise ScenarioError(
@@ -78,7 +79,7 @@ class Encoder(Part):
                 )
 
     def fields(self, model):
-        """Yield delay and period of every channel's two sensors."""
+        """Yield the fields of delay and period of every channel's two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
             yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
@@ -92,13 +93,13 @@ def buffer(spec: mujoco.MjSpec, readings: int) -> None:
 
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the numbers of the channels' position and velocity sensors, (2n,)."""
+    """Return the indices of the channels' position and velocity sensors, (2n,)."""
     kinds = np.isin(model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL])
     return np.flatnonzero(kinds & np.isin(model.sensor_objid, joint_ids(model)))
 
 
 def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Fill the histories with the present readings, so that a late sensor starts at the initial state."""
+    """Fill the histories with the present readings, so that a delayed sensor starts with the initial state."""
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
         gap = float(model.sensor_interval[sensor, 0]) or model.opt.timestep

@@ -1,6 +1,6 @@
-"""Joint friction on every channel's joint: viscous, Coulomb, and LuGre, which truly sticks.
+"""Friction on every channel's joint: viscous, Coulomb, and LuGre, which sticks without creep.
 
-All three are MuJoCo's own: a joint's damping, its `frictionloss`, and the bristles of its `dcmotor` actuator.
+MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor` actuator.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.plant import Field
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
 LEVELS = slice(3, 6)  # of actuator_biasprm: coulomb, static, stribeck
-DAMPED = 0.2  # of bristles, their damping over sqrt(stiffness inertia)
+DAMPED = 0.2  # default damping of bristles over sqrt(stiffness inertia)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Viscous(Friction):
 
 @dataclasses.dataclass(frozen=True)
 class Coulomb(Friction):
-    """Dry friction: -level sign(v) where the joint slides, at rest whatever up to level holds it.
+    """Dry friction: -level sign(v) on a sliding joint; on a joint at rest, the force up to level that holds it.
 
-    A stuck joint creeps, as friction in MuJoCo is a soft constraint: at (1 - d) tc/2 a0, with impedance d, time
-    constant tc, and a0 the acceleration that friction holds back. The hardest ones make it 1e-4 h a0 for a physics step
-    h: 2e-7 rad/s where the pendulum of 0.125 kg m^2 holds 1 N m at h = 0.25 ms.
+    Friction in MuJoCo is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0, with impedance d, time constant
+    tc, and a0 the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a physics
+    step h: 2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
 
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
@@ -62,7 +62,7 @@ class Coulomb(Friction):
 
 @dataclasses.dataclass(frozen=True)
 class LuGre(Friction):
-    """Friction of bristles that bend, hold and slip: stiction, its drop with speed, and a joint that does not creep.
+    """Friction of elastic bristles: stiction, the Stribeck drop with speed, and a stuck joint that does not creep.
 
         z' = v - stiffness |v| / g(v) z                           z: bend of the bristles, rad
         g(v) = coulomb + (static - coulomb) exp(-(v / stribeck)^2)
@@ -70,22 +70,22 @@ class LuGre(Friction):
 
     Source: C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, A new model for control of systems with
     friction, IEEE Transactions on Automatic Control 40(3), 1995, eqs. (1) to (4) without the viscous term, which is
-    `Viscous`. MuJoCo integrates z exactly for v held over a step, and takes z and v at its start for the force.
+    `Viscous`. MuJoCo integrates z exactly for v held over a step, and computes the force from z and v at its start.
 
-    Limits: implicitfast or Euler; under RK4 z is explicit and diverges at stiffness |v| h > 2.8 coulomb. Speed that
-    appears within one step, as a start at v0, meets unbent bristles: damping v0 for a step.
+    Limits: implicitfast or Euler; under RK4 z is explicit and diverges at stiffness |v| h > 2.8 coulomb. The bristles
+    start unbent: after a jump of speed, such as an initial v0, the friction of the first step is damping v0.
 
     Attributes:
       coulomb: N m (N): friction when sliding fast; greater than 0.
-      static: N m (N): where it breaks away; coulomb or more.
+      static: N m (N): friction at which the joint breaks away; coulomb or more.
       stribeck: rad/s (m/s): the speed at which friction falls from static to coulomb; greater than 0.
-      stiffness: N m/rad (N/m). The default is chosen: a hundredth of the paper's 1e5, as its bristles would ring at up
-        to 900 rad/s on the plants here, and these, at up to 89 rad/s, are stable and resolved also at h = 1 ms. They
-        bend 0.1 mrad under 0.1 N m.
-      damping: N m s/rad (N s/m), more than stiffness h, or bristles that MuJoCo bends a step late ring on. None: 0.2
-        sqrt(stiffness inertia), of each joint's inertia with the plant's default parameters: 2.2 for the pendulum. That
-        is a fifth of the paper's rule, chosen, as implicitfast counts damping h as inertia: 0.4 % of the pendulum's at
-        h = 0.25 ms. Half as much rings too long.
+      stiffness: N m/rad (N/m). The default is chosen: a hundredth of the paper's 1e5, whose bristles would oscillate at
+        up to 900 rad/s on these plants. At up to 89 rad/s they are stable and resolved even at h = 1 ms. They bend by
+        0.1 mrad under 0.1 N m.
+      damping: N m s/rad (N s/m), more than stiffness h, because MuJoCo bends bristles a step late and they would
+        oscillate. None: 0.2 sqrt(stiffness inertia), with each joint's inertia at the plant's default parameters: 2.2
+        for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast counts damping h as inertia,
+        0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
     """
 
     stateful = True
@@ -110,7 +110,7 @@ class LuGre(Friction):
                 name=PASSIVE + joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
             )
             friction.set_to_dcmotor(
-                motorconst=(1e-9, 1e-9),  # MuJoCo wants a motor: one too weak to notice
+                motorconst=(1e-9, 1e-9),  # a dcmotor needs a motor constant: too small to notice
                 resistance=1.0,
                 lugre=(self.stiffness, self.damping or 1.0, self.coulomb, self.static, self.stribeck),
                 ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),

@@ -1,11 +1,11 @@
-"""Parts: what makes a mechanism realistic, as edits of its model and numbers in its fields.
+"""Parts that make a mechanism realistic: edits of its model, and numbers in the model's fields.
 
-A part is frozen data. `edit` adds to an MjSpec what it is made of - a rotor, a stop, an actuator that is a friction -
-and `fields` yields the fields of the compiled model that its numbers set, so that simulations with other numbers share
-one model in a Batch. MuJoCo simulates the parts; they have no code of their own.
+A part is frozen data. `edit` adds objects to an MjSpec, such as a rotor, a stop, or an actuator that acts as friction.
+`fields` yields the fields of the compiled model that the part's numbers set, so that simulations with different numbers
+share one model in a Batch. MuJoCo simulates the parts; no code of ours runs.
 
-Names of parts: an actuator `passive:<joint>` belongs to a part and takes no command; `rotor:<joint>` is the joint that
-a channel's actuator drives if that is not the channel's own.
+Names: an actuator `passive:<joint>` belongs to a part and takes no command. `rotor:<joint>` is the joint that a
+channel's actuator drives, if it is not the channel's joint itself.
 """
 
 import dataclasses
@@ -19,27 +19,27 @@ from smc_mujoco.common.errors import number
 from smc_mujoco.mechanisms.plant import LARGEST, Field
 
 PASSIVE, ROTOR = "passive:", "rotor:"
-PLAY = "play:"  # the tendon of length rotor - joint
+PLAY = "play:"  # a tendon of length rotor - joint
 # The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two steps.
 HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
-HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; the rest then has no effect
-START = "smc:start"  # a keyframe in which the joints without a channel start
+HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; equal, so the rest has no effect
+START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
 
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Base of all parts."""
 
-    stateful: ClassVar[bool] = False  # whether MuJoCo integrates a state of it, which RK4 does badly
+    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
 
     def check_numbers(self, *names: str, **bounds: Any) -> None:
-        """Replace fields by the floats that they stand for. None stays where it is the field's default.
+        """Replace fields by floats. None stays if it is the field's default.
 
         Args:
-          bounds: as those of `errors.number`; `most` is LARGEST by default.
+          bounds: those of `errors.number`; `most` is LARGEST by default.
 
         Raises:
-          ScenarioError: a field is no number within these bounds.
+          ScenarioError: a field is not a number within these bounds.
         """
         limits: dict[str, Any] = {"most": LARGEST} | bounds
         for name in names:
@@ -49,7 +49,7 @@ class Part:
                 object.__setattr__(self, name, value)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        """Add what the part is made of to a mechanism, once for every channel."""
+        """Add the part's objects to a mechanism, for every channel."""
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         """Yield the fields of the edited, compiled model that the part's numbers set."""
@@ -57,20 +57,20 @@ class Part:
         yield from ()
 
     def structure(self) -> Hashable:
-        """Return what simulations must have in common to share a model: equal if `edit` does the same."""
+        """Return a key that is equal for parts whose `edit` does the same: their simulations share a model."""
         return type(self)
 
 
 @dataclasses.dataclass(frozen=True)
 class Friction(Part):
-    """Base of frictions: what resists a channel's joint, beside the plant's own damping."""
+    """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Actuator(Part):
-    """Base of actuators: what stands between a command u, the force asked of the joint, and the joint."""
+    """Base of actuators, which stand between the command u, the wanted force, and the joint."""
 
-    drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after what does
+    drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
 
     @property
     def scale(self) -> float:
@@ -79,7 +79,7 @@ class Actuator(Part):
 
     @property
     def delay(self) -> float:
-        """Time constant with which the force follows a held u, s; 0: at once."""
+        """Time constant with which the force follows a held u, s; 0 for none."""
         return 0.0
 
 
@@ -101,23 +101,23 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
 
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the numbers of the actuators that take commands."""
+    """Return the indices of the actuators that take commands, (driven,)."""
     return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
 
 
 def driven_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the numbers of the driven channels' joints."""
+    """Return the indices of the driven channels' joints, (driven,)."""
     names = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
     return np.array([model.joint(name.removeprefix(ROTOR)).id for name in names], int)
 
 
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the numbers of the channels' joints, (n,): first the driven ones, then those that are only measured."""
+    """Return the indices of the channels' joints, (n,): first the driven ones, then those that are only measured."""
     found = driven_ids(model)
     measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return np.array([*found, *(joint for joint in measured if joint not in found)], int)
 
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the numbers of the channels' degrees of freedom, (n,)."""
+    """Return the indices of the channels' degrees of freedom, (n,)."""
     return model.jnt_dofadr[joint_ids(model)]

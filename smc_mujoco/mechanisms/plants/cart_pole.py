@@ -3,12 +3,12 @@
     (M + m) x'' + m l cos(q) q'' - m l sin(q) q'^2 = u + d - b x'
     m l cos(q) x'' + (4/3) m l^2 q'' - m grav l sin(q) = -bq q'
 
-Channel 0 is the cart's place x in m. Channel 1, which is only measured, is the angle q in rad of the pole from upright,
-positive to the right. The pole is uniform and l is half its length. b and bq, the viscous friction of rail and hinge,
-are 0.
+Channel 0 is the cart's position x in m. Channel 1, which has no actuator, is the angle q in rad of the pole from
+upright, positive to the right. The pole is uniform, and l is half its length. b and bq, the viscous friction of rail
+and hinge, are 0 by default.
 Source: A. G. Barto, R. S. Sutton and C. W. Anderson, Neuronlike adaptive elements that can solve difficult learning
-control problems, IEEE Trans. Systems, Man, and Cybernetics 13(5):834, 1983, appendix, its masses and length. Its
-friction (5e-4 N on the rail, 2e-6 N m s at the hinge) is left out.
+control problems, IEEE Trans. Systems, Man, and Cybernetics 13(5):834, 1983, appendix: masses and length. Its friction
+(5e-4 N on the rail, 2e-6 N m s at the hinge) is left out.
 """
 
 from math import cos, sin
@@ -18,8 +18,8 @@ import mujoco
 from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-LEAST = 1e-13  # kg m^2, the pole's inertia about its length: it never turns that way
-STOPS = 1.7  # m, where the cart stops: chosen, short of the posts
+LEAST = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
+STOPS = 1.7  # m, |x| at the end stops: chosen, before the posts
 
 
 def build(n):

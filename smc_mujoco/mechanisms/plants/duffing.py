@@ -4,9 +4,9 @@ The joint's polynomial spring is the restoring force, exactly. Wells at +-sqrt(-
 Source: G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918. Numbers: chosen for the
 paper study, so that the wells lie at +-1 m.
 
-Mechanism `springs`: two springs k of rest length L from the cart to anchors a to either side, V = k (sqrt(x^2 + a^2) -
-L)^2, which snaps through. L^2 = a^2 - alpha/beta and k = beta L^2 give the wells their place and their stiffness
--2 alpha; the hill between them is 19 % too high for a = 1.5 m.
+Mechanism `springs`: two springs of stiffness k and rest length L from the cart to anchors at a distance a on either
+side, V = k (sqrt(x^2 + a^2) - L)^2, which snaps through. L^2 = a^2 - alpha/beta and k = beta L^2 give the wells their
+positions and their stiffness -2 alpha. The hill between them is 19 % too high for a = 1.5 m.
 """
 
 import mujoco
@@ -16,10 +16,10 @@ from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
 from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 
-ASIDE = 1.5  # m, a: chosen, so that the springs are seen and the wells' shape is nearly the equation's
-HEIGHT = 0.45  # m, the springs above the floor: over the block and the landscape
-STOPS, POST = 1.7, 0.5  # m, where the cart stops: chosen, outside x0 and between x0 and 0
-HALF = 2.07  # m, half the rail between its posts
+ASIDE = 1.5  # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
+HEIGHT = 0.45  # m, height of the springs above the floor, over the block and the landscape
+STOPS, POST = 1.7, 0.5  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
+HALF = 2.07  # m, half the length of the rail between its posts
 
 
 def build(n):

@@ -3,8 +3,8 @@
 A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear Systems, 2002,
 section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
 
-Contacts, placed for l = 0.5 m: the `floor` that a failed pendulum falls on, padded `stops`, a hard `wall` on the right,
-and a `peg` on the dial that the rod meets on its way up from the right.
+Contacts, with a geometry for l = 0.5 m: the `floor` that a failed pendulum falls on, padded `stops`, a hard `wall` on
+the right, and a `peg` on the dial that the rod hits on its way up from the right.
 """
 
 from math import asin, cos, sin
@@ -14,13 +14,13 @@ import mujoco
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit, solid
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-DEEP = 0.4  # m, stops and wall behind their faces: no blow of 80 m/s goes through
+DEEP = 0.4  # m, depth of stops and wall behind their faces, enough for a blow of 80 m/s
 L, BOB, ROD, AXLE = 0.5, 0.065, 0.012, 0.8  # m: the pendulum's length, radii of bob and rod, height of the hinge
 
-FALLEN, FALL = 2.44, 0.3  # rad (140 degrees) where the bob lies, and the restitution of the floor, chosen
-STOP, PAD = 1.0, 0.4  # rad, and the restitution of its rubber, chosen
-WALL, CLANG = 0.7, 0.8  # rad, and the restitution of a hard wall, chosen
-PEG, PEG_AT, PIN, CLICK = 0.2, 0.30, 0.020, 0.4  # rad; m from the hinge; m, radius; restitution, chosen
+FALLEN, FALL = 2.44, 0.3  # rad (140 degrees), angle of the bob on the floor, and the floor's restitution, chosen
+STOP, PAD = 1.0, 0.4  # rad, angle of the stops, and the restitution of their rubber, chosen
+WALL, CLANG = 0.7, 0.8  # rad, angle of the wall, and its restitution, chosen
+PEG, PEG_AT, PIN, CLICK = 0.2, 0.30, 0.020, 0.4  # angle, rad; m from the hinge; radius, m; restitution: chosen
 
 
 def build(n):
@@ -58,7 +58,7 @@ def on_floor(spec):
 
 def stops(spec):
     machine = spec.body("machine")
-    outer = asin(0.110 / L)  # rad, from where the bob is stopped to the arm that holds the pad
+    outer = asin(0.110 / L)  # rad, from the stopped bob to the arm that holds the pad
     for side, sign in (("left", -1), ("right", 1)):
         stop = machine.add_body(name=f"{side}_stop", pos=(0, 0, AXLE), quat=turned(sign * STOP))
         face = sorted((sign * BOB, sign * (BOB + 0.022)))

@@ -3,9 +3,10 @@
 The joint gives -k x + mu x', a damper across the rail gives -mu x^2 x' to 4e-12: see models/van_der_pol.xml.
 Source: B. van der Pol, On relaxation-oscillations, 1926. Numbers: chosen for the paper study.
 
-Mechanism `springs`: two springs k/2 along the rail, a motor in the cart that pushes by +mu x', and a damper c to an
-anchor h to the side, which takes c x^2/(x^2 + h^2) x'. c = mu (1 + h^2) puts the change of sign at |x| = 1; further
-out the damper is weaker than mu x^2, by 23 % of it at 2 m for h = 3 m, and the limit cycle reaches 2.12 m.
+Mechanism `springs`: two springs of stiffness k/2 along the rail, a motor in the cart that pushes with +mu x', and a
+damper c to an anchor at a distance h to the side, which pushes with -c x^2/(x^2 + h^2) x'. c = mu (1 + h^2) puts the
+change of sign at |x| = 1. Further out the damper is weaker than mu x^2, by 23 % at 2 m for h = 3 m, and the limit cycle
+reaches 2.12 m.
 """
 
 import mujoco
@@ -15,11 +16,11 @@ from smc_mujoco.mechanisms.hardware.contact import bar
 from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 
 ASIDE = 3.0  # m, h: chosen, so that the limit cycle stays inside the stops
-HEIGHT = 0.45  # m, the damper above the floor: over the block
-ENDS, EDGE = 2.57, 0.175  # m, where the springs' ends are on the posts and on the cart
+HEIGHT = 0.45  # m, height of the damper above the floor, over the block
+ENDS, EDGE = 2.57, 0.175  # m, |x| of the springs' ends on the posts and on the cart
 RELAXED = 0.35  # m, their rest length: chosen, so that both pull while |x| < 2.045 m
 SPRINGS = (("left_spring", -1), ("right_spring", 1))
-STOPS, POST = 2.2, 0.5  # m, where the cart stops: chosen, outside the limit cycle and between x0 and 0
+STOPS, POST = 2.2, 0.5  # m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
 
 
 def build(n):

@@ -15,7 +15,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.c import build, export, sandbox
 from smc_mujoco.control.c.load import CLaw
 from smc_mujoco.control.component import GainWarning
@@ -129,7 +129,7 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
 @pytest.mark.parametrize("name", SINGLE)
 def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
     law, f = LAWS[name](), np.float32
-    ours, theirs = back(folder, law, "float", flags=["-Wdouble-promotion"]), remade(law.function, lambda g: g)
+    ours, theirs = back(folder, law, "float", flags=["-Wdouble-promotion"]), rebuild(law.function, lambda g: g)
     read = gains_of(law)
     gains, memory, rng = type(read)(*map(f, read)), np.zeros(law.memory, f), np.random.default_rng(0)
     for k in range(200):
@@ -218,7 +218,7 @@ def turns(z, K, state):
 
 def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
     law, rng = turns(), np.random.default_rng(1)
-    ours, theirs = back(folder, law), remade(law.function, lambda g: g)
+    ours, theirs = back(folder, law), rebuild(law.function, lambda g: g)
     mine, its, gains = np.zeros(4), np.zeros(4), gains_of(law)
     for k in range(300):
         y = Measurement(*measured(k, rng))

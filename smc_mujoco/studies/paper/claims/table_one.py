@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from smc_mujoco.common.remade import remade
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.studies.paper.claims.audit import claim
@@ -115,7 +115,7 @@ def estimated(runs: Runs, law: str) -> float:
 def _asked(law: Component, x: np.ndarray, v: np.ndarray | None = None, **signals: np.ndarray) -> np.ndarray:
     """Return what a law commands, sample by sample, in open loop: the signals do not depend on its command."""
     function, gains, memory = (
-        remade(law.function, lambda same: same),
+        rebuild(law.function, lambda same: same),
         SimpleNamespace(**law.gains),
         np.zeros(law.memory),
     )

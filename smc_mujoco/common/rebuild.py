@@ -1,7 +1,7 @@
-"""Copies of functions in which every numba-compiled function that they call is compiled anew, or not at all.
+"""Copies of functions that call other copies of their compiled helpers: compiled with bounds checks, or plain Python.
 
-numba checks array bounds only on request. The functions that a law calls were compiled as its author chose, so a law
-runs with copies of them: compiled with checks or, in the reference loop, as plain Python functions.
+numba checks array bounds only on request, and the helpers that a law calls are compiled as its author chose. So a law
+runs with copies of its helpers: compiled with checks or, in the reference loop, as plain Python functions.
 """
 
 from collections.abc import Callable
@@ -11,16 +11,21 @@ from typing import Any
 from numba.core.dispatcher import Dispatcher
 
 
-def remade(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
-    """Return `finish` of a function as it was written, after doing the same to the compiled functions that it calls.
+def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
+    """Apply `finish` to the Python code of a function and of every compiled function that it calls.
 
     Args:
+      function: plain or compiled.
+      finish: called with each plain Python function; returns the one to use in its place.
       made: functions that are finished already. Those of this call are added.
+
+    Returns:
+      `finish` of a copy of the function that calls the finished functions.
     """
-    return _remade(getattr(function, "py_func", function), finish, {} if made is None else made)
+    return _rebuild(getattr(function, "py_func", function), finish, {} if made is None else made)
 
 
-def _remade(function: Any, finish: Callable, made: dict) -> Any:
+def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
     if not isinstance(function, FunctionType):
         return finish(function)
     if function not in made and not _reaches(function):
@@ -29,7 +34,7 @@ def _remade(function: Any, finish: Callable, made: dict) -> Any:
         space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
         made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))
-        # only now what it calls, which may be itself
+        # filled in only now, because a function may call itself
         space |= {name: _swapped(space[name], names, finish, made) for name in names & space.keys()}
         for cell, old in zip(cells, function.__closure__ or (), strict=True):
             cell.cell_contents = _swapped(old.cell_contents, names, finish, made)
@@ -37,9 +42,9 @@ def _remade(function: Any, finish: Callable, made: dict) -> Any:
 
 
 def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
-    """A compiled function remade; a module with those of its functions remade that a law names."""
+    """Return a compiled function rebuilt; a module with its functions of these names rebuilt; else the value."""
     if isinstance(value, Dispatcher):
-        return _remade(value.py_func, finish, made)
+        return _rebuild(value.py_func, finish, made)
     if isinstance(value, ModuleType) and _holds(value, names):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
