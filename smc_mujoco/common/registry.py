@@ -4,12 +4,23 @@ import importlib
 import pkgutil
 from collections.abc import Iterator
 from types import ModuleType
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 def modules(package: str) -> Iterator[ModuleType]:
     """Import and yield every module of a package."""
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         yield importlib.import_module(f"{package}.{info.name}")
+
+
+def subclasses(base: type[T]) -> list[type[T]]:
+    """Return every class derived from a base, users' own included, a base before what is derived from it."""
+    found = base.__subclasses__()
+    for kind in found:
+        found.extend(kind.__subclasses__())
+    return found
 
 
 # Former name of a module, as files of recorded runs have it -> its present name.

@@ -29,7 +29,7 @@ Report = Callable[[int], None]  # told the number of simulated steps just done
 
 
 class Chunk:
-    """Scenarios of one layout in one Batch; to be made and run while the callback is installed."""
+    """Scenarios of one layout in one Batch. Make and run it while the callback is installed."""
 
     def __init__(self, prepared: Sequence[Prepared], threads: int):
         self.given = [one.scenario for one in prepared]
@@ -72,7 +72,7 @@ class Chunk:
         return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
-        """Give simulations the true parameters that hold from a step on."""
+        """Set the true parameters that hold from a step on."""
         derived = []
         for i in indices:
             for name, value in assembly.numbers(self.compiled, self.scenarios[i], step).items():
@@ -85,7 +85,7 @@ class Chunk:
             self.batch.set_const(np.unique(derived).astype(np.int32))
 
     def fill_histories(self) -> None:
-        """Let late sensors have read the initial state before the run."""
+        """Fill the history of late sensors with the initial state."""
         history = self.batch.bind("history")
         model, data = assembly.numbered(self.compiled, self.scenarios[0]), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
@@ -130,7 +130,7 @@ class Chunk:
         records["failed_step"][short] = before // self.scenarios[0].stages
 
     def trace(self, i: int) -> Trace:
-        """The Trace of simulation i."""
+        """Return the Trace of simulation i."""
         scenario = self.scenarios[i]
         failure, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
         reason = None if failure == state.FINE else self.reason(i, failure)
@@ -144,7 +144,7 @@ class Chunk:
         return any(warnings[kind].number for kind in FULL)
 
     def reason(self, i: int, failure: int) -> str:
-        """What went wrong in simulation i."""
+        """Return what went wrong in simulation i."""
         scenario = self.scenarios[i]
         if state.NOT_FINITE <= failure < state.INTERRUPTED:
             if reason := call_again(scenario, self.records[i], self.packed[i]):

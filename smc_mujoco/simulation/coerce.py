@@ -3,7 +3,7 @@
 Each raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,10 +17,12 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.surface import surface as find_surface
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.perturbations import Noise, parameter_factors
+from smc_mujoco.simulation.controller import MAX_STATE
+from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
 from smc_mujoco.simulation.signals import Signal
 
 P = TypeVar("P", bound=Part)
@@ -28,7 +30,6 @@ T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
-MAX_POSITION = 1e6  # rad or m, also of rates: a run that starts beyond has already diverged
 
 
 def plant(value: Plant | str) -> Plant:
@@ -63,33 +64,29 @@ def component(kind: str, value: object) -> Component:
     raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), one of your own, or a name")
 
 
-def x0(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Return positions as a tuple, from one number or several."""
-    return None if value is None else numbers("x0", value)
+def state(name: str) -> Callable[[float | Sequence[float] | None], tuple[float, ...] | None]:
+    """Return the converter of a field with positions or rates: one number or several become a tuple."""
+
+    def convert(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
+        if value is None:
+            return None
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        if isinstance(value, Iterable) and not isinstance(value, str | bytes):
+            return tuple(taken(name, value))
+        return (value,)  # type: ignore[return-value]
+
+    return convert
 
 
-def v0(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Return rates as a tuple, from one number or several."""
-    return None if value is None else numbers("v0", value)
-
-
-def numbers(name: str, value: object) -> tuple[float, ...]:
-    """Return a tuple of floats, from one number or several."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    items = taken(name, value) if isinstance(value, Iterable) and not isinstance(value, str | bytes) else [value]
-    return tuple(items)  # type: ignore[return-value]
-
-
-def per_channel(name: str, value: object, n: int) -> tuple[float, ...] | None:
-    """Return n floats, from n numbers or one."""
-    if value is None:
+def per_channel(name: str, values: tuple[float, ...] | None, n: int) -> tuple[float, ...] | None:
+    """Return n positions or rates, from n numbers or one; none may be where a run has already diverged."""
+    if values is None:
         return None
-    items = numbers(name, value)
-    if len(items) not in (1, n):
-        raise ScenarioError(f"{name} has {len(items)} values for {n} channels: give one number or {n}")
-    items = items if len(items) == n else items * n
-    return tuple(number(name, item, least=-MAX_POSITION, most=MAX_POSITION) for item in items)
+    if len(values) not in (1, n):
+        raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
+    values = values if len(values) == n else values * n
+    return tuple(number(name, value, least=-MAX_STATE, most=MAX_STATE) for value in values)
 
 
 def physics_step(value: object, period: float, least: float) -> float | None:
@@ -135,9 +132,19 @@ def mismatch(value: Mapping[str, float] | None) -> Mapping[str, float]:
     return parameter_factors("mismatch", {} if value is None else value)
 
 
-def reference(value: object) -> Signal:
+def jump(value: Jump | None) -> Jump | None:
+    """Return a jump of the plant's parameters, or None."""
+    return instance("jump", value, Jump, "smc.Jump(time=..., factors=...)")
+
+
+def sensor(value: Encoder | None) -> Encoder | None:
+    """Return an encoder, or None."""
+    return instance("sensor", value, Encoder, "smc.Encoder(counts=...)")
+
+
+def reference(value: Signal | Sequence[Signal]) -> Signal:
     """Return one signal, also from a list of one."""
-    items = value if isinstance(value, tuple | list) else [value]
+    items = several(value)
     if len(items) != 1 or not isinstance(items[0], Signal):
         raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
     return items[0]
@@ -156,7 +163,8 @@ def disturbance(value: Signal | Sequence[Signal] | None) -> tuple[Signal, ...]:
 
 def contact(value: Contact | str | None) -> Contact:
     """Return a contact, from itself or its kind; none from None."""
-    return Contact(value) if isinstance(value, str) else Contact("none") if value is None else value
+    kind = "none" if value is None else value
+    return Contact(kind) if isinstance(kind, str) else kind
 
 
 def friction(value: Friction | Sequence[Friction] | None) -> tuple[Friction, ...]:

@@ -28,6 +28,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import subclasses
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
@@ -38,6 +39,7 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
@@ -237,10 +239,8 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 def _kinds() -> dict[str, Any]:
     """Return name -> class of all parts and signals, users' own included. Of equal names the suite's class counts."""
-    kinds: list[type] = [Part, Signal]
-    for kind in kinds:
-        kinds += kind.__subclasses__()
-    kinds = [Noise, Jump, *(kind for kind in kinds if kind not in ABSTRACT)]
+    kinds: list[type] = [Noise, Jump, *subclasses(Part), *subclasses(Signal)]
+    kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
     return {kind.__name__: kind for kind in kinds}
 
@@ -274,7 +274,7 @@ def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) ->
     first, second = (one.on(plant, duration) for one in both)
     for field in [field for field in second if field in first]:
         if field in SEVERAL:
-            second[field] = *_several(first[field]), *_several(second[field])
+            second[field] = *coerce.several(first[field]), *coerce.several(second[field])
         elif not _equal(first[field], second[field]):
             names = " and ".join(repr(one.name) for one in both)
             raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
@@ -287,10 +287,6 @@ def _equal(one: Any, other: Any) -> bool:
         return bool(one == other)
     except Exception:
         return False
-
-
-def _several(value: Any) -> tuple:
-    return value if isinstance(value, tuple) else (value,)
 
 
 def _jump(size: str) -> Recipe:

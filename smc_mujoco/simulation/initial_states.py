@@ -44,7 +44,7 @@ class Starts:
         number("by", self.by, least=0.0)
 
     def reach(self, scenario: Scenario) -> float:
-        """The largest distance from 0 of any channel at a start, rad or m."""
+        """Return the largest distance from 0 of any channel at a start, rad or m."""
         middle = scenario.resolved.x0 if self.x0 is None else self.x0
         return max(abs(x) for x in middle) or self.by
 
@@ -54,7 +54,7 @@ class Starts:
             raise ScenarioError(f"condition {name!r} and the starts, or --x0, both set x0: give one of them")
 
     def place(self, scenario: Scenario, seed: int) -> Scenario:
-        """The scenario with a seed, from the start that belongs to it."""
+        """Return a scenario with a seed, from the start that belongs to the seed."""
         if self.x0 is not None:
             scenario = dataclasses.replace(scenario, x0=self.x0)
         if seed == 0:
@@ -70,7 +70,7 @@ class Starts:
 
 
 def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by: float = 0.0) -> Starts:
-    """Where the runs of a grid begin, by seed.
+    """Return where the runs of a grid begin, by seed.
 
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's own.

@@ -31,13 +31,13 @@ from smc_mujoco.simulation.signals import Signal
 def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return the velocity alone."""
     body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
-    alone_allowed = kind == "estimator"
+    estimates = kind == "estimator"
 
     def native(y, g, m, out):
         ok, result = attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))))
         if ok:
-            if alone_allowed:
-                first, second = pair(result)
+            if estimates:
+                first, second = with_acceleration(result)
             else:
                 first, second = result
             output = carray(pointer(out), (2,))
@@ -48,7 +48,7 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
 
 
 @intrinsic
-def pair(typingctx, result):
+def with_acceleration(typingctx, result):
     """Return (v, NaN) for a number v, which is a velocity without acceleration; anything else as it is."""
     if not isinstance(result, types.Float | types.Integer | types.Boolean):
         return result(result), lambda context, builder, signature, args: args[0]

@@ -27,7 +27,7 @@ DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: wh
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Compiled:
-    """The C functions of what a scenario names; `nominal` is None for a model that MuJoCo itself computes."""
+    """The compiled functions of a scenario. `nominal` is None for a model that MuJoCo itself computes."""
 
     law: Function | AtAddress
     surface: Function | AtAddress | None
@@ -55,7 +55,7 @@ class Prepared:
 
     @property
     def bytes(self) -> int:
-        """What its simulation takes: its log, its mjData and its record, without the history of a late sensor."""
+        """Memory of its simulation: log, mjData and record, without the history of a late sensor."""
         s = self.scenario.resolved
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
@@ -65,7 +65,7 @@ class Prepared:
 
 
 def prepare(scenario: object) -> Prepared:
-    """A scenario with all that it names compiled.
+    """Return a scenario with its functions compiled.
 
     Raises:
       ScenarioError: no Scenario, or one whose functions a file could not bring back.
@@ -92,7 +92,7 @@ def prepare(scenario: object) -> Prepared:
 
 
 def _compile(s: Resolved) -> Compiled:
-    """Every function of a scenario, compiled; NotCompilable names the one that is not for numba."""
+    """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
     plant = s.plant
     for signal in (s.reference, *s.disturbance):
         native.values_of(signal)  # refuses data that compiled code would misread
@@ -108,7 +108,7 @@ def _compile(s: Resolved) -> Compiled:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Packed:
-    """What must live as long as a simulation: the arrays whose addresses stand in its record.
+    """The arrays whose addresses stand in a simulation's record. They must live as long as the simulation.
 
     Attributes:
       numbers: gains, memories and all else that is float64.
@@ -122,7 +122,7 @@ class Packed:
 
 
 def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv: int) -> tuple[tuple, Packed]:
-    """A simulation's record, as the tuple to be put into an array of SIMULATION, and its arrays.
+    """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
 
     Args:
       channels: (n,) CHANNEL.

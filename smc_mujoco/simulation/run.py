@@ -30,7 +30,7 @@ MANY = 64  # runs of a chunk that leave more memory than it takes time to give i
 
 
 class PlainLoopWarning(UserWarning):
-    """A law or signal does not compile and runs in the reference loop, several times slower and on one core."""
+    """A warning: a law or signal does not compile and runs in the reference loop, several times slower, on one core."""
 
 
 @overload
@@ -72,7 +72,7 @@ def stream(
     threads: int | None = None,
     report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
-    """Pairs (index, Trace), each as soon as its chunk is done; at no time is more than one chunk held here."""
+    """Yield pairs (index, Trace) as soon as their chunk is done. At most one chunk is in memory here."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
     slow: list[tuple[int, Prepared]] = []
@@ -101,7 +101,7 @@ def stream(
 
 @contextlib.contextmanager
 def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
-    """Say in one sentence that memory ran out for runs."""
+    """Turn a MemoryError into one sentence about the runs."""
     try:
         yield
     except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo has all three, by the place
@@ -124,7 +124,7 @@ def give_back() -> None:
 
 
 def _chunks(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[list[tuple[int, Prepared]]]:
-    """A group in chunks of at most CHUNK_BYTES, though at least one run a thread."""
+    """Yield a group in chunks of at most CHUNK_BYTES, but of at least one run for each thread."""
     chunk: list[tuple[int, Prepared]] = []
     held = 0
     scenarios = [prepared.scenario for _, prepared in group]
@@ -141,14 +141,14 @@ def _chunks(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[lis
 
 
 def _prepared(scenarios: object) -> Iterator[Prepared]:
-    """Scenarios, prepared one by one."""
+    """Yield scenarios, prepared one by one."""
     if isinstance(scenarios, str) or not isinstance(scenarios, Iterable):
         raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
     yield from map(prepare, scenarios)
 
 
 def cores(threads: int | None = None) -> int:
-    """How many simulations at once: `threads`, or else one for each core that this process may use.
+    """Return how many simulations to step at once: `threads`, or one for each core that this process may use.
 
     Raises:
       ScenarioError: no whole number from 1 to 1024.

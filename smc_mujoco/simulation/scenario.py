@@ -48,7 +48,6 @@ MIN_PERCENT = 10.0  # of a mismatch: chosen, multiples of five from here on may 
 MIN_MILLISECONDS = 1.0  # s: chosen, as no plant here tolerates such a delay
 
 REST = Constant(0.0)
-In = TypeVar("In")
 Out = TypeVar("Out")
 T = TypeVar("T")
 
@@ -123,22 +122,22 @@ class Scenario:
     control_period: float = 1e-3
     physics_step: float | None = None
     u_max: float | None = None
-    x0: tuple[float, ...] | None = field(converter=coerce.x0, default=None)
-    v0: tuple[float, ...] | None = field(converter=coerce.v0, default=None)
-    reference: Signal = REST
+    x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
+    v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
+    reference: Signal = field(converter=coerce.reference, default=REST)
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
     input_delay: float = 0.0
     velocity: Estimator | None = field(converter=coerce.velocity, default=None)
     mismatch: Mapping[str, float] = field(converter=coerce.mismatch, default=None)
-    jump: Jump | None = None
+    jump: Jump | None = field(converter=coerce.jump, default=None)
     seed: int = 0
     integrator: str | None = None
     friction: tuple[Friction, ...] = field(converter=coerce.friction, default=None)
     contact: Contact = field(converter=coerce.contact, default=None)
     mechanism: str = "equation"
     actuator: tuple[Actuator, ...] = field(converter=coerce.actuator, default=None)
-    sensor: Encoder | None = None
+    sensor: Encoder | None = field(converter=coerce.sensor, default=None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
     def __post_init__(self):
@@ -162,36 +161,27 @@ class Scenario:
 
     def _convert(self) -> None:
         """Convert every field from what the user gave."""
-        new = {
-            one.name: one.metadata["converter"](getattr(self, one.name))
+        put = vars(self).update  # the class is frozen
+        put(
+            (one.name, one.metadata["converter"](getattr(self, one.name)))
             for one in dataclasses.fields(self)
             if "converter" in one.metadata
-        }
-        vars(self).update(new)
+        )
         if not isinstance(self.contact, Contact):
             kinds = ", ".join(self.plant.contacts)
             raise ScenarioError(f"contact is {shown(self.contact)}: give smc.Contact(...) or one of {kinds}")
         self.contact.check(self.plant)
-        new = {
-            "model": coerce.one_of("model", self.model, coerce.MODELS),
-            "integrator": coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS),
-            "mechanism": coerce.mechanism(self.mechanism, self.plant),
-            "reference": coerce.reference(self.reference),
-            "jump": coerce.instance("jump", self.jump, Jump, "smc.Jump(time=..., factors=...)"),
-            "sensor": coerce.instance("sensor", self.sensor, Encoder, "smc.Encoder(counts=...)"),
-            "duration": number("duration", self.duration, above=0.0, most=LONGEST),
-            "control_period": number("control_period", self.control_period, above=0.0, least=SHORTEST),
-            "seed": whole("seed", self.seed, 0, 2**53 - 1),
-            "x0": coerce.per_channel("x0", self.x0, self.plant.n),
-            "v0": coerce.per_channel("v0", self.v0, self.plant.n),
-        }
-        vars(self).update(new)
-        new = {
-            "physics_step": coerce.physics_step(self.physics_step, self.control_period, SHORTEST),
-            "u_max": None if self.u_max is None else number("u_max", self.u_max, above=0.0, infinite=True),
-            "input_delay": number("input_delay", self.input_delay, least=0.0, most=self.duration),
-        }
-        vars(self).update(new)
+        put(model=coerce.one_of("model", self.model, coerce.MODELS))
+        put(integrator=coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS))
+        put(mechanism=coerce.mechanism(self.mechanism, self.plant))
+        put(duration=number("duration", self.duration, above=0.0, most=LONGEST))
+        put(control_period=number("control_period", self.control_period, above=0.0, least=SHORTEST))
+        put(seed=whole("seed", self.seed, 0, 2**53 - 1))
+        put(x0=coerce.per_channel("x0", self.x0, self.plant.n))
+        put(v0=coerce.per_channel("v0", self.v0, self.plant.n))
+        put(physics_step=coerce.physics_step(self.physics_step, self.control_period, SHORTEST))
+        put(u_max=None if self.u_max is None else number("u_max", self.u_max, above=0.0, infinite=True))
+        put(input_delay=number("input_delay", self.input_delay, least=0.0, most=self.duration))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()
@@ -349,7 +339,7 @@ def check_new(s: Resolved) -> None:
 
 
 def check_clock(s: Resolved) -> None:
-    """The delay is a whole number of steps, the jump is within the run, and the trace fits into memory."""
+    """Check that the delay is a whole number of steps, the jump is within the run, and the trace fits into memory."""
     delay = s.input_delay / s.physics_step
     if abs(delay - round(delay)) > 1e-6:
         raise ScenarioError(
@@ -371,7 +361,7 @@ def check_clock(s: Resolved) -> None:
 
 
 def check_signals(s: Resolved) -> None:
-    """Disturbances and reference are signals that can serve as such, and none is shorter than a step."""
+    """Check that the signals can be disturbances and a reference, and that none is shorter than a step."""
     for d in s.disturbance:
         most = max(MAX_STEPS, s.work)  # knots in all channels
         if isinstance(d, OrnsteinUhlenbeck) and s.plant.n * s.duration / d.dt > most:
@@ -381,8 +371,8 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
         raise ScenarioError(
-            f"disturbance {shown(forces[0])} pushes a body, and those of {s.plant.name}, a model of yours, act on its "
-            "joints: give another signal"
+            f"disturbance {shown(forces[0])} pushes a body, and disturbances of {s.plant.name}, your own model, "
+            "act on its joints: give another signal"
         )
     if s.reference.cartesian:
         raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
@@ -391,7 +381,7 @@ def check_signals(s: Resolved) -> None:
 
 
 def check_law(s: Resolved) -> None:
-    """The law suits the plant, and the surface suits the law."""
+    """Check that the law suits the plant, and the surface the law."""
     if not fits(s.law, s.plant):
         paired = dataclasses.replace(s.plant, underactuated=True)
         hint = ": give each channel a partner" if s.plant.direct and fits(s.law, paired) else ""
@@ -411,7 +401,7 @@ def check_law(s: Resolved) -> None:
 
 
 def check_names(s: Resolved) -> None:
-    """No parameter is named twice, once by its own name and once as the mass."""
+    """Check that no parameter is named twice, once by its own name and once as the mass."""
     for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
         twice = "mass" in factors and s.plant.mass in factors and s.plant.mass != "mass"
         if twice:
@@ -420,7 +410,7 @@ def check_names(s: Resolved) -> None:
 
 
 def check_mechanism(s: Resolved) -> None:
-    """The integrator handles the parts' states; mechanism and contact allow every parameter of the run."""
+    """Check that the integrator handles the parts' states, and mechanism and contact every parameter of the run."""
     if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
         raise ScenarioError(
             f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
@@ -439,7 +429,7 @@ def check_numbers(plant: Plant, name: str, factors: Mapping[str, float]) -> None
 
 @functools.lru_cache(maxsize=16)
 def built(plant: Plant, name: str) -> mujoco.MjModel:
-    """A plant's other mechanism, compiled."""
+    """Return the model of a plant's other mechanism."""
     spec = plant.spec()
     plant.mechanisms[name].edit(spec)
     return compiled(spec)

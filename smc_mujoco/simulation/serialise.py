@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
-from smc_mujoco.common.registry import present_place
+from smc_mujoco.common.registry import present_place, subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
-    """The scenario as plain data that JSON holds without loss."""
+    """Return a scenario as plain data that JSON holds without loss."""
     given, scenario = scenario, scenario.resolved
     return (
         {name: getattr(scenario, name) for name in PLAIN}
@@ -57,7 +57,7 @@ def describe(scenario: Scenario) -> dict:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """Of what a trace depends on: the packages, and how the machine rounds; reading them takes 5 ms."""
+    """Return the versions of the packages that a trace depends on, and how the machine rounds. It takes 5 ms."""
     packages = {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
     return packages | {"arithmetic": arithmetic()}
 
@@ -159,22 +159,19 @@ def _restore_part(data: dict) -> Part:
 
 
 def _thing(thing: Signal | Part) -> dict:
-    """What made it: its class by name, and the values of its fields."""
+    """Return the class of a thing by name, and the values of its fields."""
     values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
     return dict(zip(("kind", "module"), _home(type(thing)), strict=True)) | {"values": values}
 
 
 def _values(data: dict) -> dict:
-    """The values of a thing's fields; JSON made lists of the tuples."""
+    """Return the values of a thing's fields, with tuples for the lists that JSON made of them."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
 
 
 def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
-    """Every class of the base's, users' own included, by its home."""
-    found = base.__subclasses__()
-    for kind in found:
-        found.extend(kind.__subclasses__())
-    return {_home(kind): kind for kind in found}
+    """Return every class derived from a base, users' own included, by its name and module."""
+    return {_home(kind): kind for kind in subclasses(base)}
 
 
 def _home(kind: type) -> tuple[str, str]:
