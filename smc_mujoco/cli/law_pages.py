@@ -5,7 +5,7 @@ Everything comes from the templates and their docstrings. A docstring begins wit
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from rich.console import Console
@@ -17,8 +17,11 @@ from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.plant import Plant
 
 SOURCE = re.compile(r"(?<![\w.])Sources?: ")
 SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
@@ -26,6 +29,7 @@ DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled
 INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
 CATALOGUES = {"Laws": laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
+ARRIVES = {"s": "s", "e": "e", "": "–"}
 CALLS = {
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",
@@ -107,7 +111,35 @@ def print_pages(name: str | None, console: Console) -> None:
             degrees = [str(template.relative_degree)] * len(degree)
             table.add_row(template.name, *degrees, Text(parts.formula), Text(brief(parts.source)))
         console.print(table, "")
-    console.print("One in full: [cyan]smc-mujoco laws NAME[/]", highlight=False)
+    filters = "[cyan]smc-mujoco laws --needs continuous,two-gains[/]"
+    console.print(f"One in full: [cyan]smc-mujoco laws NAME[/]; those that suit: {filters}", highlight=False)
+
+
+def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:
+    """Print a table of the laws that have all these properties, with what distinguishes them.
+
+    Raises:
+      ScenarioError: an unknown property, family or plant.
+    """
+    found = suitable(needs, family, plant)
+    said = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
+    kind = plant if plant is None or isinstance(plant, str) else plant.name
+    title = f"{len(found)} of {len(laws())} laws" + f" that {' and '.join(said)}" * bool(said)
+    title += f" for {kind}" * (kind is not None)
+    if "no-velocity" in needs:
+        text = 'Every law runs without a velocity sensor where the scenario estimates it: velocity="levant".'
+        console.print(text, highlight=False)
+    if not found:
+        console.print(f"{title}: leave something out", highlight=False)
+        return
+    columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
+    table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
+    for law in found:
+        u = "continuous" if law.continuous else "jumps"
+        table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
+    console.print(table, "")
+    key = "arrives: what theory has at 0 after a finite time, s or the error e. u: whether it jumps there."
+    console.print(key, style="dim", highlight=False)
 
 
 def print_page(template: Template, console: Console) -> None:
@@ -120,6 +152,9 @@ def print_page(template: Template, console: Console) -> None:
         "gains": "\n".join(_gains(template)),
         "conditions": "\n".join(template.conditions) or "none on the gains alone",
         "degree": _degree(template),
+        "family": template.family,
+        "promises": _promises(template),
+        "reads": ", ".join(f for f in Measurement._fields if f in reads(template)) * is_law,
         "plants": (", ".join(template.plants) or "every one whose joints are all driven") * is_law,
         "discretisation": parts.discretisation,
         "known": parts.known,
@@ -141,6 +176,15 @@ def _gains(template: Template) -> Iterable[str]:
         yield f"{name:{width}} = {value:<8g}{least}".rstrip()
     if not template.defaults:
         yield "none"
+
+
+def _promises(template: Template) -> str:
+    """Return in words what theory says of a law's u and of its arrival; "" for what is no law."""
+    if template.kind != "law":
+        return ""
+    u = "a continuous u" if template.continuous else "u jumps"
+    arrival = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time", "": ""}[template.finite_time]
+    return ", ".join(filter(None, [u, arrival]))
 
 
 def _degree(template: Template) -> str:

@@ -24,6 +24,7 @@ from smc_mujoco.common.registry import modules
 from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
+FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
 RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # names in version 0.1
 
 
@@ -64,6 +65,9 @@ class LawOptions(SurfaceOptions, total=False):
     short: str
     colour: str
     rest: Rest | None
+    family: str
+    continuous: bool
+    finite_time: str
 
 
 OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
@@ -168,6 +172,7 @@ class Template:
       requires_model: whether it needs the nominal model.
       label, short, colour: as in the decorator; "" means automatic, see `smc_mujoco.draw.style`.
       rest: its linear part; None if it is not linear at rest.
+      family, continuous, finite_time: as in the decorator; `smc_mujoco.control.properties` chooses laws by them.
     """
 
     kind: str
@@ -183,6 +188,9 @@ class Template:
     short: str = ""
     colour: str = ""
     rest: Rest | None = None
+    family: str = ""
+    continuous: bool = False
+    finite_time: str = ""
 
     degree = renamed("degree")
     modelled = renamed("modelled")
@@ -320,11 +328,13 @@ def template(
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
     if not isinstance(conditions, Mapping | None) or not all(map(callable, (conditions or {}).values())):
         raise ScenarioError(f"conditions is {shown(conditions)}: give words with functions of the gains")
-    for word in ("label", "short", "colour"):
+    for word in ("label", "short", "colour", "family"):
         if not isinstance(words.get(word, ""), str):
             raise ScenarioError(f"{word} is {shown(words[word])}: give a text")
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
+    if words.get("finite_time", "") not in FINITE:
+        raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
             if name not in stated:

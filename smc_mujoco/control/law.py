@@ -115,6 +115,11 @@ def law_function(
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
       rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
+      family: in a word, such as "terminal", to find the law by.
+      continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws of e), however short
+        the control period. Default: no.
+      finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e", the error; "s", the
+        sliding variable, after which e decays as the surface says; "", the default, neither.
 
     The function must be pure: state belongs in memory, parameters in gains. A compiled function keeps the values that
     its globals and closure had at compilation, and its random numbers would come from a shared generator. Each new

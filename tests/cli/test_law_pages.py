@@ -66,6 +66,55 @@ def test_there_are_at_least_thirty_laws():
     assert len(laws()) >= 30
 
 
+# those that suit
+
+
+def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
+    code, out, err = call("laws", "--needs", "continuous,finite-time", "--plant", "duffing")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    (line,) = (line for line in out.splitlines() if line.split()[:1] and line.split()[0] in laws())
+    assert line.split() == ["continuous_twisting", "higher-order", "continuous", "e", "L,", "k1,", "k2"]
+    assert f"1 of {len(laws())} laws that have a continuous u and bring the error to 0 in finite time" in flat(out)
+
+
+def test_laws_of_a_family_and_of_a_plant(call):
+    names = [line.split()[0] for line in call("laws", "--family", "terminal")[1].splitlines() if line.strip()]
+    assert {"terminal", "nonsingular_terminal", "nonsingular_fast_terminal"} <= set(names)
+    assert "twisting" not in names
+    assert "hierarchical" in call("laws", "--plant", "overhead_crane")[1]
+
+
+def test_where_no_law_suits_it_says_so(call):
+    out = flat(call("laws", "--needs", "one-gain")[1])
+    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave something out"
+    assert 'velocity="levant"' in flat(call("laws", "--needs", "no-velocity")[1])
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--needs", "smooth"), "unknown property of a law 'smooth': choose from continuous, "),
+        (("--family", "termnal"), "unknown family of laws 'termnal': did you mean 'terminal'?"),
+        (("--plant", "dufing"), "did you mean 'duffing'?"),
+        (("pid", "--needs", "continuous"), "laws pid shows one law: leave it out, or leave out --needs"),
+    ],
+)
+def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
+    code, out, err = call("laws", *words)
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert sentence in err
+
+
+def test_a_page_has_what_theory_promises_and_what_the_law_reads(call):
+    out = flat(call("laws", "twisting")[1])
+    assert "family higher-order" in out
+    assert "promises u jumps, e = 0 after a finite time" in out
+    assert "reads e, de, ddr, f, g, model" in out
+    assert "promises a continuous u" in flat(call("laws", "pid")[1])
+    assert "promises" not in call("laws", "filtered_difference")[1]
+
+
 # one of them
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
@@ -36,15 +37,41 @@ def laws(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="A law, surface or velocity estimator; by default all.")
     ] = None,
+    needs: Annotated[
+        str | None,
+        typer.Option(
+            help="Only laws that have all these, as a,b: no-velocity, no-acceleration, no-model, continuous (u), "
+            "finite-time (of the error), finite-reaching (of s), one-gain, two-gains (at most)."
+        ),
+    ] = None,
+    family: Annotated[
+        str | None, typer.Option(help="Only laws of a family, such as terminal, adaptive or super-twisting.")
+    ] = None,
+    plant: Annotated[
+        str | None, typer.Option(metavar="PLANT", help="Only laws for a plant, or FILE.xml:joint+joint.")
+    ] = None,
 ) -> None:
     """Show all laws, surfaces and velocity estimators, or one in full: formula, gains, conditions, source.
 
     The column deg is the relative degree of the variable that a law drives to zero: 1 for a sliding variable s, of any
     surface of degree 1; 2 for the error e and its rate; 3 for e and two rates.
 
+    With --needs, --family or --plant the table has the laws that suit, and what distinguishes them. `smc-mujoco which`
+    compares such laws on a plant, and advises one.
+
     Example: smc-mujoco laws super_twisting
+
+    Example: smc-mujoco laws --needs continuous,two-gains
     """
     with held_back():
         from smc_mujoco.cli import law_pages
+        from smc_mujoco.common.errors import ScenarioError
 
-    law_pages.print_pages(name, Terminal())
+    filtered = (needs, family, plant) != (None, None, None)
+    if name is not None and filtered:
+        raise ScenarioError(f"laws {name} shows one law: leave it out, or leave out --needs, --family and --plant")
+    if filtered:
+        machine = None if plant is None else options.plant(plant)
+        law_pages.print_suitable(options.names(needs), family, machine, Terminal())
+    else:
+        law_pages.print_pages(name, Terminal())

@@ -13,6 +13,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
 
 
 @law_function(
+    family="adaptive",
+    finite_time="s",
     gains={
         "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

@@ -14,6 +14,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 
 
 @law_function(
+    family="adaptive",
     gains={
         "gamma": Gain(15.0, FORCE_PER_POSITION, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

@@ -17,6 +17,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 
 
 @law_function(
+    family="adaptive",
+    continuous=True,
     gains={
         "K0": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "eps": Gain(0.1, SPEED, positive=True),

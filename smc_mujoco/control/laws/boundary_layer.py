@@ -20,6 +20,8 @@ REST = Rest(
 
 
 @law_function(
+    family="first-order",
+    continuous=True,
     gains={
         "k": Gain(6.0, FORCE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

@@ -16,6 +16,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 
 
 @law_function(
+    family="super-twisting",
+    continuous=True,
+    finite_time="s",
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
         "k2": Gain(4.4, FORCE_RATE, positive=True),

@@ -16,11 +16,13 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
 
 
 @law_function(
+    family="first-order",
+    finite_time="s",
     gains={
         "eps": Gain(3.0, FORCE, positive=True),
         "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),
-    }
+    },
 )
 def discrete_reaching(y, gains, memory):
     s, eq = sliding(y, gains.c)

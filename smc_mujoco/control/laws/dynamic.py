@@ -15,6 +15,8 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
 
 
 @law_function(
+    family="first-order",
+    continuous=True,
     gains={
         "k": Gain(30.0, FORCE_RATE, nonnegative=True),
         "q": Gain(5.0, RATE, nonnegative=True),

@@ -13,6 +13,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
 
 
 @law_function(
+    family="first-order",
+    finite_time="s",
     gains={
         "k": Gain(3.0, FORCE, nonnegative=True),
         "q": Gain(3.0, FORCE_PER_SPEED, nonnegative=True),

@@ -24,6 +24,8 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 
 @law_function(
+    family="disturbance-observer",
+    finite_time="s",
     label="Extended-state",
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),

@@ -15,6 +15,8 @@ from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
 
 
 @law_function(
+    family="first-order",
+    finite_time="s",
     label="Fixed-time",
     gains={
         "k1": Gain(2.0, force_per("a"), nonnegative=True),

@@ -40,6 +40,8 @@ def inferred(size, rate):
 
 
 @law_function(
+    family="first-order",
+    finite_time="s",
     gains={
         "k_min": Gain(3.0, FORCE, nonnegative=True),
         "k_max": Gain(6.0, FORCE, nonnegative=True),

@@ -32,6 +32,8 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
 
 
 @law_function(
+    family="underactuated",
+    finite_time="s",
     gains={
         "a": Gain(0.67, Unit(), positive=True),
         "c1": Gain(0.67, RATE, positive=True),

@@ -18,6 +18,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
 
 
 @law_function(
+    family="super-twisting",
+    continuous=True,
+    finite_time="s",
     label="Implicit super-twisting",
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),

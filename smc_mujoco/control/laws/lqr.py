@@ -18,6 +18,8 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, Gain, Unit
 
 
 @law_function(
+    family="baseline",
+    continuous=True,
     gains={
         "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
         "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),

@@ -16,6 +16,8 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 
 
 @law_function(
+    family="higher-order",
+    finite_time="e",
     label="Nested third-order",
     gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)},
     memory=1,

@@ -15,6 +15,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
 
 
 @law_function(
+    family="terminal",
+    finite_time="e",
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),

@@ -14,6 +14,8 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
 
 
 @law_function(
+    family="terminal",
+    finite_time="e",
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "B": Gain(3.0, lambda g: Unit(position=g.p - 1, time=-g.p), positive=True),

@@ -19,6 +19,8 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
     label="Observer-free",
     short="OF",

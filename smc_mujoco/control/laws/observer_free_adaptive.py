@@ -22,6 +22,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     label="Observer-free, adaptive",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

@@ -23,6 +23,8 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     label="Observer-free, integral",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "ki": Gain(2.0, RATE2, positive=True)},
     memory=1,

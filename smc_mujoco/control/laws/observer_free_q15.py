@@ -47,6 +47,8 @@ def saturated(n):
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     label="Observer-free, Q15",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

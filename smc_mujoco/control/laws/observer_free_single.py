@@ -18,7 +18,12 @@ ONE, TEN, A45, A105 = np.float32(1.0), np.float32(10.0), np.float32(45.0), np.fl
 QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 
 
-@law_function(label="Observer-free, single", gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
+@law_function(
+    family="observer-free",
+    continuous=True,
+    label="Observer-free, single",
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+)
 def observer_free_single(y, gains, memory):
     s = np.float32(y.de) + np.float32(gains.k1) * np.float32(y.e)
     slid, eq = sliding(y, gains.k1)

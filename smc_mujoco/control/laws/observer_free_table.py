@@ -22,6 +22,8 @@ TABLE = np.array([math.tanh(END * i / MOST) for i in range(MOST)] + [1.0])
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     label="Observer-free, table",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "size": Gain(64.0, positive=True, held=True)},
     conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MOST},

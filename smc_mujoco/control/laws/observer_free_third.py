@@ -16,6 +16,8 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 
 
 @law_function(
+    family="observer-free",
+    continuous=True,
     label="Observer-free, third order",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

@@ -13,6 +13,9 @@ from smc_mujoco.control.units import RATE, Gain, force_per
 
 
 @law_function(
+    family="first-order",
+    continuous=True,
+    finite_time="s",
     label="Power-rate",
     gains={
         "k": Gain(6.0, force_per("a"), nonnegative=True),

@@ -13,6 +13,8 @@ from smc_mujoco.control.units import FORCE, PARABOLA, Gain
 
 
 @law_function(
+    family="higher-order",
+    finite_time="e",
     gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, PARABOLA, positive=True)},
     memory=1,
     relative_degree=2,

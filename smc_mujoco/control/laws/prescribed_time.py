@@ -16,6 +16,8 @@ from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
 
 
 @law_function(
+    family="first-order",
+    finite_time="s",
     label="Prescribed-time",
     gains={
         "T": Gain(2.0, TIME, positive=True),

@@ -23,6 +23,8 @@ def brakes(gains):
 
 
 @law_function(
+    family="higher-order",
+    finite_time="e",
     label="Quasi-continuous",
     gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, PARABOLA, positive=True)},
     memory=1,

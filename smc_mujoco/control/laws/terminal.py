@@ -14,6 +14,8 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
 
 
 @law_function(
+    family="terminal",
+    finite_time="e",
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "b": Gain(2.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),

@@ -13,6 +13,8 @@ from smc_mujoco.control.units import FORCE, Gain
 
 
 @law_function(
+    family="higher-order",
+    finite_time="e",
     gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
     memory=1,
     relative_degree=2,

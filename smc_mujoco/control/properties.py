@@ -1,0 +1,108 @@
+"""What laws need and promise, to choose laws by.
+
+    suitable(["continuous", "two-gains"], family="terminal")     # templates of laws
+    reads(smc.law("pid").template)                               # {"e", "de", ...}: what the law measures
+
+A property is derived from the law's code where that is possible. What only theory says, continuity and finite time,
+stands in the law's decorator. Tests compare both with what the law does.
+"""
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from types import FunctionType
+from typing import NamedTuple
+
+from smc_mujoco.common.errors import find
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import Measurement, catalogue, laws
+from smc_mujoco.mechanisms.plant import Plant
+
+VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor or an estimator gives
+
+
+class Property(NamedTuple):
+    """A property of a law: its words, as in "laws that need no model", and the function that tells it."""
+
+    words: str
+    holds: Callable[[Template], bool]
+
+
+def reads(law: Template) -> frozenset[str]:
+    """Return the fields of the measurement that a law's code reads; all of them if its code cannot be read."""
+    return frozenset(_reads(law.function, 0, set()))
+
+
+def searched(law: Template) -> list[str]:
+    """Return the names of the gains that must be chosen for a plant: those that tuning does not hold."""
+    return [name for name, gain in law.gains.items() if not gain.held]
+
+
+def _at_most(count: int) -> Callable[[Template], bool]:
+    return lambda law: 0 < len(searched(law)) <= count
+
+
+PROPERTIES: Mapping[str, Property] = {
+    "no-velocity": Property("need no velocity", lambda law: not reads(law) & VELOCITY),
+    "no-acceleration": Property("need no acceleration", lambda law: "a" not in reads(law)),
+    "no-model": Property("need no model of the plant", lambda law: not law.requires_model),
+    "continuous": Property("have a continuous u", lambda law: law.continuous),
+    "finite-time": Property("bring the error to 0 in finite time", lambda law: law.finite_time == "e"),
+    "finite-reaching": Property("bring s or the error to 0 in finite time", lambda law: law.finite_time != ""),
+    "one-gain": Property("have one gain to choose", _at_most(1)),
+    "two-gains": Property("have at most two gains to choose", _at_most(2)),
+}
+
+
+def families() -> dict[str, list[str]]:
+    """Return family -> the names of its laws."""
+    found: dict[str, list[str]] = {}
+    for name, law in catalogue().items():
+        found.setdefault(law.family, []).append(name)
+    return dict(sorted(found.items()))
+
+
+def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant | str | None = None) -> list[Template]:
+    """Return the laws of the library that have all these properties.
+
+    Args:
+      needs: names in PROPERTIES.
+      family: one of `families`.
+      plant: only laws for this plant.
+
+    Raises:
+      ScenarioError: an unknown name.
+    """
+    wanted = [find("property of a law", need, PROPERTIES) for need in needs]
+    names = laws(plant)
+    if family is not None:
+        names = [name for name in names if name in find("family of laws", family, families())]
+    found = [catalogue()[name] for name in names]
+    return [law for law in found if all(one.holds(law) for one in wanted)]
+
+
+def _reads(function: object, position: int, seen: set[object]) -> set[str]:
+    """Return the attributes that a function reads of its argument at a position; every field if that is not known."""
+    function = getattr(function, "py_func", function)
+    if function in seen:
+        return set()
+    seen.add(function)
+    try:
+        assert isinstance(function, FunctionType)
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        assert isinstance(tree, ast.FunctionDef)
+    except (AssertionError, OSError, SyntaxError, ValueError):
+        return set(Measurement._fields)
+    name, found, known = tree.args.args[position].arg, set(), 0
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == name:
+            found.add(node.attr)
+            known += 1
+        elif isinstance(node, ast.Call):
+            for i, argument in enumerate(node.args):
+                if isinstance(argument, ast.Name) and argument.id == name:
+                    found |= _reads(function.__globals__.get(ast.unparse(node.func)), i, seen)
+                    known += 1
+    uses = sum(isinstance(node, ast.Name) and node.id == name for node in ast.walk(tree))
+    return found if uses == known else set(Measurement._fields)

@@ -1,0 +1,178 @@
+"""Properties of laws are compared with what the laws do: what they read, where u jumps, how they arrive."""
+
+import functools
+import itertools
+
+import numpy as np
+import pytest
+from helpers.plants_ab import called, chain, measured, plant_a, rest
+
+import smc_mujoco as smc
+from smc_mujoco.control.law import Measurement, catalogue, law_function
+from smc_mujoco.control.properties import PROPERTIES, families, reads, searched, suitable
+
+LAWS = pytest.mark.parametrize("name", smc.laws())
+STEP = 1e-9  # s, control period: short, so that a layer as wide as a step is a jump
+JUMP = 4e-3  # of the range of u; the words of the fixed-point law make steps of 1e-3
+
+
+# what laws read
+
+
+@functools.cache
+def changes(name):
+    """The fields of the measurement that change u or memory of a law in any of many states."""
+    law, found, random = smc.law(name), set(), np.random.default_rng(0)
+    for _ in range(40):
+        numbers = random.normal(size=len(Measurement._fields))
+        model, surfaced = random.choice([0.0, 1.0], size=2)
+        known = {"t": abs(numbers[0]), "dt": 1e-3, "limit": 3.0, "model": model, "surfaced": surfaced, "g": 2.0}
+        y = Measurement(*numbers)._replace(**known)
+        memory = np.abs(random.normal(size=law.memory))
+        one = memory.copy()
+        u = called(law, y, one)
+        for field in {*Measurement._fields} - found:
+            for value in (getattr(y, field) + 0.7, -getattr(y, field) - 0.3, 30.0):
+                other = memory.copy()
+                if field != "dt" and (called(law, y._replace(**{field: value}), other) != u or (other != one).any()):
+                    found.add(field)
+    return found
+
+
+@LAWS
+def test_a_law_is_changed_by_no_field_that_it_does_not_read(name):
+    assert changes(name) <= reads(catalogue()[name])
+
+
+@LAWS
+def test_a_law_is_changed_by_the_error_and_the_velocity_that_it_reads(name):
+    wanted = {"e", "de", "v", "dq", "q", "a", "limit"} & reads(catalogue()[name])
+    assert wanted - changes(name) == set()
+
+
+def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
+    @law_function
+    def position_only(y, gains, memory):
+        return -y.e * y.g, y.e
+
+    @law_function
+    def hands_on(y, gains, memory):
+        z = y
+        return -z.e, z.e
+
+    assert reads(position_only) == {"e", "g"}
+    assert PROPERTIES["no-velocity"].holds(position_only)
+    assert reads(hands_on) == set(Measurement._fields)
+    assert {"surfaced", "model", "ddr"} <= reads(catalogue()["classical"])  # in `sliding` and `command`
+
+
+# continuity
+
+
+def jump(name, model):
+    """The largest step of u, as a share of its range, along short dense lines through states where laws switch."""
+    law, random = smc.law(name), np.random.default_rng(1)
+    slope = next((value for gain, value in law.gains.items() if gain in ("c", "k1")), 2.5)
+    on_surface = [(0.4, -0.4 * slope, 0.0), (-0.3, 0.3 * slope, 0.0)]
+    centres = [(0.0, 0.0, 0.0), *on_surface, (2.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0)]
+    along, common, worst = np.linspace(-1e-8, 1e-8, 101), {"limit": 6.0, "model": model, "g": 1.1}, 0.0
+    for centre, fresh in itertools.product(centres, (True, False)):
+        memory = np.zeros(law.memory)
+        for k in range(20):  # what a run would leave in it
+            e, de, a = random.normal(size=3) * 0.3
+            if not fresh:
+                called(law, measured(e, de, a=a, dt=1e-3, t=1e-3 * k, **common), memory)
+        called(law, measured(*centre[:2], a=centre[2], dt=STEP, t=7.31, **common), memory)
+        line = centre + np.outer(along, random.normal(size=3))
+        us = [called(law, measured(e, de, a=a, dt=STEP, t=7.31, **common), memory.copy())[0] for e, de, a in line]
+        worst = max(worst, np.abs(np.diff(us)).max() / 6.0)
+    return worst
+
+
+@LAWS
+def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not(name):
+    largest = max(jump(name, model) for model in (0.0, 1.0))
+    assert (largest < JUMP) == catalogue()[name].continuous, largest
+
+
+# finite time
+
+
+@functools.cache
+def arrival(name):
+    """From 1, how long s (or e) takes from 0.01 to 0.001, over how long from 0.1 to 0.01: 1 if it falls as exp(-t)."""
+    law, known = smc.law(name), catalogue()[name]
+    h = 1e-4 if known.relative_degree == 1 else 5e-4
+    ran = plant_a(law, rest, h=h, duration=2.0)
+    if known.relative_degree > 1:
+        g = 20.0 if known.relative_degree == 3 else 1.0  # as behind a lag of 50 ms
+        ran = chain(law, rest, (1.0, 0.0, 0.0)[: known.relative_degree], h, 15.0, g=g)
+    values = np.abs(ran.s if known.finite_time == "e" else ran.sigma)
+    times = [np.flatnonzero(np.append(True, values > level))[-1] * h for level in (0.1, 0.01, 0.001)]
+    assert times[-1] < ran.t[-1], times
+    return (times[2] - times[1]) / (times[1] - times[0]) if times[1] else 0.0
+
+
+@pytest.mark.parametrize("name", [name for name, law in catalogue().items() if law.finite_time])
+def test_what_arrives_in_finite_time_is_ever_faster(name):
+    assert arrival(name) < 0.6
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["observer_free", "observer_free_third", "boundary_layer", "pid", "lqr", "computed_torque", "barrier_adaptive"],
+)
+def test_what_falls_exponentially_does_not(name):
+    assert arrival(name) > 0.7
+
+
+# choosing
+
+
+def names(*needs, **options):
+    return [law.name for law in suitable(needs, **options)]
+
+
+def test_laws_are_chosen_by_all_that_is_asked():
+    assert names() == smc.laws()
+    assert names("finite-time", "continuous") == ["continuous_twisting"]
+    assert set(names("two-gains")) < set(smc.laws())
+    assert "pid" not in names("two-gains")
+    assert "lqr" in names("two-gains")  # its weight r and its plant are held
+    assert names("no-velocity") == ["none"]
+    assert names("no-model", plant="cart_pole") == ["none"]
+    assert names(family="terminal") == ["nonsingular_fast_terminal", "nonsingular_terminal", "terminal"]
+    assert names("continuous", family="terminal") == []
+
+
+def test_every_law_has_a_family_and_every_family_laws():
+    assert "" not in families()
+    assert sorted(name for laws in families().values() for name in laws) == smc.laws()
+    assert families()["disturbance-observer"] == ["disturbance_observer", "extended_state"]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"needs": ["smooth"]}, "unknown property of a law 'smooth'"),
+        ({"family": "terminals"}, "did you mean 'terminal'"),
+    ],
+)
+def test_an_unknown_property_or_family_is_named(options, sentence):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        suitable(**options)
+
+
+def test_gains_that_are_held_are_not_counted():
+    assert searched(catalogue()["super_twisting"]) == ["k1", "k2", "c"]
+
+
+def test_a_law_of_a_user_says_its_properties_in_the_decorator():
+    @law_function(gains={"k": 2.0}, family="mine", continuous=True, finite_time="e")
+    def my_law(y, gains, memory):
+        return -gains.k * y.e, y.e
+
+    for need in ("continuous", "finite-time", "finite-reaching", "one-gain", "no-velocity"):
+        assert PROPERTIES[need].holds(my_law)
+    with pytest.raises(smc.ScenarioError, match="finite_time is 'soon': give 's', 'e' or ''"):
+        law_function(finite_time="soon")
