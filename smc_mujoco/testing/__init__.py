@@ -1,1 +1,1 @@
-"""What the pytest plugin is made of: step responses, limits, golden metrics, cases of the study, reports."""
+"""The pytest plugin: step responses, limits on metrics, golden metrics, cases of the study, reports of failures."""

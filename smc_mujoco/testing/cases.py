@@ -1,4 +1,4 @@
-"""The marker's cases: plants and conditions of the study as arguments of a test."""
+"""Cases of the marker `smc`: plants and conditions of the study as arguments of a test."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -12,15 +12,15 @@ EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])
 
 
 def cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
-    """Argument of a test, `plant` or `condition` -> the names that it takes in turn.
+    """Return argument of a test, `plant` or `condition` -> the names with which the test runs.
 
     Args:
-      given, named: the marker's arguments by position and by name. Without plants: every plant of the study; without
-        conditions: nominal.
+      given, named: the marker's arguments by position and by name. Default: every plant of the study, and the condition
+        nominal.
       arguments: names of the test's arguments.
 
     Raises:
-      ScenarioError: a plant or condition that is not there, or an argument that the test does not take.
+      ScenarioError: an unknown plant or condition, or an argument that the test does not have.
     """
     if given:
         raise ScenarioError(f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}")
@@ -34,20 +34,20 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
     for argument, plural in (("plant", "plants"), ("condition", "conditions")):
         if argument not in arguments and plural in named:
             raise ScenarioError(f"marker smc gives {plural} and the test takes no {argument}: add the argument")
-    taken = {argument: names for argument, names in wanted.items() if argument in arguments}
-    if not taken:
+    used = {argument: names for argument, names in wanted.items() if argument in arguments}
+    if not used:
         raise ScenarioError("marker smc is on a test that takes neither plant nor condition: add the arguments")
-    return taken
+    return used
 
 
 def _conditions(value: object) -> list[str]:
-    """Conditions as texts, from one or several of them."""
+    """Return one or several conditions as texts."""
     several: Any = value if isinstance(value, list | tuple) else [value]
     return [str(find_condition(one)) for one in several]
 
 
 def _names(kind: str, value: object, known: Mapping[str, object]) -> list[str]:
-    """Names that are known, from one or several."""
+    """Return one or several names as a list. Raise ScenarioError for an unknown one."""
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, list | tuple) or not names:
         raise ScenarioError(f"{kind}s of marker smc is {shown(value)}: give names, as in {EXAMPLE}")

@@ -1,7 +1,7 @@
-"""Golden metrics: recorded by `pytest --smc-update` in a JSON file beside the test, and compared from then on.
+"""Golden metrics: `pytest --smc-update` records them in a JSON file beside the test, and later runs compare with it.
 
-The file of test_laws.py is test_laws.golden.json: test -> metric -> value, tolerance, unit. The unit is that of value
-and tolerance. A test that names no tolerance uses those of the file.
+The file of test_laws.py is test_laws.golden.json: test -> metric -> value, tolerance and the unit of both. A test that
+names no tolerance uses those of the file.
 """
 
 import contextlib
@@ -14,12 +14,12 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.files import plain, read_json, replacing
-from smc_mujoco.testing.limits import Limit, judge, told
+from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
-RELATIVE = 0.01  # default tolerance, as a share of the value: far more than another processor's rounding, chosen
+RELATIVE = 0.01  # default tolerance, as a share of the value: chosen, far above rounding errors of other processors
 UPDATE = "run pytest --smc-update"
-LEAST = 1e-9  # least tolerance, in the metric's unit: more than rounding makes of 0
+LEAST = 1e-9  # least tolerance, in the metric's unit: above rounding errors of a value that is 0
 
 
 def place(test: Path) -> Path:
@@ -31,10 +31,10 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
     """Write a response's metrics and their tolerances into the file, under `key`. Arguments as of `compare`.
 
     Raises:
-      ScenarioError: the run failed, a tolerance that is none, or a file that cannot be written.
+      ScenarioError: the run failed, a tolerance is not a number of at least 0, or the file cannot be written.
     """
     _checked(response, tolerances)
-    names = tolerances if tolerances and rel is None else [name for name in response.values if response.tells(name)]
+    names = tolerances if tolerances and rel is None else [name for name in response.values if response.applies(name)]
     entry = {}
     for name in names:
         value, unit = response.value(name)
@@ -50,15 +50,16 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
 
 
 def compare(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Compare a response with what was recorded under `key`.
+    """Compare a response with the metrics recorded under `key`.
 
     Args:
-      rel: the share of its recorded value within which a metric must stay; None: the tolerance in the file.
+      rel: tolerance as a share of the recorded value; None: the tolerance in the file.
       tolerances: metric -> tolerance in its unit. Without rel only these metrics are compared.
 
     Raises:
-      AssertionError: nothing was recorded, or a metric is off; then the message has a table of all that were compared.
-      ScenarioError: a file that cannot be read, or a tolerance that is none.
+      AssertionError: nothing was recorded, or a metric is outside its tolerance; the message has a table of all
+        metrics.
+      ScenarioError: the file cannot be read, or a tolerance is not a number of at least 0.
     """
     __tracebackhide__ = True
     _checked(response, tolerances)
@@ -80,19 +81,19 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
         else:
             within = _tolerance(name, golden, tolerances, rel or 0.0)
         kept = value == golden or abs(value - golden) <= within
-        limits.append(Limit(name, told(value, unit), f"{told(golden)} ± {told(within)}", kept))
+        limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(within)}", kept))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
 def _checked(response: object, tolerances: Mapping[str, float]) -> None:
-    """Raise ScenarioError for what is no response, and for tolerances of metrics that it does not have."""
+    """Raise ScenarioError for anything but a response, and for tolerances of metrics that it does not have."""
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.named(tolerances)
 
 
 def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
-    """Return a metric's tolerance in its unit: the one that is named, else a share of its value, 0 of inf."""
+    """Return a metric's tolerance in its unit: the given one, else a share of its value, 0 if that is inf."""
     if name in tolerances:
         return number(f"tolerance of {name}", tolerances[name], least=0.0)
     share = max(number("rel", rel, least=0.0) * abs(value), LEAST)
@@ -108,10 +109,10 @@ def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: s
 
 
 def read(file: Path) -> dict[str, dict[str, Any]]:
-    """Return what a golden file holds; {} where there is none.
+    """Return the content of a golden file; {} if there is no file.
 
     Raises:
-      ScenarioError: it is no golden file.
+      ScenarioError: it is not a golden file.
     """
     try:
         found = read_json(file)
@@ -127,7 +128,7 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Let one worker of a parallel session at a time write into a folder. On Windows there is no lock."""
+    """Lock a folder, so that one worker of a parallel session at a time writes into it. On Windows there is no lock."""
     try:
         import fcntl
     except ImportError:
@@ -138,4 +139,4 @@ def locked(folder: Path) -> Iterator[None]:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
-        os.close(handle)  # and with it the lock
+        os.close(handle)  # releases the lock

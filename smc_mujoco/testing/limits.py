@@ -1,4 +1,4 @@
-"""Limits that a test sets on metrics, and the sentence and table of those that are missed."""
+"""Limits that a test sets on metrics, and the message, with a table, for those that are violated."""
 
 import functools
 import math
@@ -12,7 +12,7 @@ R = TypeVar("R")
 
 
 class Limit(NamedTuple):
-    """A metric with its value and its limit, both in words, and whether it keeps within the limit."""
+    """A metric with its value and its limit, both as text, and whether the value is within the limit."""
 
     metric: str
     value: str
@@ -21,29 +21,29 @@ class Limit(NamedTuple):
 
 
 def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
-    """Return the Limit for a number, the most that the value may be, or a pair, the least and the most.
+    """Return the Limit of a value that may be at most `limit`, or in the range `limit` = (least, most).
 
     Raises:
-      ScenarioError: neither.
+      ScenarioError: the limit is neither a number nor a pair.
     """
     if not isinstance(limit, tuple | list):
         most = number(f"limit of {metric}", limit, infinite=True)
-        return Limit(metric, told(value, unit), f"<= {told(most)}", value <= most)
+        return Limit(metric, quantity(value, unit), f"<= {quantity(most)}", value <= most)
     if len(limit) != 2:
         raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the most, or (least, most)")
     least, most = (number(f"limit of {metric}", end, infinite=True) for end in limit)
     if least > most:
         raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
-    return Limit(metric, told(value, unit), f"{told(least)} .. {told(most)}", least <= value <= most)
+    return Limit(metric, quantity(value, unit), f"{quantity(least)} .. {quantity(most)}", least <= value <= most)
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
-    """Raise an AssertionError with a table of all limits if one is missed.
+    """Raise an AssertionError with a table of all limits if one is violated.
 
     Args:
-      kind: heading of the limits.
-      word: what stands between a value and the limit that it misses.
-      note: said in parentheses.
+      kind: heading of the limits in the table.
+      word: word between a value and the limit that it violates.
+      note: text in parentheses after the violations.
     """
     __tracebackhide__ = True
     if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, kept in limits if not kept]:
@@ -51,22 +51,22 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
         raise AssertionError(f"{'; '.join(missed)} ({note})\n{lines}")
 
 
-def told(value: float, unit: str = "") -> str:
-    """Return a number with its unit as tables show it. Infinity is "never", as in every table of this package."""
+def quantity(value: float, unit: str = "") -> str:
+    """Return a number with its unit for tables. Infinity is "never", as in every table of this package."""
     if math.isinf(value):
         return "never"
     return f"{value:.6g} {unit}".rstrip() if unit != "1" else f"{value:.6g}"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return plain text in columns."""
+    """Return a table as plain text."""
     lines = [tuple(heads), *map(tuple, rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
 
 
 def without_frames(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with its ScenarioErrors raised anew, so that pytest shows no frame of this package."""
+    """Return the function with its ScenarioErrors raised again, so that pytest shows no frame of this package."""
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:

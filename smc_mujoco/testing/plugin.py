@@ -4,8 +4,8 @@
         r = step_response("inverted_pendulum", my_law, step=0.2, friction=smc.Coulomb(0.05))
         assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
 
-pytest loads this file in every session of everybody who has the package installed (entry point `pytest11`). It
-therefore imports nothing heavy until a test uses a fixture or the marker, and leaves MUJOCO_GL alone.
+pytest loads this file in every session if the package is installed (entry point `pytest11`). So it imports nothing
+heavy until a test uses a fixture or the marker, and does not change MUJOCO_GL.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Ledger(NamedTuple):
-    """Responses of the test that runs, and pytest's temporary folder: fixtures write them, hooks read them."""
+    """Responses of the running test, and pytest's temporary folder. Fixtures write them, hooks read them."""
 
     responses: list[StepResponse]
     temporary: Path
@@ -41,7 +41,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Explain the marker."""
+    """Register the marker."""
     config.addinivalue_line(
         "markers",
         "smc(plants=[...], conditions=[...]): run the test with each plant and condition of smc_mujoco's study, "
@@ -50,7 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """One test for each plant and condition of the marker."""
+    """Make one test for each plant and condition of the marker."""
     marker = metafunc.definition.get_closest_marker("smc")
     if marker is None:
         return
@@ -61,7 +61,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         found, wrong = cases(marker.args, marker.kwargs, metafunc.fixturenames), None
     except ScenarioError as error:
         found, wrong = {}, str(error)
-    if wrong:  # told outside of the handler, so that the sentence comes without the error's frames
+    if wrong:  # raised outside of the handler, so that pytest does not show the frames of the error
         pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     for argument, names in found.items():
         metafunc.parametrize(argument, names)
@@ -74,7 +74,7 @@ def step_response(
     """Run a law from rest to a step of the reference: step_response(plant, law, step, condition, **scenario fields).
 
     Example: r = step_response("duffing", my_law(k1=4.0), step=0.2, condition="noise", duration=5.0)
-    Every metric is an attribute of r: assert r.settling_time < 2; r.check(settling_time=2, overshoot=5) tests several.
+    Every metric is an attribute: assert r.settling_time < 2. r.check(settling_time=2, overshoot=5) tests several.
     """
     from smc_mujoco.testing.limits import without_frames
     from smc_mujoco.testing.response import respond
@@ -93,8 +93,8 @@ def step_response(
 def golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     """Compare a response with the metrics that `pytest --smc-update` recorded: golden(r, settling_time=0.01).
 
-    Named metrics are compared within a tolerance in their unit. With none named, or with rel=0.05, all the others are
-    too: within that share of their recorded value, by default within 1 %.
+    Named metrics are compared within a tolerance in their unit. If none is named, all metrics are compared, within 1 %
+    of their recorded value by default. With rel=0.05 the metrics that are not named are compared too, within 5 %.
     """
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
@@ -117,7 +117,7 @@ def golden(request: pytest.FixtureRequest) -> Callable[..., None]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Forget the responses of the test before."""
+    """Forget the responses of the previous test."""
     if ledger := item.config.stash.get(LEDGER, None):
         ledger.responses.clear()
 
@@ -141,7 +141,7 @@ def pytest_runtest_makereport(
 
 
 def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
-    """Return the responses that a test made, and those that it has from fixtures of a wider scope."""
+    """Return the responses that a test made, and those that it got from fixtures of a wider scope."""
     from smc_mujoco.testing.response import StepResponse
 
     fixed = [value for value in getattr(item, "funcargs", {}).values() if isinstance(value, StepResponse)]
@@ -149,7 +149,7 @@ def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Say which golden files were written."""
+    """Print which golden files were written."""
     if config.getoption("smc_update"):
         reports = itertools.chain.from_iterable(terminalreporter.stats.values())
         noted = [pair for report in reports for pair in getattr(report, "user_properties", ())]

@@ -1,4 +1,4 @@
-"""The report of a failing test: tables of its step responses, a figure, and a film if one is wanted."""
+"""The report of a failing test: tables of its step responses, a figure and, with --smc-video, a film."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,11 +11,12 @@ LONGEST = 150  # characters of a test's id in a file's name: most file systems a
 
 
 def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
-    """Return tables of all responses, then the files that show them: one figure and one film for each plant.
+    """Return tables of all responses, and the paths of the files that show them: a figure and a film for each plant.
 
     Args:
-      test: its node id, of which the files' names are made.
-      folder: where the files go; it is made.
+      test: node id of the test, from which the files' names are made.
+      folder: folder of the files; it is made if it does not exist.
+      video: whether to make films.
     """
     parts = [f"{response}\n{response.table()}" for response in responses]
     plants: dict[str, list[Trace]] = {}

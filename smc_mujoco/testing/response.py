@@ -1,4 +1,4 @@
-"""A step response: a run from rest to a step of the reference, with every metric as an attribute."""
+"""Step responses: runs from rest to a step of the reference, with every metric as an attribute."""
 
 import dataclasses
 import functools
@@ -17,24 +17,24 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Step
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.testing.limits import bound, judge, table, told, without_frames
+from smc_mujoco.testing.limits import bound, judge, quantity, table, without_frames
 
-TOLD = ("settling_time", "overshoot", "tv_rate")  # metrics in the response's repr
+IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StepResponse:
     """The response of a law to a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
 
-    Where some joints have no actuator, `r.scores` has the metrics of each group of channels, as `smc.scores` does: of
-    the pole on a cart, r.scores["free"]["ultimate_bound"]. In `check` that metric is "free ultimate_bound".
+    If some joints have no actuator, `r.scores` has the metrics of each group of channels, as `smc.scores` does. For the
+    pole on a cart: r.scores["free"]["ultimate_bound"]. In `check` that metric is named "free ultimate_bound".
 
-    A run that failed has no metrics: asking for one raises a ScenarioError that says when and why it failed.
+    A failed run has no metrics: reading one raises a ScenarioError that says when and why the run failed.
 
     Attributes:
-      trace: the Trace of the run; `scenario` is its Scenario, `failure` what went wrong in it, or None.
+      trace: the Trace of the run.
       step: height of the step, rad or m.
-      condition: the condition and the fields that the test gave, in words; "" for none.
+      condition: the condition, and the scenario fields that the test gave, as text; "" for none.
     """
 
     trace: Trace
@@ -62,12 +62,12 @@ class StepResponse:
 
     @functools.cached_property
     def scores(self) -> Mapping[str, Mapping[str, float]]:
-        """Every metric of each group of channels, by the group's name; raises as `metrics`."""
+        """Every metric of each group of channels, by the group's name; raises like `metrics`."""
         return scores(self.trace)
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
-        """`metrics`, and where there are several groups of channels those of each, as "free peak"."""
+        """`metrics`, and if there are several groups of channels the metrics of each, named as in "free peak"."""
         groups = self.scores.items()
         each = {self._label(group, name): value for group, values in groups for name, value in values.items()}
         return dict(self.metrics) | each
@@ -75,7 +75,7 @@ class StepResponse:
     @without_frames
     def __getattr__(self, name: str) -> float:
         __tracebackhide__ = True  # of the AttributeError
-        if name.startswith("_") or name == "trace":  # asked for by copy and inspect
+        if name.startswith("_") or name == "trace":  # read by copy and inspect
             raise AttributeError(name)
         if name in CATALOGUE and name in self.metrics:
             return self.metrics[name]
@@ -92,7 +92,7 @@ class StepResponse:
     def __repr__(self) -> str:
         how = f"failed, {self.failure}"
         if self.failure is None:
-            how = ", ".join(f"{name} {told(*self.value(name))}" for name in TOLD if name in self.metrics)
+            how = ", ".join(f"{name} {quantity(*self.value(name))}" for name in IN_REPR if name in self.metrics)
         return f"StepResponse({self}: {how})"
 
     def value(self, name: str) -> tuple[float, str]:
@@ -107,16 +107,16 @@ class StepResponse:
         return unknown("metric", name, CATALOGUE)
 
     def _label(self, group: str, metric: str) -> str:
-        """Return the name of a group's metric in tables: its own if it is the one in `metrics`, else with the group."""
+        """Return the name of a group's metric in tables: the plain name if `metrics` has it, else with the group."""
         alone = len(groups(self.scenario.plant)) == 1
         return metric if alone or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
 
-    def tells(self, name: str) -> bool:
-        """Return whether one of the `values` says something of this run: some are of realistic mechanisms alone."""
+    def applies(self, name: str) -> bool:
+        """Return whether a metric is meaningful for this run. Some are for realistic mechanisms only."""
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
     def named(self, names: Iterable[str]) -> None:
-        """Raise ScenarioError for names that are not among the `values` of this run, which may have failed."""
+        """Raise ScenarioError for names that are not among the `values` of this run, also if it failed."""
         plant = self.scenario.plant
         known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
         known += [self._label(each.name, m.name) for each in groups(plant) for m in CATALOGUE.values() if m.fits(each)]
@@ -126,14 +126,14 @@ class StepResponse:
 
     @without_frames
     def check(self, **limits: float | tuple[float, float]) -> None:
-        """Assert limits on metrics, all of them: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
+        """Assert several limits on metrics: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
 
         Args:
-          limits: metric -> the most that it may be, or (least, most), in the metric's unit.
+          limits: metric -> largest value, or (least, largest) value, in the metric's unit.
 
         Raises:
-          AssertionError: a limit is missed, or the run failed; the message is a table of all the limits.
-          ScenarioError: no such metric, or no such limit.
+          AssertionError: a limit is violated, or the run failed; the message has a table of all limits.
+          ScenarioError: an unknown metric, or a limit that is neither a number nor a pair.
         """
         __tracebackhide__ = True
         if not limits:
@@ -144,10 +144,12 @@ class StepResponse:
         judge([bound(name, *self.value(name), limit) for name, limit in limits.items()], "limit", "not", self)
 
     def table(self) -> str:
-        """Return a table of the metrics that say something of this run, as text."""
+        """Return a table of the metrics that are meaningful for this run, as text."""
         if self.failure is not None:
             return f"failed: {self.failure}"
-        return table(("metric", "value"), [(name, told(*self.value(name))) for name in self.values if self.tells(name)])
+        return table(
+            ("metric", "value"), [(name, quantity(*self.value(name))) for name in self.values if self.applies(name)]
+        )
 
 
 def respond(
@@ -160,12 +162,13 @@ def respond(
     """Run a law from rest at 0 to a step of the reference at t = 0.
 
     Args:
-      step: its height, rad or m.
-      condition: a name, such as "noise", or one of your own, see `smc.condition`.
-      fields: Scenario field -> value, over those of the condition; x0 may be among them.
+      plant, law: as in a Scenario.
+      step: height of the step, rad or m.
+      condition: name of a condition, such as "noise", or your own, see `smc.condition`.
+      fields: Scenario field -> value, which replaces that of the condition; x0 may be among them.
 
     Raises:
-      ScenarioError: anything out of its range, in one sentence.
+      ScenarioError: an argument is unknown or out of range.
     """
     given = dict(fields or {})
     for name in given:
@@ -178,9 +181,9 @@ def respond(
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
-    asked = find_condition(condition)
+    chosen = find_condition(condition)
     machine = find_plant(plant) if isinstance(plant, str) else plant
-    of_study = asked.on(machine, number("duration", given.get("duration", scenarios.DURATION)))
-    whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | of_study | given
-    told = [asked.name] * (asked.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
-    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(told))
+    conditions = chosen.on(machine, number("duration", given.get("duration", scenarios.DURATION)))
+    whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | conditions | given
+    words = [chosen.name] * (chosen.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
+    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(words))
