@@ -74,7 +74,8 @@ def plot(
             for k, name in enumerate(names):
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
                 axes[i, k].tick_params(labelleft=k == 0)
-            axes[i, 0].set_title(style.in_words(plant))
+            known = plants_catalogue().get(plant)
+            axes[i, 0].set_title(style.plant_name(known) if known else plant, parse_math=False)
         pages.set_head(page, width, title or "Medians over seeds, by condition", key)
         pages.write(page, paths)
     return page
@@ -104,6 +105,8 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
         ax.set_xscale("log")
     for (law, line), one in found.items():
         _dot(ax, one, line, {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"})
+    if not sizes:
+        ax.set_xticks([])
     for j in range(1, len(there)):
         ax.axhline(j * (len(laws) + 1) - 1, color=style.RULE, lw=style.points(0.8))
     middles = [j * (len(laws) + 1) + (len(laws) - 1) / 2 for j in range(len(there))]
@@ -125,6 +128,7 @@ def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
     if np.isfinite(one.low) and np.isfinite(one.high):
         ax.plot([one.low, one.high], [line, line], color=look["color"], lw=style.points(1.5))
     elif np.isfinite(one.low):  # reaches to "never"
+        ax.plot(one.low, line)  # nothing is seen: the axis comprises the interval
         look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
         ax.annotate("", (1.0, line), (one.low, line), ("axes fraction", "data"), "data", arrowprops=look)
 

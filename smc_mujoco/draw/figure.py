@@ -113,7 +113,7 @@ def figure(
         if overview:
             _draw_over_time(page, cells, overview, drawing.titles(overview, pitch), colours, changes)
         _draw_beside(page, others, column, places, colours, rests)
-        pages.set_head(page, width, title or style.plant_name(traces[0]), key)
+        pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key)
         pages.write(page, paths)
     return page
 
@@ -202,7 +202,8 @@ def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], plac
             panel = places[0]._replace(quantity="u")
             drawing.last_samples(ax, panel.traces, colours)
             channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
-            ax.set(xlabel="time before the end (ms)", ylabel=f"control u ({style.units(panel.group)['u']}){channel}")
+            letter = "u" if channel else "control u"
+            ax.set(xlabel="time before the end (ms)", ylabel=f"{letter} ({style.units(panel.group)['u']}){channel}")
 
 
 def signals(
@@ -267,7 +268,7 @@ def signals(
         key = _meaning([control])
         if room > points(250):
             key.append(Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %"))
-        pages.set_head(page, width, title or f"{style.plant_name(traces[0])}: control", key)
+        pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key)
         pages.write(page, paths)
     return page
 

@@ -34,6 +34,7 @@ LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single cha
 COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
 DASH = 5.0  # widths of a line
 TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
+JUMP = 2.0  # a rate of the reference so many times its 99 % quantile is that of a jump; chosen
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
 UNBANDED = ("x", "e", "spread")  # drawn sample by sample, without a mean over time
 
@@ -282,7 +283,10 @@ def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
 
 
 def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Sequence[Sequence[int]]) -> None:
-    """Draw v over x: a ring at the start of each trace, a diamond at each sample in `held`, where friction holds it."""
+    """Draw v over x of traces, and of a reference that moves.
+
+    A ring is the start of a trace, a diamond a sample in `held`, where friction holds it.
+    """
     for trace, colour, samples in reversed(list(zip(traces, colours, held, strict=True))):
         x, v = trace.x, trace.v
         for i in light(x.shape[1]) if x.shape[1] > 1 else ():
@@ -296,8 +300,23 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
             ax.plot(x[-1], v[-1], "X", color=colour, zorder=5, **cross())
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
+    low, high = limits(traces, "v")
+    longest = sorted(traces, key=lambda trace: len(trace.t))
+    for trace in {trace.scenario.reference: trace for trace in longest}.values():
+        r, dr = orbit(trace)
+        if dr.any():
+            ax.plot(r, dr, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
+            low, high = min(low, 1.05 * dr.min()), max(high, 1.05 * dr.max())
     ax.set_xlim(limits(traces, "x"))
-    ax.set_ylim(limits(traces, "v"))
+    ax.set_ylim(low, high)
+
+
+def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+    """Return the reference r and its rate r' by differences, where it does not jump."""
+    r = trace.r[np.isfinite(trace.r[:, 0]), 0]
+    dr = np.gradient(r, trace.scenario.control_period) if len(r) > 1 else np.zeros(len(r))
+    smooth = np.abs(dr) <= JUMP * np.quantile(np.abs(dr), 0.99) if len(r) else []
+    return r[smooth], dr[smooth]
 
 
 def transient(panel: Panel) -> Panel:

@@ -20,7 +20,7 @@ from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
-from smc_mujoco.mechanisms.plant import EFFORT
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.perturbations import Jump
@@ -324,9 +324,8 @@ def units(group: Group) -> dict[str, str]:
     return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
 
 
-def plant_name(trace: Trace) -> str:
+def plant_name(plant: Plant) -> str:
     """Return the plant's label: its own, or its name in words. A user's model keeps the user's name."""
-    plant = trace.scenario.plant
     return plant.label or (plant.name if plant.direct else in_words(plant.name))
 
 

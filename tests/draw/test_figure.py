@@ -87,7 +87,7 @@ def test_network_shows_mean_and_spread_and_stays_small(tmp_path):
     assert "max − min x (rad)" in words(svg)
     assert "light: single channels" in words(svg)
     assert "mean u (N·m)" in words(svg)
-    assert "control u (N·m), channel 0" in words(svg)
+    assert "u (N·m), channel 0" in words(svg)
     assert svg.stat().st_size < 1_000_000
 
 

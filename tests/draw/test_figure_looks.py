@@ -153,6 +153,16 @@ def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
         assert line.get_zorder() > max(curve.get_zorder() for curve in curves(ax))
 
 
+def test_a_reference_that_moves_is_in_the_phase_portrait_without_its_jumps(one):
+    sine, step = 2.0 * np.sin(3.0 * one.t)[:, None], np.where(one.t < 0.5, 0.0, 1.0)[:, None]
+    (ax,) = figure(dataclasses.replace(one, r=sine), panels=["phase"]).axes
+    (line,) = [line for line in ax.lines if line.get_gid() == panels.REFERENCE]
+    assert np.abs(line.get_ydata()).max() == pytest.approx(6.0, rel=1e-3)
+    assert ax.get_ylim()[0] < -6.0 < 6.0 < ax.get_ylim()[1]
+    (ax,) = figure(dataclasses.replace(one, r=step), panels=["phase"]).axes
+    assert not [line for line in ax.lines if line.get_gid() == panels.REFERENCE]
+
+
 def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     scenario = one.scenario
     slow = dataclasses.replace(one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=2.0)))
@@ -251,7 +261,8 @@ def test_bad_arguments_are_refused(options, sentence, one):
 class Rows:
     """A table of made-up runs."""
 
-    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6):
+    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6, still="", mixed=False):
+        self.still, self.mixed = still, mixed
         cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
@@ -262,8 +273,12 @@ class Rows:
             return empty[name]
         if name in ("plant", "condition", "law", "seed"):
             return np.array([row[("plant", "condition", "law", "seed").index(name)] for row in self.rows], object)
-        never = [name == "settling_time" and row[2] == "pid" for row in self.rows]
-        return np.where(never, np.inf, [row[4] for row in self.rows])
+        never = [name == "settling_time" and (row[2] == "pid" or row[0] == self.still) for row in self.rows]
+        sizes = [float(row[4]) for row in self.rows]
+        if self.mixed:  # the interval of pid, the fastest, reaches to "never"
+            never = [one and int(row[3]) % 2 > 0 for one, row in zip(never, self.rows, strict=True)]
+            sizes = [size - 0.9 * (row[2] == "pid") for size, row in zip(sizes, self.rows, strict=True)]
+        return np.where(never, np.inf, sizes)
 
 
 @pytest.mark.parametrize("size", [None, "ieee-page"])
@@ -278,3 +293,16 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itea': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itea"])
+
+
+def test_the_axis_of_a_board_comprises_intervals_that_reach_to_never():
+    ax = smc.plot(Rows(seeds=7, mixed=True), metrics=["settling_time"]).axes[0]
+    lows = [text.xyann[0] for text in ax.texts if text.arrow_patch is not None]
+    assert lows
+    assert ax.get_xlim()[0] < min(lows)
+
+
+def test_a_panel_of_a_board_in_which_no_law_settles_has_no_numbers():
+    page = smc.plot(Rows(still="duffing"), metrics=["settling_time"])
+    assert [ax.get_title(loc="left") for ax in page.axes] == ["Duffing oscillator", "Van der Pol oscillator"]
+    assert [len(ax.get_xticks()) > 0 for ax in page.axes] == [False, True]

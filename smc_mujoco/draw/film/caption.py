@@ -42,7 +42,9 @@ class Caption:
         self.jumps = style.jumps(traces, names)
         inside = size[0] - 2 * EDGE * scale
         clock = style.width("00.00 s", TITLE * scale, bold=True) + EDGE * scale
-        self.title = style.cropped(title or style.plant_name(traces[0]), inside - clock, TITLE * scale, bold=True)
+        self.title = style.cropped(
+            title or style.plant_name(traces[0].scenario.plant), inside - clock, TITLE * scale, bold=True
+        )
         notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
         self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
         self.key = wrapped(key(traces, scales), inside - self.note_room, KEY * scale)
