@@ -1,9 +1,9 @@
-"""What linear theory says of the paper's law at rest: smallest lambda, critical delay, steady error.
+"""Linear theory of the paper's law at rest: smallest lambda, critical delay, steady error.
 
     plant = smc.plant("inverted_pendulum")
     smallest_lam(plant, k1=9.7)                                # 0.253
     critical_delay(plant, lam=4.4, k1=9.7)                     # s, continuous control
-    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)    # s, as it runs: sampled and held
+    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)    # s, sampled and held, as in a run
     steady_error(plant, lam=4.4, k1=9.7, d=0.2)                # rad
     rest_error(plant, law, d=0.2)                              # the same without linearising
 
@@ -11,9 +11,9 @@ At rest the plant is M x'' = -K x - D x' + u + d (`linear`) and u = -lam tanh(x'
 
     M x'' + (D + lam) x' + (K + lam k1) x = d,                                                          (1)
 
-in n modes that differ in their stiffness K_j alone: each statement below is the worst mode's. The middle of a saturated
-law is of the same kind, with lam = k/phi and k1 = c (`linear.local`). Laws that switch have no linear part, and no
-theory here.
+in n modes that differ only in their stiffness K_j. Each result below is that of the worst mode. A law with a boundary
+layer has the same form near s = 0, with lam = k/phi and k1 = c (`linearisation.local`). Laws that switch have no linear
+part, and no theory here.
 Source: Routh-Hurwitz for (1), the paper's stability claim is "any lambda > 0"; the crossings of a delay after
 K. L. Cooke & Z. Grossman, J. Math. Anal. Appl. 86:592, 1982; sampling after Astrom & Wittenmark, Computer-Controlled
 Systems, 1997, chapter 2; the rest derived here.
@@ -35,8 +35,8 @@ from smc_mujoco.mechanisms.plant import Plant
 def smallest_lam(plant: Plant, k1: float) -> float:
     """Return the lam above which (1) is stable in continuous control, at least 0.
 
-    By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every mode. 0
-    confirms the paper's claim; inf: no lam is enough.
+    By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every mode. A result of 0
+    confirms the paper's claim; with inf no lam is enough.
     """
     k1, at = number("k1", k1, least=0.0), linear(plant)
     soft = -float(at.modes[0])
@@ -45,10 +45,11 @@ def smallest_lam(plant: Plant, k1: float) -> float:
 
 
 def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, float]:
-    """Return the lam between which the sampled loop without delay is stable; (inf, inf): nowhere.
+    """Return the range of lam in which the sampled loop without delay is stable; (inf, inf) if there is none.
 
-    A sample moves a mode by z+ = z + E z + Gamma u, z = (x, x'), u = -lam (k1, 1) z: exact. Jury's conditions, of the
-    trace t and determinant d of the closed E, are d > 0, t + d < 0 and 4 + 2 t + d > 0, all affine in lam.
+    Over a sample a mode moves exactly by z+ = z + E z + Gamma u, with z = (x, x') and u = -lam (k1, 1) z. Jury's
+    conditions, with t and d the trace and determinant of the closed loop's E, are d > 0, t + d < 0 and 4 + 2 t + d > 0,
+    all affine in lam.
     """
     k1, at = number("k1", k1, least=0.0), linear(plant)
     low, high = 0.0, math.inf
@@ -67,15 +68,16 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
 
 
 def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
-    """Return the input delay in s from which (1) is unstable: 0 if it is unstable without delay, inf if with none.
+    """Return the input delay in s above which (1) is unstable: 0 if it is unstable without delay, inf if it never is.
 
     Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
-    right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|, a quadratic in w^2 without tau, which the phase then
-    gives. Holding the input over h acts like h/2 of delay more.
-    Sampled (control_period h): a delay of m periods makes it 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
-    N = lam (k1, 1) adj(w - E) Gamma, and |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
-    gives m, not whole: stable for all whole m below it, no more at the next. A loop still above 1 at the highest
-    frequency a sampled loop has, z = -1, tolerates less than one period.
+    right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|. This is a quadratic in w^2 without tau; the phase at w
+    then gives tau. Holding the input over h acts like an additional delay of h/2.
+
+    Sampled (control_period h): with a delay of m periods the equation is 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1
+    and N = lam (k1, 1) adj(w - E) Gamma. |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
+    gives an m that is not whole: the loop is stable for all whole numbers below it, and unstable at the next. A loop
+    whose gain is above 1 at the highest frequency, z = -1, tolerates less than one period.
     """
     lam, k1 = number("lam", lam, least=0.0), number("k1", k1, least=0.0)
     at, h = linear(plant), number("control_period", control_period, least=0.0)
@@ -125,7 +127,7 @@ def _adjugate(m: np.ndarray) -> np.ndarray:
 
 
 def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
-    """Return where (1) rests under a constant d on every channel, worst channel, rad or m.
+    """Return |x| at rest of (1) under a constant d on every channel, worst channel, rad or m.
 
     For one joint it is |d| / (lam k1 + K).
     """
@@ -136,9 +138,10 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 
 
 def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> float | None:
-    """Return the same without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|; inf if none.
+    """Return `steady_error` without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|.
 
-    None for a law without theory. Only x up to the first maximum of that force count: beyond it nothing holds.
+    inf if there is no such x, None for a law without linear part. Only x up to the first maximum of that force count,
+    because rest beyond it is unstable.
     """
     force = holding(plant, law, u_max)
     if force is None:
@@ -152,9 +155,10 @@ def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> flo
 
 
 def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
-    """Return the largest constant d, or dry friction, with which the plant rests within |x| <= most.
+    """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= most, rad or m.
 
-    None as in `rest_error`. Dry friction up to this level cannot hold the plant further out. It may stop further in.
+    None for a law without linear part. Dry friction up to this level cannot hold the plant further out, but it may stop
+    it closer to 0.
     """
     force = holding(plant, law, u_max)
     if force is None:
@@ -165,7 +169,7 @@ def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf
 
 
 def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
-    """Return where a force that rises over the first `size` of DISPLACEMENTS is largest, and how large."""
+    """Return the place and the size of the maximum of a force that rises over the first `size` of DISPLACEMENTS."""
     from scipy.optimize import minimize_scalar
 
     ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]

@@ -1,4 +1,4 @@
-"""A plant at rest as M x'' = -K x - D x' + u + d, and the laws that are linear there.
+"""Linearisation at rest: the plant as M x'' = -K x - D x' + u + d, and the laws that are linear there.
 
     at = linear(smc.plant("pendulum_network"))
     at.inertia, at.damping, at.modes        # kg m^2, N m s/rad, (n,) N m/rad
@@ -21,9 +21,9 @@ from smc_mujoco.control.design import STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 
-SAME = 1e-6  # relative: what differs by less is called the same
-MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first summit of every restoring force here
-DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # of a force at rest: each 0.5 % further out
+SAME = 1e-6  # relative: smaller differences count as none
+MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first maximum of every restoring force here
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # rad or m, where `holding` is sampled: steps of 0.5 %
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,11 +44,11 @@ def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
     """Linearise the plant at x = x' = 0.
 
     Args:
-      factors: parameter name -> factor, for the true plant of a mismatch; None: the nominal one.
+      factors: parameter name -> factor, for the true plant with a mismatch; None: the nominal plant.
 
     Raises:
-      ScenarioError: channels without an actuator, of two units, of unlike inertia or damping, or coupled otherwise
-        than by springs.
+      ScenarioError: channels without an actuator, with different units, inertias or dampings, or with a coupling other
+        than springs.
     """
     return _linear(plant, frozen(factors or {}))
 
@@ -79,16 +79,16 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
 
 
 def local(law: Law) -> tuple[float, float] | None:
-    """Return lam and k1 of u = -lam (e' + k1 e), which the law is near s = 0; None where it is not linear there."""
+    """Return lam and k1 of u = -lam (e' + k1 e), the law near s = 0; None if it is not linear there."""
     rest = law.template and law.template.rest
     return rest.linear(SimpleNamespace(**law.gains)) if rest else None
 
 
 @functools.lru_cache(maxsize=1024)
 def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return E (2, 2) and Gamma (2,) of a mode sampled with period h, z+ = z + E z + Gamma u, z = (x, x'): exact.
+    """Return E (2, 2) and Gamma (2,) of a mode sampled with period h: z+ = z + E z + Gamma u, z = (x, x').
 
-    E is the change over a sample, not the usual Phi = 1 + E, in which rounding would hide the change of a short h.
+    E is the change over a sample, not the usual Phi = 1 + E, in which rounding would hide the change over a short h.
     """
     from scipy.linalg import expm
 
@@ -99,11 +99,14 @@ def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndar
 
 
 def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
-    """The force that holds every channel at the same x > 0, N or N m, as a function of x; None for other laws."""
+    """Return the force that pulls every channel back from the same x > 0, N or N m, as a function of x, (k,).
+
+    It is that of the law and of the plant together. None for a law without linear part.
+    """
     rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
     if not rest:
         return None
-    linear(plant)  # or refuses
+    linear(plant)  # raises for a plant without linear theory
     p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
     ratios = [plant.nominal(np.full(plant.n, 1.0), still, i, p) for i in range(plant.n)]
     if np.ptp([f / g for f, g in ratios]) > SAME * (1.0 + abs(ratios[0][0] / ratios[0][1])):
@@ -117,7 +120,7 @@ def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.nda
 
 
 def rising(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return the force of `holding` at DISPLACEMENTS, up to where it falls for the first time."""
+    """Return the force of `holding` at DISPLACEMENTS, up to its first maximum."""
     values = force(DISPLACEMENTS)
     falls = np.flatnonzero(np.diff(np.r_[0.0, values]) < 0.0)
     return values[: falls[0]] if falls.size else values

@@ -2,17 +2,18 @@
 
     for margin in margins(["duffing"], ["observer_free", "classical"], ["delay"]):
         print(margin.law, margin.value, margin.unit, margin.theory)
-    of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # a law of your own
+    of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # your own law
 
-A run tolerates a level if it does not fail and its ultimate bound is at most 5 % of its scale (`conventions`): what is
-left after 10 s. (The envelope is then below its start too, as the paper's claim on delay asks: it starts at the scale.)
+A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
+(`conventions`). (Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.)
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
-tolerated, until it is within one control period of delay, or 2 % of anything else. The tolerated levels need not be one
-interval: there may be larger ones above a level that is not tolerated, and one that is not between two that are. Noise
-is one realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel. Theory says
-from which delay rest is unstable: a smooth law then swings with an amplitude that grows from 0, and so tolerates a
-little more. It also says from where a push, or friction that sticks, holds the plant 5 % off: the plant may still stick
-further in. All searches advance together, one batch of runs a round.
+tolerated, until it is within one control period of delay, or 2 % of other levels. The tolerated levels may have gaps:
+there may be tolerated levels above one that is not. Noise is one realisation, seed 0, the same for every law. A
+disturbance is positive and acts on every channel.
+
+Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
+from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant 5 %
+off. The plant may stop closer to the reference. All searches advance together, one batch of runs per round.
 """
 
 import dataclasses
@@ -46,14 +47,14 @@ from smc_mujoco.simulation.signals import Constant
 from smc_mujoco.simulation.trace import Trace
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
-RATE = 5.0  # 1/s: noise of the velocity over that of the position, as of the study's sensor
-LARGEST = 6.0  # N or N m: the study's u_max, beyond which no actuator of it holds anything
-HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, well beyond what is tolerated
+RATE = 5.0  # 1/s: standard deviation of the velocity's noise over that of the position's, as in the study's sensor
+LARGEST = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
+HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
-FINE, COARSE = 0.02, 0.1  # of the level: where a search ends, in full and quick
-PERIODS = {FINE: 1, COARSE: 5}  # of control, likewise for a delay
+FINE, COARSE = 0.02, 0.1  # of the level: resolution of a full and of a quick search
+PERIODS = {FINE: 1, COARSE: 5}  # control periods: the same for a delay
 QUICK = 5.0  # s, of a quick search's runs
-HALVINGS = 6  # of an interval between two levels, about: for the progress bar
+HALVINGS = 6  # of an interval between two levels, about; for the progress bar
 
 Key = TypeVar("Key")
 
@@ -63,14 +64,14 @@ Key = TypeVar("Key")
 
 @dataclasses.dataclass(kw_only=True)
 class Search:
-    """The search for the largest tolerated level below the smallest one that is not.
+    """The search for the largest tolerated level below the first one that is not tolerated.
 
     Attributes:
-      levels: those tried first, from small to large, up to the first that is not tolerated.
-      resolution: from the largest tolerated level to the interval at which the search ends.
-      rounded: from a level to the nearest one that a run can have.
-      low: the largest level known to be tolerated; at first the level at which there is nothing to tolerate.
-      high: the smallest level known not to be; inf until there is one.
+      levels: levels tried first, from small to large, up to the first that is not tolerated.
+      resolution: function of the largest tolerated level that returns the interval at which the search ends.
+      rounded: function that returns the nearest level that a run can have.
+      low: largest level known to be tolerated; at first the level without any effect.
+      high: smallest level known not to be tolerated; inf until there is one.
     """
 
     levels: Sequence[float]
@@ -90,7 +91,7 @@ class Search:
 
     @property
     def left(self) -> int:
-        """About how many runs are still to come."""
+        """The number of runs still to come, estimated."""
         if self.high == math.inf:
             return sum(level > self.low for level in self.levels) + HALVINGS
         return math.ceil(max(0.0, math.log2((self.high - self.low) / self.resolution(self.low))))
@@ -102,7 +103,8 @@ def find_boundaries(
     """Advance searches together until all are done.
 
     Args:
-      tolerated: from the searches that go on, with the level that each tries, to whether these are tolerated.
+      tolerated: function of (key, level) pairs, one per search that goes on. It returns whether each level is
+        tolerated.
     """
     while tried := [(key, level) for key, search in searches.items() if (level := search.next) is not None]:
         for (key, level), good in zip(tried, tolerated(tried), strict=True):
@@ -117,13 +119,14 @@ class Kind:
     """A kind of margin: something that a law tolerates up to some level.
 
     Attributes:
-      label: its name in tables and figures.
+      label: name in tables and figures.
       unit: {x} stands for the unit of x, {u} for that of u.
-      levels: those tried first, from small to large.
-      put: a scenario with a level of it.
-      none: the level at which there is none.
+      levels: levels tried first, from small to large.
+      put: function of a scenario and a level that returns the scenario with this level.
+      none: level without any effect.
       periods: whether a level is a whole number of control periods.
-      theory: the largest level by linear theory, or None if there is none; it may refuse the plant.
+      theory: function that returns the largest level by linear theory, None if there is no theory; it may refuse the
+        plant.
     """
 
     label: str = ""
@@ -154,7 +157,7 @@ class Kind:
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        if base.disturbance or base.friction or base.mismatch or base.jump:  # theory does not know these
+        if base.disturbance or base.friction or base.mismatch or base.jump:  # linear theory does not include these
             return None
         try:
             return self.theory(base)
@@ -178,7 +181,7 @@ def _doubled(largest: float) -> tuple[float, ...]:
 
 
 def _critical_delay(base: Scenario) -> float | None:
-    lam_k1 = None if base.actuator else linearisation.local(base.law)  # theory knows no drive
+    lam_k1 = None if base.actuator else linearisation.local(base.law)  # the theory has no drive
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 
@@ -188,14 +191,14 @@ def _at_rest(base: Scenario) -> float | None:
 
 
 def _rougher(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with that much more dry friction."""
+    """Return the scenario with `level` added to its dry friction."""
     others = tuple(part for part in base.friction if not isinstance(part, Coulomb))
     before = sum(part.level for part in base.friction if isinstance(part, Coulomb))
     return dataclasses.replace(base, friction=(*others, Coulomb(before + level)))
 
 
 def _heavier(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with that multiple of the nominal mass, whichever of its two names the mismatch has."""
+    """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or by its own name."""
     mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
@@ -250,11 +253,12 @@ class Margin:
     Attributes:
       plant, law: their names.
       kind: one of KINDS.
-      value: the largest level tolerated; NaN: the law fails without any. Equal to `searched`: no failure was found.
-      unit: of value, resolution, searched and theory.
-      resolution: the first level not tolerated is at most this much larger.
-      searched: the largest level tried.
-      theory: the same by linear theory, or None.
+      value: largest tolerated level. NaN if the run without it fails already. If equal to `searched`, all are
+        tolerated.
+      unit: unit of value, resolution, searched and theory.
+      resolution: the first level that is not tolerated is at most this much larger.
+      searched: largest level of the search.
+      theory: the margin by linear theory, or None.
     """
 
     plant: str
@@ -286,14 +290,14 @@ def margins(
     """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
     Args:
-      plants, laws: names, or plants and laws of your own, one or several.
-      kinds: of KINDS, one or several.
-      gains: a set of `gains.SETS`.
-      quick: runs of 5 s, to within 5 control periods or 10 %: for a look.
-      threads: as of `run`.
-      report: called with the work done and the whole, in simulated steps; the whole is an estimate until the end.
-      condition: what holds besides, such as "coulomb".
-      starts: where runs begin. Default: the plant's own x0.
+      plants, laws: names, or your own plants and laws, one or several.
+      kinds: one or several of KINDS.
+      gains: set of gains, one of `gain_sets.SETS`, or "default".
+      quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first look.
+      threads: as in `run`.
+      report: called with the work done and the whole work, in simulated steps; the whole is an estimate until the end.
+      condition: condition of the runs, such as "coulomb".
+      starts: initial states, see `smc.starts`. Default: the plant's own x0.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
@@ -318,10 +322,10 @@ def of(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
 ) -> list[Margin]:
-    """Return the margins of any scenarios, each left as it is but for the level that is searched.
+    """Return the margins of any scenarios. A search changes nothing but its level.
 
     Args:
-      resolution: FINE or COARSE. Other arguments as of `margins`.
+      resolution: FINE or COARSE. The other arguments are as in `margins`.
     """
     for kind in kinds:
         find("kind of margin", kind, MARGIN_KINDS)
@@ -332,7 +336,7 @@ def of(
     done = 0
 
     def tolerated(scenarios: Sequence[Scenario]) -> list[bool]:
-        """Run scenarios, and return whether each is tolerated; their traces are dropped at once."""
+        """Run scenarios, and return whether each is tolerated. Traces are not kept."""
         nonlocal done
         now = sum(scenario.work for scenario in scenarios)
         later = sum(search.left * cells[i][0].work for i, search in going.items())
@@ -361,7 +365,7 @@ def of(
 
 
 def save(margins: Sequence[Margin], path: str | os.PathLike) -> Path:
-    """Write margins to a .json file that `load` reads back; NaN and infinity are words there, see `files.plain`."""
+    """Write margins to a .json file that `load` reads. NaN and infinity are words there, see `files.plain`."""
     return write_json(ended(path, ".json"), [dataclasses.asdict(margin) for margin in margins])
 
 
@@ -369,7 +373,7 @@ def load(path: str | os.PathLike) -> list[Margin]:
     """Read the margins that `save` wrote.
 
     Raises:
-      ScenarioError: no such file, or not of margins.
+      ScenarioError: no such file, or not a file of margins.
     """
     with reading(path, "file of margins", "give a .json file that margins.save wrote") as file:
         return [_margin(entry) for entry in read_json(file)]

@@ -2,24 +2,27 @@
 
     found = basin("inverted_pendulum", "observer_free", points=(50, 50))
     found.share                                             # of the states that converge, 0 to 1
-    of(smc.Scenario(plant="duffing", law=my_law), x, v)     # a law of your own
+    of(smc.Scenario(plant="duffing", law=my_law), x, v)     # your own law
     found.save("map.json"); load("map.json")
 
-The channels of a network all start alike. x is not wrapped: a pendulum that rests a turn away has not converged.
+All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
-The rule. X and V are the largest |x| and |v| of the grid; a run is home while |x| <= 2 % of X and |v| <= 2 % of V on
-every channel. States are run for 15 % of the duration; those not decided then are run again, from the start, for 40 %,
-and the rest for all of it (runs are deterministic and keep no state: this costs at most 1.55 times the last).
-- converges, early: home throughout the last third of the horizon, and (x/X)^2 + (v/V)^2 smaller by a tenth in the
-  second half of it than in the first; or near, within a tenth of home, in the second half. There its size means
-  nothing: a law that switches leaves a ripple, and either half may be the larger one. A start that is near itself means
-  nothing either: a run that leaves slowly is near for long.
-- does not, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away from home.
-- at the end: converges if home throughout the last 20 % of the run, and near or not leaving, larger by 5 %; does not if
-  never home in them; else undecided. A run that leaves by less, 2.5 % a second in runs of 10 s, counts as one that
-  stays.
-Early verdicts are no proofs, as a run that is home and shrinking might leave later: tests compare them with runs to
-the end. `basin` integrates with implicitfast, four times as fast as RK4 and 1e-3 rad or m from it: less than a
+The rule. X and V are the largest |x| and |v| of the grid. A run is home while |x| <= 2 % of X and |v| <= 2 % of V on
+every channel, and near while its distance (x/X)^2 + (v/V)^2 is below (0.2 %)^2, a tenth of that. Every state is run for
+15 % of the duration. Undecided states are run again, from the beginning, for 40 %, and the rest for the whole duration.
+(Runs are deterministic. All this costs at most 1.55 times a whole run.)
+- It converges, early: home throughout the last third of the run, with a distance that is smaller by a tenth in the
+  second half of this third than in the first; or near in the second half. Near the reference the size does not matter,
+  because a law that switches leaves a ripple. But a state that starts near must shrink: a run that leaves slowly is
+  near for long.
+- It does not converge, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away
+  from home.
+- At the end: it converges if it is home throughout the last 20 % of the run and is near, or its distance grows by less
+  than 5 %. It does not if it is never home in that part. Otherwise it is undecided. A run that leaves more slowly, 2.5
+  % a second in runs of 10 s, counts as one that stays.
+
+Early verdicts are no proofs, because a run that is home and shrinking might leave later. Tests compare them with whole
+runs. `basin` integrates with implicitfast, four times as fast as RK4, with a difference of 1e-3 rad or m, less than a
 fiftieth of a cell.
 """
 
@@ -46,13 +49,13 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
-LATE = 3  # the part of an early horizon that counts is its last third
-BATCH_BYTES = 48 * 2**20  # of traces that are in memory at once, about
+LATE = 3  # an early verdict considers the last third of a run
+BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 STILL = 1e-6  # of X, V and u_max
-LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the squared distance: two factors, a size
+LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the distance (x/X)^2 + (v/V)^2: two factors, a size
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
-PACE = 3.0  # 1/s, V over X: chosen, about how fast the study's plants swing
-LEAST_SAMPLES = 10  # of the shortest runs: two halves of the last fifth of them have one each
+PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
+LEAST_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 
@@ -62,9 +65,9 @@ class Basin:
 
     Attributes:
       plant, law: their names.
-      x, v: the grid's positions (nx,) and velocities (nv,), the plant's unit and per second.
+      x, v: the grid's positions (nx,) and velocities (nv,), in the plant's unit and per second.
       outcome: 1 converges, 0 undecided, -1 does not, (nv, nx) int8.
-      decided_at: length of the run that decided it, s, (nv, nx); the whole duration where nothing did.
+      decided_at: duration of the run that decided, s, (nv, nx); the whole duration if undecided.
       unit: of x, "rad" or "m".
       duration: s, of the longest runs.
     """
@@ -105,17 +108,19 @@ def basin(
     """Map the region of attraction of a law on a plant.
 
     Args:
-      plant, law: names, or a plant and a law of your own.
-      points: numbers of positions and velocities of the default grid: -X .. X and -V .. V, X a half turn, or
-        twice the study's start on a rail, and V = 3 X per second.
-      gains: a set of `gains.SETS`.
-      threads: as of `run`.
-      report: called with the work done and the most that there can be, in simulated steps; the latter shrinks as states
-        are decided.
-      condition: what holds besides, such as "coulomb".
+      plant, law: names, or your own plant and law.
+      points: numbers of positions and velocities of the default grid, -X .. X and -V .. V. X is half a turn, or twice
+        the plant's x0 on a rail; V is 3 X per second.
+      x, v: positions and velocities of the grid, in place of the default ones.
+      gains: set of gains, one of `gain_sets.SETS`, or "default".
+      duration: of the longest runs, s.
+      threads: as in `run`.
+      report: called with the work done and the most that may be needed, in simulated steps; the latter shrinks as
+        states are decided.
+      condition: condition of the runs, such as "coulomb".
 
     Raises:
-      ScenarioError: an unknown plant, law, set or condition, or a grid of nothing.
+      ScenarioError: an unknown plant, law, set or condition, or an empty grid.
     """
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     if own := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
@@ -136,13 +141,13 @@ def of(
     report: Report = lambda done, most: None,
     early: bool = True,
 ) -> Basin:
-    """Map the region of attraction of any scenario, each run as it stands but for its initial state.
+    """Map the region of attraction of any scenario. Its runs differ only in their initial state.
 
     Args:
-      early: whether decided states leave; False runs all of them to the end. Other arguments as of `basin`.
+      early: whether to decide states early; False runs all of them to the end. The other arguments are as in `basin`.
 
     Raises:
-      ScenarioError: channels of two units, a grid of nothing, or a duration too short for the rule.
+      ScenarioError: channels with different units, an empty grid, or a duration too short for the rule.
     """
     if base.plant.mixed:
         raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
@@ -185,7 +190,7 @@ def of(
 
 
 def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
-    """Judge a run by the module's rule, for a grid x, v: 1, 0 or -1, or None where it needs a longer run."""
+    """Judge a run by the module's rule, for a grid x, v: 1, 0 or -1, or None if it needs a longer run."""
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
     far = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
@@ -209,7 +214,7 @@ def load(path: str | os.PathLike) -> Basin:
     """Read the map that `Basin.save` wrote.
 
     Raises:
-      ScenarioError: no such file, or no map.
+      ScenarioError: no such file, or not a map.
     """
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:

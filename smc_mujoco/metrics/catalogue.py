@@ -1,8 +1,8 @@
 """Metrics: numbers that say how well a run went, each a function Trace -> float.
 
 Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
-`conventions`. A metric is one decorated function here; `score` and every table find it by themselves. Each refuses a
-trace that diverged or has a NaN (ScenarioError); "never" is inf.
+`conventions`. A metric is one decorated function here; `score` and all tables then include it. Every metric refuses a
+trace that diverged or has a NaN (ScenarioError). inf means "never".
 """
 
 from __future__ import annotations
@@ -30,18 +30,19 @@ if TYPE_CHECKING:
 
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
-CONSTANT = 1e-12  # of max |u|: a range of u that is rounding
+CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
 
 
 def metrics() -> tuple[Metric, ...]:
-    """Every metric, in the order of tables."""
+    """Return every metric, in the order of tables."""
     return tuple(CATALOGUE.values())
 
 
 def score(trace: Trace) -> dict[str, float]:
-    """Every metric by name that has one value for the plant; those that compare channels only of a network.
+    """Return name -> value of every metric that has a single value for the plant.
 
-    Of a cart with a pole: times and percentages of the motion are the worst of both, what has a unit is the cart's.
+    Metrics that compare channels are for networks only. For a cart with a pole, times and percentages of the motion are
+    the worse of the two; metrics with a unit of length are the cart's.
 
     Raises:
       ScenarioError: the run diverged, failed or holds NaN.
@@ -51,9 +52,10 @@ def score(trace: Trace) -> dict[str, float]:
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
-    """The metrics of each group of channels by itself: {"driven": {...}, "free": {...}} of a cart with a pole.
+    """Return the metrics of each group of channels by itself: {"driven": {...}, "free": {...}} for a cart with a pole.
 
-    Joints without an actuator are free; a kind in several units has a group of each: "driven m". Raises as `score`.
+    Joints without an actuator are free. If channels of a kind have several units, each unit is a group, such as "driven
+    m". Raises like `score`.
     """
     refuse(trace)
     return {
@@ -223,7 +225,7 @@ def hf_share(trace: Trace) -> float:
 @metric("s", realistic=True)
 def stick_time(trace: Trace) -> float:
     """Time for which a channel is at rest, with a reaction of friction or contact; longest channel."""
-    rest = conventions.at_rest(trace)  # and a reaction is that of the step which ends at its sample
+    rest = conventions.at_rest(trace)  # the reaction at a sample is that of the step before it
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
 
 
@@ -237,7 +239,8 @@ def peak_reaction(trace: Trace) -> float:
 def reversal_rate(trace: Trace) -> float:
     """How often e turns back in the last part, per second, worst channel: twice the frequency of a limit cycle.
 
-    After swings of at least half the ripple; 0 for a ripple up to 1e-6 of the scale. It sees no cycle beyond that part.
+    Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle longer than the last
+    part is not seen.
     """
     part, least = last(trace), 1e-6 * scale(trace)
     return max(conventions.turns(e, least) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)

@@ -1,7 +1,7 @@
 """Groups: the channels of a plant that can share one number.
 
-The driven channels are one group, the free joints, which are only measured, another. Each is divided further if its
-units differ: a cart's metres and its pole's radians have no maximum and no sum.
+The driven channels are one group, the free joints, which have no actuator, another. Each is divided further if its
+units differ, because metres and radians have no common maximum or sum.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Group:
 
 
 def groups(plant: Plant) -> tuple[Group, ...]:
-    """The plant's groups: first the driven ones, in each kind by the first channel."""
+    """Return the plant's groups: driven ones first, each kind in the order of its channels."""
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -51,7 +51,7 @@ def groups(plant: Plant) -> tuple[Group, ...]:
 
 
 def cut(trace: Trace, group: Group) -> Trace:
-    """The trace with the channels of a group alone; the same trace if these are all. Its scenario stays whole."""
+    """Return the trace of a group's channels; the same trace if these are all. Its scenario keeps all channels."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
     columns = list(group.channels)

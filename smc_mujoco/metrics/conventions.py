@@ -1,10 +1,10 @@
-"""What every metric shares: the conventions, the refusal of broken traces, and `@metric`.
+"""Conventions of all metrics, the refusal of broken traces, and the decorator `@metric`.
 
-Groups: a metric is of channels that are alike, those of one of the plant's `groups`. Driven channels and free
-joints, which no actuator drives, are scored apart, even if their units agree. With several groups, `score` and each
-metric take the worst of them for a time, a percentage or a share of the motion: a law that drops the pole has settled
-nothing. A metric that has x's unit, or is of the command, is that of the driven channels; if these have several units,
-a metric with x's or u's unit is refused. `scores` has every group by itself.
+Groups: a metric compares channels of one kind, a group of the plant's `groups`. Driven channels and free joints, which
+have no actuator, are different groups, even if their units agree. If a plant has several groups, `score` and each
+metric return the worst group for a time, a percentage or a share of the motion: a law that drops the pole has settled
+nothing. A metric with x's unit, or of the command, is that of the driven channels; if these have several units, a
+metric with x's or u's unit is refused. `scores` returns every group by itself.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
@@ -15,10 +15,10 @@ sliding variable; h the time between samples. The conventions, all chosen, one f
 - settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
   signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
-- approach: a stretch of one channel's run towards one reference. It begins at t[0] and again at each
+- approach: the part of one channel's run towards one reference. It begins at t[0], and again at each
   sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
-- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Coulomb friction and
-  contacts creep by 1e-6 or less while they hold; LuGre friction bends its bristles meanwhile.
+- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints held by Coulomb
+  friction or contacts creep at 1e-6 or less; with LuGre friction they move as the bristles bend.
 - channels: errors and efforts that are integrals over time are summed over the group's channels; every other
   metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
 BAND = 0.02  # of the scale
 LAST = 0.2  # of the run's duration
-ROUNDING = 1e-9  # of the duration: a sample that rounding put this much before the last part is in it
-REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above what stuck joints creep, see friction.py
+ROUNDING = 1e-9  # of the duration: a sample so little before the last part counts as in it
+REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above the creep of stuck joints, see friction.py
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
@@ -61,9 +61,9 @@ class Metric:
       summary: first line of the docstring.
       formula: Trace of one group's channels -> float, without the checks.
       label: its name in tables and figures.
-      network: whether it compares channels and so needs several of a kind.
-      realistic: whether it is only about mechanisms that are more than their plant's equation.
-      command: whether it is of u or s, which free joints do not have.
+      network: whether it compares channels, and so needs several of a kind.
+      realistic: whether it is meaningful only for mechanisms with friction, contacts or other parts.
+      command: whether it is computed from u or s, which free joints do not have.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Metric:
     command: bool = False
 
     def refusal(self, plant: Plant) -> str:
-        """Why this has no one value for the plant, or ""."""
+        """Return why the metric has no single value for the plant, or ""."""
         driven = [group for group in groups(plant) if group.driven]
         if not any(map(self.fits, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
@@ -87,21 +87,21 @@ class Metric:
 
     @property
     def shared(self) -> bool:
-        """Whether free joints count in its one value: it is of the motion, and has no unit of x."""
+        """Whether free joints count in its single value: it is computed from the motion, and does not have x's unit."""
         return not self.command and "{" not in self.unit
 
     def of(self, trace: Trace) -> float:
-        """The one value of a trace that `refuse` and `refusal` accept: the worst of the groups that count."""
+        """Return the single value of a trace that `refuse` and `refusal` accept: that of the worst group."""
         plant = trace.scenario.plant
         counted = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
         return max(float(self.formula(cut(trace, group))) for group in counted)
 
     def fits(self, group: Group) -> bool:
-        """Whether this is a metric of a group by itself."""
+        """Return whether the metric applies to a group by itself."""
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
     def unit_for(self, x: str) -> str:
-        """The unit where positions have the unit x, "rad" or "m" (as `plant.unit`)."""
+        """Return the unit for positions in x, "rad" or "m" (as `plant.unit`)."""
         u = EFFORT[x]
         return self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u).format(x=x, u=u)
 
@@ -109,7 +109,7 @@ class Metric:
 def metric(
     unit: str, *, label: str = "", **flags: bool
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
-    """Decorator: enter a function Trace -> float in the catalogue and have it refuse broken traces.
+    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
 
     Arguments are fields of `Metric`; the label is by default the function's name with spaces.
     """
@@ -156,35 +156,35 @@ def refuse(trace: Trace) -> None:
 
 
 def error(trace: Trace) -> np.ndarray:
-    """e = x - r, (K+1, n)."""
+    """Return e = x - r, (K+1, n)."""
     return trace.x - trace.r
 
 
 def parts(trace: Trace) -> dict[Group, Trace]:
-    """The trace of each group's channels alone: what the functions below take."""
+    """Return the trace of each group's channels, as the functions below take it."""
     return {group: cut(trace, group) for group in groups(trace.scenario.plant)}
 
 
 def scale(trace: Trace) -> float:
-    """The scale of a group's trace in x's unit, never zero; see the module's conventions."""
+    """Return the scale of a group's trace in x's unit, never zero; see the module's conventions."""
     start, travel = np.abs(trace.x[0] - trace.r[0]).max(), max(np.ptp(r) for r in trace.r.T)
     return float(max(start, travel)) or 1.0
 
 
 def at_rest(trace: Trace) -> np.ndarray:
-    """Where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
+    """Return where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
     return np.abs(trace.v) <= max(REST * float(np.abs(trace.v).max()), STILL)
 
 
 def last(trace: Trace) -> slice:
-    """The samples of the last part."""
+    """Return the samples of the last part."""
     t = trace.t
     begin = t[-1] - LAST * (1 + ROUNDING) * (t[-1] - t[0])
     return slice(int(np.searchsorted(t, begin)), None)
 
 
 def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
-    """Seconds since t[0] from which size (K+1,) stays <= band; 0 if always, inf if not at the end."""
+    """Return the time since t[0], s, from which size (K+1,) stays <= band; 0 if always, inf if not at the end."""
     outside = np.flatnonzero(size > band)
     if outside.size == 0:
         return 0.0
@@ -194,7 +194,7 @@ def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
 
 
 def approaches(trace: Trace) -> list[list[slice]]:
-    """The samples of each approach in order, channel by channel."""
+    """Return the samples of each approach in order, channel by channel."""
     band = BAND * scale(trace)
     channels = []
     for r in trace.r.T:
@@ -204,16 +204,16 @@ def approaches(trace: Trace) -> list[list[slice]]:
 
 
 def largest(a: np.ndarray) -> np.ndarray:
-    """The largest channel at each sample: a.max(axis=1) of (K, n), much faster for few channels."""
+    """Return a.max(axis=1) of a (K, n), much faster for few channels."""
     return functools.reduce(np.maximum, a.T)
 
 
 def turns(y: np.ndarray, least: float) -> int:
-    """How often y (K,) turns back, each time by half its range from its last extreme; 0 for a range up to `least`."""
+    """Return how often y (K,) turns back, by half its range or more from its last extreme; 0 for a range <= `least`."""
     count, going, low, high = 0, 0, y[0], y[0]
     swing = float(np.ptp(y)) / 2
     slopes = np.diff(y)
-    peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # between them y is monotonic: it turns at no other
+    peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
     for value in y[[0, *peaks, -1]].tolist() if 2 * swing > least else ():
         low, high = min(low, value), max(high, value)
         if going >= 0 and value <= high - swing:

@@ -1,1 +1,1 @@
-"""Gains by one rule for every law."""
+"""Tuning of gains, by one rule for every law."""

@@ -1,18 +1,18 @@
-"""What tuning minimises: tracking error plus effort, summed over the conditions that a law must cope with.
+"""The objective of tuning: tracking error plus variation of the command, summed over several conditions.
 
     J = sum over the conditions of  ITAE / sum |x0|  +  w TV / (u_max duration)        in s^2
 
-ITAE is that of `metrics`, summed over the channels as the |x0| are; TV is the total variation of u, worst channel. A
-command that swings from bound to bound at every sample has TV / (u_max duration) = 2 / h, h the control period. The
-weight is w = h times 1 s^2 = 1e-3 s^3, chosen so that a run which chatters like that pays 2 s^2: as much as one that
-stands at x0 for its first 2 s. Without it ("tracking", w = 0), nothing speaks against chattering.
+ITAE is that of `metrics`, summed over the channels like |x0|. TV is the total variation of u, worst channel. A command
+that jumps from bound to bound at every sample has TV / (u_max duration) = 2 / h, with h the control period. The weight
+is w = h times 1 s^2 = 1e-3 s^3, chosen so that such chattering costs 2 s^2, as much as a run that stays at x0 for its
+first 2 s. Without it ("tracking", w = 0), chattering costs nothing.
 
-The conditions are those in which laws are ranked afterwards: nominal, noisy, delayed, disturbed by a sine and by a
-constant, and with a mass that is 30 % less and 30 % more than the law's gains were meant for. Every run of them has a
-seed, a noise and a start (`initial_states`) that no grid takes, so no law is judged on runs that it was tuned on.
+The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant disturbance, and 30 %
+less and 30 % more mass. Their runs have seeds, noise and initial states (`initial_states`) that no grid uses, so no law
+is judged on runs that it was tuned on.
 
-A run that fails has no ITAE. It costs FAILED (2 - t / duration), t the time of its failure. This is finite, more than
-any run costs that does not fail, and less the later it fails.
+A failed run has no ITAE. It costs FAILED (2 - t / duration), with t the time of the failure. This is finite, more than
+any other run costs, and decreases with t.
 """
 
 import dataclasses
@@ -31,28 +31,28 @@ from smc_mujoco.simulation.initial_states import SEEDS, Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-DURATION = 5.0  # s, chosen: half the study's, 8 T and more of its plants; settled runs add little after it
+DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
 AROUND = Starts()
-RUNS = 1000  # seeds of runs that a seed of tuning has: one a condition
-FAILED = 1e9  # s^2; a run fails beyond |x| = 1e6, so ITAE / |x0| is less for any |x0| > 0.05, and is cut there
+RUNS = 1000  # seeds of runs for each seed of tuning; each condition uses one
+FAILED = 1e9  # s^2, also the bound on ITAE / |x0|, which is less anyway for |x0| > 0.05, because |x| > 1e6 is a failure
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Objective:
-    """J as data; two tunings are comparable only if theirs are equal.
+    """J as data. Tunings can be compared only if their objectives are equal.
 
     Attributes:
-      conditions: names, or conditions of your own; each is one run of a candidate.
-      starts: where its runs begin, see `starts`.
+      conditions: names, or your own conditions; each is one run of a candidate.
+      starts: initial states of the runs, see `smc.starts`.
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
-      u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or what the strongest motor gives
-        where the plant is a model of yours.
+      u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or for your own model the limit
+        of its strongest motor.
 
     Raises:
-      ScenarioError: an unknown condition, or a number out of its range.
+      ScenarioError: an unknown condition, or a number out of range.
     """
 
     conditions: tuple[Condition, ...] = CONDITIONS
@@ -80,12 +80,12 @@ class Objective:
         return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
     def describe(self) -> dict[str, Any]:
-        """Return it as JSON data, from which `restore` makes it again."""
+        """Return it as JSON data, from which `restore` makes an equal one."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return values | {"conditions": list(map(str, self.conditions)), "starts": dataclasses.asdict(self.starts)}
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
-        """Return one run for each condition; every candidate has the same starts and the same noise.
+        """Return one run for each condition. Every candidate gets the same initial states and the same noise.
 
         Raises:
           ScenarioError: a condition in which the plant starts at 0.
@@ -111,7 +111,7 @@ class Objective:
         return sum(tracking for tracking, _ in parts), sum(variation for _, variation in parts)
 
     def parts(self, trace: Trace) -> tuple[float, float]:
-        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its price, and 0."""
+        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its cost, and 0."""
         if trace.diverged_at is not None:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
@@ -121,7 +121,7 @@ class Objective:
 
 
 def restore(data: Mapping[str, Any]) -> Objective:
-    """Return the objective that `Objective.describe` wrote; old files have no starts, and so the default ones."""
+    """Return the objective that `Objective.describe` wrote. Old files have no starts and get the default ones."""
     starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])

@@ -1,4 +1,4 @@
-"""The result of a tuning, with all that it depends on: saved as JSON, and compared only with its like."""
+"""The result of a tuning and everything that it depends on. It is saved as JSON."""
 
 import dataclasses
 import math
@@ -43,20 +43,20 @@ class Tuned:
     """A law's best gains, and how they were tuned.
 
     Attributes:
-      law: with the best gains.
-      objective: what they cost, s^2.
+      law: the law with the best gains.
+      objective: their objective J, s^2.
       history: every evaluation of the search, in order.
-      finals: the best of them, run accurately; one of these has the gains.
-      before: the cost of the law's own gains, which the search did not know; s^2.
+      finals: the best of them, run accurately; one of these has the best gains.
+      before: J of the law's original gains, which the search does not use, s^2.
       plant: the plant.
-      definition: what was minimised, with its conditions and u_max.
+      definition: the objective, with its conditions and u_max.
       rule: the search, in words.
-      budget: how many sets of gains were evaluated.
-      seed: of search and noise.
-      scales: the plant's X, F, M, T, SI units.
-      bounds: gain -> lowest, highest, as the rule gives them.
-      searched: the same in the end, some a decade wider.
-      versions: of the packages that the numbers depend on.
+      budget: number of sets of gains that were evaluated.
+      seed: seed of search and noise.
+      scales: the plant's X, F, M and T, SI units.
+      bounds: gain -> lowest, highest, by the rule.
+      searched: the bounds at the end; some are wider by a decade.
+      versions: versions of the packages that the numbers depend on.
     """
 
     law: Component
@@ -84,14 +84,14 @@ class Tuned:
 
     @property
     def at_bound(self) -> dict[str, str]:
-        """Gains that are within 2 % of a bound they were searched in, or all the actuator gives: "lower" or "upper"."""
+        """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search, or at the actuator's limit."""
         return at_bound(self.gains, self.searched) | {
             name: "upper" for name, most in self._largest.items() if self.gains[name] >= most * (1.0 - ROUNDING)
         }
 
     @property
     def _largest(self) -> dict[str, float]:
-        """Return the most that the actuator gives of gains that the law divides by another one."""
+        """The actuator's limit on gains that the law divides by another one."""
         u_max = self.definition.u_max
         bounds = largest(self.law, self.law.gains, math.inf if u_max is None else u_max)
         return {name: most for name, most in bounds.items() if name in self.bounds}
@@ -103,7 +103,7 @@ class Tuned:
 
     @property
     def front(self) -> list[Evaluation]:
-        """The finals that no other beats in both tracking and variation, by tracking; failed ones left out."""
+        """The Pareto front of the finals in tracking and variation, by tracking, without failed ones."""
         front: list[Evaluation] = []
         for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
             if not one.failed and (not front or one.variation < front[-1].variation):
@@ -128,7 +128,7 @@ def load(path: str | os.PathLike) -> Tuned:
     """Read the tuning that `Tuned.save` wrote.
 
     Raises:
-      ScenarioError: no such file, or no tuning.
+      ScenarioError: no such file, or not a tuning.
     """
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
@@ -152,20 +152,20 @@ def load(path: str | os.PathLike) -> Tuned:
 
 
 def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) -> Tuned:
-    """The tuning that comes with the package, from which the gains of a set in `gains` are.
+    """Return the tuning in the package from which the gains of a set in `gain_sets` come.
 
     Raises:
-      ScenarioError: there is none.
+      ScenarioError: there is no such tuning.
     """
     return load(gains.file(plant, law, objective, seed))
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
-    """Return the tunings, best first, if all were made by the same rule with the same means.
+    """Return the tunings, best first, if all were made in the same way.
 
     Raises:
-      ScenarioError: one had another rule, plant, objective, budget, seed, versions or width of bounds than the first,
-        or evaluated another number of gains than its budget.
+      ScenarioError: one has another rule, plant, objective, budget, seed, versions or width of bounds than the first,
+        or did not spend its budget.
     """
     tuned = list(tuned)
     if not tuned or not all(isinstance(one, Tuned) for one in tuned):
@@ -194,7 +194,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
 
 
 def _bounds(tuned: Tuned) -> Box:
-    """Return the bounds that the rule gives; for a law that cannot be loaded here, only their width is checked."""
+    """Return the bounds by the rule. For a law that cannot be loaded here, only their width is checked."""
     if tuned.law.template:
         return box(tuned.law, tuned.scales)
     one_sided = 10.0**DECADES  # of a force, which is searched up to u_max

@@ -2,24 +2,24 @@
 
     tuned = tune("duffing", "classical", budget=96, seed=0)     # Tuned(law, objective, history)
     tuned.save("duffing-classical.json")
-    compare([tuned, tune("duffing", "observer_free")])           # refuses what was not tuned alike
+    compare([tuned, tune("duffing", "observer_free")])           # best first; refuses tunings made in different ways
 
 The rule has two rounds, as in successive halving (K. Jamieson & A. Talwalkar, AISTATS 2016): many candidates are run
 cheaply, and the best of them accurately.
 
 1. A differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin, weight 0.2 to
-   0.7, 16 members, no polishing) in the logarithm of the gains. It begins with a Latin hypercube that has the scales
-   themselves in it, never with gains that someone tuned before. Its runs take Euler's method at 1 ms where a plant's
-   own method is RK4: a third of the cost, and an objective within 0.5 % for laws that do not chatter.
-2. After every 48 evaluations the six best candidates that have not yet been run accurately are run so. The gains are
-   those with the best accurate objective.
+   0.7, 16 members, no polishing) in the logarithm of the gains. It begins with a Latin hypercube that includes the
+   scales themselves, never with gains that someone tuned before. Its runs use Euler's method at 1 ms if the plant's own
+   method is RK4. That costs a third, and changes the objective by at most 0.5 % for laws that do not chatter.
+2. After every 48 evaluations the six best candidates that have not been run accurately yet are run accurately. The
+   result is the set of gains with the best accurate objective.
 
-Each generation is one batch of runs. Gains are rounded to four digits, so that what is printed is what was run; a set
-that was evaluated before costs no budget. Bounds are those of `bounds`. After every 48 evaluations those at which the
-best lies are moved out by a decade, half of the members are drawn again between them, and the search goes on;
-`Tuned.at_bound` names gains that are at a bound in the end. A population that has collapsed starts again. Nothing in
-this depends on the budget, so a search with a larger budget repeats a shorter one and goes on: it is never worse than
-one whose budget is a multiple of 48. `objective` says what is minimised.
+Each generation is one batch of runs. Gains are rounded to four digits, so the printed gains are those that were run. A
+set that was evaluated before costs no budget. `search_space` gives the bounds. After every 48 evaluations the bounds at
+which the best gains lie are moved outwards by a decade, half of the members are drawn again within the new bounds, and
+the search continues. `Tuned.at_bound` names gains that are at a bound at the end. A population that has collapsed
+starts again. None of this depends on the budget, so a search with a larger budget repeats a shorter one and continues.
+It is never worse than one whose budget is a multiple of 48. `objective` defines what is minimised.
 """
 
 import contextlib
@@ -50,8 +50,8 @@ RULE = (
     " six best that were not yet run under RK4 are, bounds that the best is at are widened by a decade and half of the"
     " members drawn again; the best under RK4 is taken"
 )
-MEMBERS, STAGE = 16, 48  # of the population; evaluations after which the best are run accurately, again and again
-FINALISTS = 6  # of a stage
+MEMBERS, STAGE = 16, 48  # size of the population; evaluations between accurate runs of the best
+FINALISTS = 6  # candidates run accurately after each stage
 DITHER = (0.2, 0.7)  # differential weight, drawn each generation; of three tried the best within 128 evaluations
 DIGITS = 4  # of a gain
 LONGEST = 1_000_000  # candidates
@@ -72,16 +72,17 @@ def tune(
     """Find the law's best gains on the plant, by the rule that is the same for every law.
 
     Args:
-      law: the search does not start from its gains; `Tuned.before` is their cost. Those held keep their value.
-      budget: how many sets of gains are evaluated, each in as many runs as the objective has conditions.
-      seed: of the search, and of the starts and the noise, which are the same for all candidates; below 10^9.
-      objective: an Objective, "balanced", or "tracking", which has no price on the variation of u.
-      threads, progress: as of `run`.
-      conditions: names or conditions of your own, in place of those of the objective.
-      starts: where runs begin, see `starts`, in place of those of the objective.
+      plant, law: names, or your own plant and law. The search does not start from the law's gains; `Tuned.before` is
+        their objective. Gains that are held keep their value.
+      budget: number of sets of gains to evaluate, each in one run per condition.
+      seed: seed of the search, and of initial states and noise, which are the same for all candidates; below 10^9.
+      objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
+      threads, progress: as in `run`.
+      conditions: names or your own conditions, in place of the objective's.
+      starts: initial states, see `smc.starts`, in place of the objective's.
 
     Raises:
-      ScenarioError: a law with gains of unknown unit, a plant without scales, or something out of its range.
+      ScenarioError: a law with gains of unknown unit, a plant without scales, or an argument out of range.
     """
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     if conditions is not None:
@@ -126,7 +127,7 @@ class _Spent(Exception):
 
 @dataclasses.dataclass
 class _Ledger:
-    """The evaluations, cheap and accurate, in order. It raises _Spent when they are as many as the budget allows."""
+    """The evaluations, cheap and accurate, in order. It raises _Spent when the budget is spent."""
 
     goal: Objective
     cases: Sequence[Scenario]
@@ -158,14 +159,14 @@ class _Ledger:
         return np.array([self.objectives[gains] for gains in candidates])
 
     def gains(self, logs: Sequence[float]) -> tuple[float, ...]:
-        """Return the gains of a candidate, none of them above what the actuator can give, see `search_space`."""
+        """Return the gains of a candidate, none above the actuator's limit, see `search_space`."""
         gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
         for name, most in search_space.largest(self.cases[0].law, gains, self.u_max).items():
             gains[name] = min(gains[name], _rounded(most))
         return tuple(gains.values())
 
     def decide(self, count: int) -> None:
-        """Run the best of the first candidates accurately, as many as a stage has finalists."""
+        """Run the best FINALISTS of the first `count` candidates accurately, without those that were run so before."""
         ran = {one.gains for one in self.finals}
         ranked = sorted(self.evaluations[:count], key=lambda e: e.objective)
         best = [one for one in ranked if one.gains not in ran][:FINALISTS]
@@ -194,7 +195,7 @@ def _cheap(case: Scenario) -> Scenario:
 
 
 def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
-    """Return the law with other gains; the search warns of no theorem's conditions."""
+    """Return the law with other gains, without a warning for violated conditions of its theorem."""
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
@@ -210,7 +211,7 @@ def _search(ledger: _Ledger, start: search_space.Box, seed: int) -> search_space
             sides = search_space.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box)
             if sides := search_space.movable(ledger.cases[0].law, sides):
                 box = search_space.widened(box, sides)
-                members[MEMBERS // 2 :] = _hypercube(box, random)[MEMBERS // 2 :]  # or they would stay crowded at it
+                members[MEMBERS // 2 :] = _hypercube(box, random)[MEMBERS // 2 :]  # else they crowd at the old bound
     ledger.decide(ledger.budget)
     return box
 
@@ -218,7 +219,7 @@ def _search(ledger: _Ledger, start: search_space.Box, seed: int) -> search_space
 def _evolve(
     ledger: _Ledger, box: search_space.Box, members: np.ndarray, random: np.random.Generator, until: int
 ) -> np.ndarray:
-    """Evolve the members until that many are evaluated; return a fresh population where it has collapsed."""
+    """Evolve the members up to `until` evaluations, and return them; a new population if it has collapsed."""
     from scipy.optimize import differential_evolution
 
     result = differential_evolution(

@@ -1,29 +1,30 @@
-"""Where gains are searched: one rule for every law, by dimensional analysis of the plant.
+"""Search space of gains: one rule for every law, by dimensional analysis of the plant.
 
-The plant gives four scales, and they give every gain its own:
+The plant has four scales, from which each gain's scale follows:
 
     X = max |x0|        position, rad or m
-    F = u_max           force, N m or N; F = u_max / M where the law has the nominal model and speaks in accelerations
+    F = u_max           force, N m or N; F = u_max / M if the law has the nominal model and computes accelerations
     M = 1 / g(0)        inertia, kg m^2 or kg
     T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
 
-A gain with the unit of F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a
-force by itself, such as lambda of -lambda tanh(s), is searched up to F: what the actuator cannot give is not a gain.
-A gain that the law divides by another one, such as k of the force k / b where b is the law's own guess of g, is
-bounded in the same way: k at most u_max b, for the b of each candidate. The law says so, `Gain(2.0, ACCELERATION,
-over="b")`. A law that has the model divides by the plant's g instead: its k is stated as a force and searched up to
-F = u_max / M. Gains k and b are tuned without the model, and with it, where g is less than b, k / g may be more.
+A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a force
+by itself, such as lambda of -lambda tanh(s), is searched up to F, because the actuator cannot give more. A gain that
+the law divides by another one, such as k of the force k / b where b is the law's own estimate of g, is bounded in the
+same
+way: k is at most u_max b, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
+A law that has the model divides by the plant's g instead: its k is declared as a force and searched up to F = u_max /
+M. Gains k and b are tuned without the model. With the model, if g is less than b, the force k / g may be larger.
 
 A law declares the unit of each gain with the gain, and which gains are held at the law's own value:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
-Held are initial values, exponents, table sizes, a plant's parameters, the filters and number formats of a processor.
-Where an exponent is a gain, the unit of what stands before the power depends on it: a function of the gains gives it.
+Initial values, exponents, table sizes, a plant's parameters, filters and number formats of a processor are held. If an
+exponent is a gain, the unit of the factor before the power depends on it, and is given as a function of the gains.
 
-Units are those for which a law does the same in every system of units (tests/analysis/tuning/test_search_space.py).
-Some laws have a number of their own that has a unit, such as the width 1 of tanh(s): their gains have the units that
-leave this number as it is. A law without the model that takes g for 1 treats forces and accelerations alike.
+With these units a law behaves the same in every system of units (tests/analysis/tuning/test_search_space.py). Some laws
+contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this number
+unchanged. A law without the model that takes g as 1 treats forces and accelerations alike.
 """
 
 import dataclasses
@@ -39,20 +40,20 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
 
-DECADES = 1.5  # chosen: to either side of a scale; a factor 1000 in all
-NEAR = 0.02  # of a bound's range in log space: as near counts as being at the bound
+DECADES = 1.5  # on either side of a scale: chosen, a factor of 1000 in all
+NEAR = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
 WIDENING = 1.0  # decades
-ROUNDING = 1e-3  # of a gain: twice what four digits may add to it
+ROUNDING = 1e-3  # of a gain: twice the largest error of four digits
 
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
 
 
-# Deprecated: law -> gain -> its unit, or None if it is held. Version 0.1 kept the units of all laws here.
+# Deprecated: law -> gain -> its unit, or None if it is held. In version 0.1 the units of all laws were here.
 SCALES: dict[str, Mapping[str, Unit | Callable[[Mapping[str, float]], Unit] | None]] = {}
 
 
 def __getattr__(name: str) -> object:
-    """Return a unit that stood in this module in version 0.1."""
+    """Return a unit that was in this module in version 0.1."""
     if name not in units.__dict__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warnings.warn(f"{__name__}.{name} is now in {units.__name__}: import it from there", DeprecationWarning, 2)
@@ -60,7 +61,7 @@ def __getattr__(name: str) -> object:
 
 
 def _gain(law: Component, name: str) -> Gain:
-    """Return what is known of a law's gain, with its unit for the law's own exponents."""
+    """Return a law's gain with its unit, which may depend on the law's exponents."""
     known = law.template.gains if law.template else {}
     gain = known.get(name, Gain(law.gains[name]))
     old = SCALES.get(law.name, {})
@@ -73,10 +74,10 @@ def _gain(law: Component, name: str) -> Gain:
 
 
 def unit(law: Component, name: str) -> Unit | None:
-    """Return the unit of a law's gain; None for a number that is held.
+    """Return the unit of a law's gain; None for a gain that is held.
 
     Raises:
-      ScenarioError: it is not known.
+      ScenarioError: the unit is not known.
     """
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
@@ -85,14 +86,15 @@ def unit(law: Component, name: str) -> Unit | None:
     return gain.unit  # pyright: ignore[reportReturnType]
 
 
-def scales(plant: Plant, u_max: float, modelled: bool, reach: float | None = None) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units; F is an acceleration for a law that has the model.
+def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
+    """Return the plant's X, F, M and T in SI units.
 
     Args:
+      with_model: whether the law has the nominal model; then F is an acceleration.
       reach: X, rad or m. Default: max |x0| of the plant.
 
     Raises:
-      ScenarioError: a plant without a start or an inertia, with channels of two units, or a joint without an actuator.
+      ScenarioError: x0 is 0, g is not positive, channels have different units, or a joint has no actuator.
     """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
@@ -104,14 +106,14 @@ def scales(plant: Plant, u_max: float, modelled: bool, reach: float | None = Non
         raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {cure}")
     if not (math.isfinite(g) and g > 0.0):
         raise ScenarioError(f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant")
-    return {"X": X, "F": u_max * g if modelled else u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
+    return {"X": X, "F": u_max * g if with_model else u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
 
 
 def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return the bounds between which each gain of a law is searched; gains that are held are not in it.
+    """Return gain -> lowest and highest value of the search, for all gains of a law that are not held.
 
     Raises:
-      ScenarioError: a law or gain whose unit is not known, or nothing to tune.
+      ScenarioError: a gain without a known unit, or no gain to tune.
     """
     bounds = {}
     for name in law.gains:
@@ -124,7 +126,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
 
 
 def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
-    """Return the gains within 2 % of a bound, on the scale of logarithms: gain -> "lower" or "upper"."""
+    """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
     places = {name: math.log(gains[name] / low) / math.log(high / low) for name, (low, high) in bounds.items()}
     near = {name: place for name, place in places.items() if min(place, 1.0 - place) <= NEAR}
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
@@ -138,12 +140,12 @@ def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[st
 
 
 def movable(law: Component, sides: Mapping[str, str]) -> dict[str, str]:
-    """Return what `at_bound` found, less the gains that are at the actuator's own bound, which is not moved."""
+    """Return the result of `at_bound` without gains at the actuator's limit, which cannot be moved."""
     return {gain: side for gain, side in sides.items() if side == "lower" or unit(law, gain) != FORCE}
 
 
 def widened(bounds: Box, sides: Mapping[str, str]) -> dict[str, tuple[float, float]]:
-    """Return the bounds, those that `movable` found moved outwards by a decade."""
+    """Return the bounds, with those that `movable` found moved outwards by a decade."""
     by = 10**WIDENING
     moved = {"lower": lambda low, high: (low / by, high), "upper": lambda low, high: (low, high * by)}
     return {name: moved[sides[name]](*ends) if name in sides else ends for name, ends in bounds.items()}

@@ -102,9 +102,9 @@ def test_the_front_is_what_no_other_evaluation_beats(found):
 
 
 def test_scales_are_those_of_the_plant():
-    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, modelled=False)
+    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, with_model=False)
     assert scales == {"X": 1.5, "F": 4.0, "M": pytest.approx(6.0), "T": pytest.approx(1.5)}
-    assert search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, modelled=True)["F"] == pytest.approx(4.0 / 6.0)
+    assert search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, with_model=True)["F"] == pytest.approx(4.0 / 6.0)
     assert search_space.scales(smc.plant("inverted_pendulum"), 6.0, False)["M"] == pytest.approx(0.5 * 0.5**2)
 
 
