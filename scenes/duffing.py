@@ -9,9 +9,18 @@ Look for: x = 0 is the unstable point between the wells at -1 m and +1 m; whoeve
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('reaches the hump and stays', 'reach the hump and stay')}; first: {runs.least('settling_time')}; "
+        f"last: {runs.most('settling_time')}; largest overshoot: {runs.most('overshoot')}"
+    )
+
+
 scene = smc.Scene(
     title="Duffing oscillator",
     conditions={"nominal": smc.paper.comparison("duffing", duration=6.0)},
+    answer=answer,
 )
 
 if __name__ == "__main__":

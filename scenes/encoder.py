@@ -7,6 +7,14 @@ Look for: chattering of the smooth law too, once a count is coarse, and the limi
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('settles', 'settle')}; TV rate from the ideal sensor to 512 counts: "
+        f"{runs.changes('tv_rate', 'ideal', '512 counts')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum read by an encoder",
     conditions={
@@ -22,6 +30,7 @@ scene = smc.Scene(
     },
     film="512 counts",
     answers=("ultimate_bound", "ripple", "tv_rate"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

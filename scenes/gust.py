@@ -1,4 +1,4 @@
-"""How strong a gust on the bob does each law bear before the pendulum falls?
+"""How strong a gust on the bob does each law tolerate before the pendulum falls?
 
 A gust pushes the bob sideways for 0.4 s. It is a force in space, so its torque F l cos x is less the further the
 pendulum leans. Who loses it falls to the floor.
@@ -8,6 +8,19 @@ also bounce off the floor and get up again.
 """
 
 import smc_mujoco as smc
+
+
+def stands(trace):
+    return not trace.reaction.any()  # of the floor
+
+
+def answer(runs):
+    last = list(runs.traces)[-1]
+    return (
+        f"the strongest gust of those tried up to which the pendulum stays off the floor: {runs.up_to(stands)}; "
+        f"after {last} {runs[last].who('ends upright', 'end upright')}"
+    )
+
 
 scene = smc.Scene(
     title="Inverted pendulum in a gust",
@@ -21,6 +34,7 @@ scene = smc.Scene(
     },
     film="8 N",
     answers=("settling_time", "peak", "max_u"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -8,6 +8,14 @@ up.
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('comes back', 'come back')}; first: {runs.least('settling_time')}; hardest blow: "
+        f"{runs.most('peak_reaction')}; softest: {runs.least('peak_reaction')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum between stops",
     conditions={
@@ -23,6 +31,7 @@ scene = smc.Scene(
     },
     film="restitution 0.8",
     answers=("settling_time", "peak_reaction"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -9,9 +9,19 @@ Look for: the settling times beside each other, and the total variation of u, wh
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    settled = runs.those()
+    return (
+        f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}; last: {runs.most('settling_time')}; "
+        f"of those that settle, u varies least under {settled.least('tv_rate')}, most under {settled.most('tv_rate')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum",
     conditions={"nominal": smc.paper.comparison("inverted_pendulum", duration=3.0)},
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -8,6 +8,15 @@ Look for: the steady error that grows with F, the limit cycle (ripple) where the
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    worst = runs["0.4 N m"]
+    return (
+        f"{runs.who('settles', 'settle')}; largest steady error at 0.4 N m: {worst.most('steady_error')}; widest "
+        f"ripple: {worst.most('ripple')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum with joint friction",
     conditions={
@@ -21,6 +30,7 @@ scene = smc.Scene(
     },
     film="0.4 N m",
     answers=("steady_error", "ripple", "stick_time"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

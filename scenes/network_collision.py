@@ -8,6 +8,19 @@ Look for: the hardest blow (peak reaction), and whether it costs settling time.
 
 import smc_mujoco as smc
 
+
+def gentle(trace):
+    score = smc.score(trace)
+    return score["settling_time"] < trace.t[-1] and score["peak_reaction"] == 0.0
+
+
+def answer(runs):
+    return (
+        f"{runs.who('settles without a clash', 'settle without a clash', gentle)}; first of those: "
+        f"{runs.those(gentle).least('settling_time')}; hardest blow: {runs.most('peak_reaction')}"
+    )
+
+
 scene = smc.Scene(
     title="Pendulums that collide",
     conditions={
@@ -20,6 +33,7 @@ scene = smc.Scene(
     },
     film="steel",
     answers=("settling_time", "peak_reaction"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

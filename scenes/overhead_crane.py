@@ -15,9 +15,17 @@ def run(a):
     return smc.Scenario(plant="overhead_crane", law=law, model="nominal", duration=10.0)
 
 
+def answer(runs):
+    return (
+        f"the load swings least with {runs.least('peak', 'free')}, most with {runs.most('peak', 'free')}; trolley and "
+        f"load are first at rest with {runs.least('settling_time')}, last with {runs.most('settling_time')}"
+    )
+
+
 scene = smc.Scene(
     title="Overhead crane",
     conditions={"weights": {"a = 0.3": run(0.3), "a = 0.67": run(0.67), "a = 4": run(4.0)}},
+    answer=answer,
 )
 
 if __name__ == "__main__":

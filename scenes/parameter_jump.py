@@ -8,6 +8,14 @@ Look for: after the hard jump gravity exceeds what |u| <= 6 N m holds beyond a f
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('settles and stays there', 'settle and stay there')}; the farthest off after the hard jump: "
+        f"{runs['hard'].most('ultimate_bound')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum, mass jump at half time",
     conditions={
@@ -15,6 +23,7 @@ scene = smc.Scene(
         "hard": smc.paper.comparison("inverted_pendulum", "jump_hard"),
     },
     film="hard",
+    answer=answer,
 )
 
 if __name__ == "__main__":

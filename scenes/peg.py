@@ -8,6 +8,19 @@ Look for: who ends at the actuator's limit (max |u|) and who leans with no more 
 
 import smc_mujoco as smc
 
+
+def push(trace):
+    return abs(trace.u[-1]).max() / max(trace.scenario.limits)
+
+
+def answer(runs):
+    pushes = runs.who("ends at the actuator's limit", "end at the actuator's limit", lambda run: push(run) >= 1.0)
+    return (
+        f"{pushes}; softest push at the end, as a share of the limit: {runs.least(push)}; hardest blow: "
+        f"{runs.most('peak_reaction')}"
+    )
+
+
 scene = smc.Scene(
     title="A peg in the way",
     conditions={
@@ -16,6 +29,7 @@ scene = smc.Scene(
     },
     film="pendulum",
     answers=("steady_error", "max_u", "energy", "peak_reaction"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

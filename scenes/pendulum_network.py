@@ -10,12 +10,21 @@ Look for: the spread between the largest and the smallest angle beside the mean.
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('brings all five to rest', 'bring all five to rest')}; first: {runs.least('settling_time')}; last: "
+        f"{runs.most('settling_time')}; the angles come together first under {runs.least('spread_settling_time')}"
+    )
+
+
 scene = smc.Scene(
     title="Five coupled pendulums",
     conditions={
         "hanging": smc.paper.comparison("pendulum_network", duration=4.0),
         "inverted": smc.paper.comparison("inverted_pendulum_network", duration=4.0),
     },
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -9,6 +9,14 @@ classical law, and the second-order form that does not know of the lag.
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}; last: {runs.most('settling_time')}; "
+        f"the largest ultimate bound: {runs.most('ultimate_bound')}"
+    )
+
+
 scene = smc.Scene(
     title="Relative degree 3",
     conditions={
@@ -31,6 +39,7 @@ scene = smc.Scene(
         for name, jerk in {"duffing": 200.0, "inverted_pendulum": 1000.0}.items()
     },
     answers=("settling_time", "ultimate_bound", "tv_rate"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

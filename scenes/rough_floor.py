@@ -8,6 +8,19 @@ Look for: the steady error of the smooth law, anywhere within what mu holds, bes
 
 import smc_mujoco as smc
 
+
+def restarts(trace):
+    still = abs(trace.v) <= 1e-3 * abs(trace.v).max()
+    return (still[:-1] & ~still[1:]).sum() > 1  # it starts from rest once
+
+
+def answer(runs):
+    return (
+        f"farthest from the centre: {runs.most('steady_error')}; nearest: {runs.least('steady_error')}; "
+        f"{runs.who('sticks and slips', 'stick and slip', restarts)}"
+    )
+
+
 scene = smc.Scene(
     title="Duffing block on a rough floor",
     conditions={
@@ -18,6 +31,7 @@ scene = smc.Scene(
     },
     film="mu 0.2",
     answers=("steady_error", "settling_time", "stick_time"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -8,6 +8,14 @@ Look for: who never leaves the floor, who overshoots onto the other side, who st
 
 import smc_mujoco as smc
 
+
+def answer(runs):
+    return (
+        f"{runs.who('gets up and stays up', 'get up and stay up')}; first: {runs.least('settling_time')}; the farthest "
+        f"from upright at the end with the heavy bob: {runs['heavy bob'].most('ultimate_bound')}"
+    )
+
+
 scene = smc.Scene(
     title="Inverted pendulum, from the floor and back",
     conditions={
@@ -23,6 +31,7 @@ scene = smc.Scene(
     },
     film="heavy bob",
     answers=("settling_time", "overshoot", "peak_reaction"),
+    answer=answer,
 )
 
 if __name__ == "__main__":

@@ -70,6 +70,7 @@ from smc_mujoco.simulation.time_series import TimeSeries as TimeSeries
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
+from smc_mujoco.studies.outcome import Outcome as Outcome
 from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.paper.claims.audit import claims as claims
 from smc_mujoco.studies.paper.claims.verdict import Claim as Claim

@@ -26,11 +26,14 @@ def perform(
     clock: Timer,
     terminal: Terminal,
     export: Sequence[str] = (),
+    question: str = "",
 ) -> None:
-    """Run a scene: print its scores and answers, write its traces, figures and film to the folder `out`.
+    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
 
     Each trace is written as .npz, and also in the formats of `export`.
     """
+    if question:
+        terminal.note(f"{question}\n", "bold", wrap=True)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -53,6 +56,7 @@ def perform(
         terminal.note(f"{label}: {sentence}", wrap=True)
     if scene.facts:
         terminal.print()
+    terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)
     with clock("traces"):
         written = save(traces, out, export)
     with clock("figures"):

@@ -12,7 +12,7 @@ import re
 import runpy
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from smc_mujoco.common import errors
@@ -21,6 +21,8 @@ from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.outcome import Outcome, summary
 
 LONGEST = 60  # bytes of a name in a file's name, which most file systems limit to 255
 
@@ -36,6 +38,8 @@ class Scene:
       figure: "overview" (x, u, s and phase portrait, a figure a condition) or "signals" (u of all conditions in one).
       answers: metrics of the driven channels that answer the scene's question, printed after the scores.
       facts: label -> sentence, printed under the answers: what else was measured.
+      answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
+        default says who settles, and who is first.
     """
 
     title: str
@@ -44,6 +48,7 @@ class Scene:
     figure: str = "overview"
     answers: tuple[str, ...] = ()
     facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    answer: Callable[[Outcome], str] = summary
 
     def __post_init__(self):
         if not isinstance(self.conditions, Mapping) or not self.conditions:
@@ -75,6 +80,30 @@ class Scene:
             lookup(f"metric that answers scene {self.title!r}", name, CATALOGUE)
         if not isinstance(self.facts, Mapping) or not all(isinstance(text, str) for text in self.facts.values()):
             raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
+        if not callable(self.answer):
+            raise ScenarioError(f"scene {self.title!r} has answer {shown(self.answer)}: give a function of its runs")
+
+    def sentence(self, traces: Mapping[str, Mapping[str, Trace]]) -> str:
+        """Return the sentence that answers the question of the scene, from condition -> label -> Trace.
+
+        Raises:
+          ScenarioError: the scene's function fails, or returns no text.
+        """
+        try:
+            text = self.answer(Outcome(traces=traces))
+        except ScenarioError:
+            raise
+        except Exception as error:  # whatever a user's function raises
+            what = f"{type(error).__name__}: {error}"
+            raise ScenarioError(f"the answer of scene {self.title!r} raises {what}; mend its function") from error
+        if not isinstance(text, str) or not text.strip():
+            raise ScenarioError(
+                f"the answer of scene {self.title!r} is {shown(text)}: give a function that returns text"
+            )
+        text = " ".join(text.split())
+        labels = "|".join(re.escape(label) for _, label, _ in self.runs())
+        begins = text[:1] if re.match(rf"(?:{labels})(?!\w)", text) else text[:1].upper()  # labels stay as in tables
+        return begins + text[1:] + "." * (not text.endswith((".", "?", "!")))
 
     def seeded(self, seed: int) -> "Scene":
         """Return the same scene with another seed in every run."""

@@ -169,6 +169,21 @@ def test_run_of_a_scene_file_prints_its_scores_and_writes_its_files_where_it_say
         assert heading in out
 
 
+def test_run_prints_the_question_first_and_after_the_scores_the_answer(call, undrawn, folder):
+    (folder / "asks.py").write_text('''"""Does it settle?
+
+Look for: nothing.
+"""
+import smc_mujoco as smc
+run = smc.Scenario(plant="duffing", law="none", duration=0.01)
+scene = smc.Scene(title="Asked", conditions={"calm": {"only": run}}, answer=lambda runs: runs.who("rests", "rest"))
+''')
+    code, out, _ = call("run", "asks.py", "--no-video", "--out", "out")
+    assert code == 0
+    assert [line for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked"]
+    assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
+
+
 def test_results_go_to_videos_and_the_scene_s_name_when_nothing_else_is_asked_for(call, scene, folder):
     assert call("run", scene, "--no-video")[0] == 0
     assert {path.name for path in (folder / "videos" / "mine").iterdir()} == FILES

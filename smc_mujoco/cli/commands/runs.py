@@ -29,7 +29,7 @@ def run(
     ] = None,
     timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
 ) -> None:
-    """Run a scene: print its scores; write its traces, figures and film.
+    """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
     Exported traces have every number to the last bit, and its unit: csv in the first line ("t [s],x [m],..."), mat in
     the struct `units`, parquet in the metadata of each column, under "unit".
@@ -48,7 +48,7 @@ def run(
     if seed is not None:
         scene = scene.seeded(seed)
     terminal = Terminal()
-    perform(scene, out or Path("videos") / path.stem, video, threads, clock, terminal, endings)
+    perform(scene, out or Path("videos") / path.stem, video, threads, clock, terminal, endings, scenes.question(path))
     if timing:
         terminal.note(str(clock), "dim")
 

@@ -1,0 +1,312 @@
+"""What came of a scene's runs, in words: the parts of the sentence that answers the scene's question.
+
+    def answer(runs):
+        return f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}"
+
+gives "all 4 settle; first: adaptive and super_twisting tied (0.840 to 0.853 s)". Values that differ by less than the
+least relevant difference of `analysis.differences` are tied, as on leaderboards. These are single runs: a study says
+whether another start or noise would change the order.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+from smc_mujoco.analysis.differences import exceeds
+from smc_mujoco.analysis.paired_runs import floor
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.text import number
+from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time
+from smc_mujoco.simulation.trace import Trace
+
+Measure = str | Callable[[Trace], float]
+
+
+def settles(trace: Trace) -> bool:
+    """Return whether every channel stays in its settling band, from some time until the end of the run."""
+    return math.isfinite(settling_time(trace))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """The runs of a scene, and what came of them in words: what `Scene.answer` is called with.
+
+    A measure is the name of a metric, or a function Trace -> float whose smaller values are better for `least`. A run
+    that failed has no value, and nothing holds for it.
+
+    Attributes:
+      traces: condition -> label -> Trace.
+    """
+
+    traces: Mapping[str, Mapping[str, Trace]]
+
+    def __getitem__(self, condition: str) -> "Outcome":
+        """Return the outcome of one condition."""
+        return Outcome(traces={condition: find("condition of the scene", condition, self.traces)})
+
+    @property
+    def labels(self) -> list[str]:
+        """The labels of all runs."""
+        return list(dict.fromkeys(label for runs in self.traces.values() for label in runs))
+
+    @property
+    def named(self) -> str:
+        """The labels in a row: "a, b and c", "none"."""
+        return _and(self.labels) if self.labels else "none"
+
+    def only(self, *labels: str) -> "Outcome":
+        """Return the outcome of the runs with these labels."""
+        for label in labels:
+            find("label of the scene", label, dict.fromkeys(self.labels))
+        return Outcome(traces={name: {x: run for x, run in runs.items() if x in labels} for name, runs in self})
+
+    def those(self, holds: Callable[[Trace], bool] = settles) -> "Outcome":
+        """Return the outcome of the runs for which something holds; by default of those that settle."""
+        kept = {name: {label: run for label, run in runs.items() if _true(holds, run)} for name, runs in self}
+        return Outcome(traces=kept)
+
+    def __iter__(self) -> Iterator[tuple[str, Mapping[str, Trace]]]:
+        return iter(self.traces.items())
+
+    def values(self, measure: Measure, group: str = "") -> dict[str, dict[str, float]]:
+        """Return condition -> label -> value: NaN for a run that failed, inf for "never".
+
+        Args:
+          group: of channels, as in `smc.scores`, such as "free"; by default the one value of `smc.score`.
+        """
+        value = self._function(measure, group)
+        return {name: {label: value(run) for label, run in runs.items()} for name, runs in self}
+
+    def size(self, measure: Measure, group: str = "", unit: str = "") -> str:
+        """Return the value of the run, or the range of all: "0.323 s", "1.12 to 1.13 s", "never".
+
+        Args:
+          unit: of a measure that is a function.
+        """
+        values = [value for found in self.values(measure, group).values() for value in found.values()]
+        units = {unit or _unit(measure, run, group) for _, runs in self for run in runs.values()}
+        return _range(values, units.pop() if len(units) == 1 else "") if values else "none"
+
+    def leaders(self, *measures: Measure) -> list[str]:
+        """Return the labels that have the least value, or are level with it, in every measure and condition."""
+        level = [self._level(name, measure, "", least=True) for name in self.traces for measure in measures]
+        return [label for label in self.labels if all(label in found for found in level)]
+
+    def least(self, measure: Measure, group: str = "", unit: str = "") -> str:
+        """Return whose value is least, with the value: "classical (1.12 s)", "a and b tied (1.12 to 1.13 s)".
+
+        Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none" where all fail.
+        """
+        return self._first(measure, group, unit, least=True)
+
+    def most(self, measure: Measure, group: str = "", unit: str = "") -> str:
+        """Return whose value is largest, as `least` does."""
+        return self._first(measure, group, unit, least=False)
+
+    def who(self, singular: str, plural: str, holds: Callable[[Trace], bool] = settles) -> str:
+        """Return for which runs something holds: "all 4 settle", "a and b settle, c does not".
+
+        Over several conditions: "a settles in all 3 conditions, b in all but 50 ms, c in none".
+
+        Args:
+          singular: the verb, such as "settles", with what follows it.
+          plural: the same of several, such as "settle".
+          holds: what must hold; by default that the run settles.
+        """
+        where = self._where(holds)
+        if len(self.traces) == 1:
+            yes, no = ([label for label in where if bool(where[label]) == wanted] for wanted in (True, False))
+            return _one_condition(yes, no, singular, plural)
+        parts: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+        for label, names in where.items():
+            tried = [name for name, runs in self if label in runs]
+            parts.setdefault((_share(names, tried), tuple(names)), []).append(label)
+        first, *others = sorted(parts, key=lambda part: -len(part[1]))
+        if not first[1]:
+            return f"{_one_condition([], self.labels, singular, plural)} in any condition"
+        sentence = f"{_all(parts[first], self.labels)} {singular if len(parts[first]) == 1 else plural} {first[0]}"
+        return ", ".join([sentence, *(f"{_and(parts[part])} {part[0]}" for part in others)])
+
+    def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
+        """Return the last condition that each label tolerates, conditions ordered from weak to strong.
+
+        That is the last before the first one in which something does not hold: "a and b 20 ms, c 10 ms, d none". If it
+        holds again in a later one, that is said.
+        """
+        where, words = self._where(holds), {}
+        for label, names in where.items():
+            tried = [name for name, runs in self if label in runs]
+            good = next((i for i, name in enumerate(tried) if name not in names), len(tried))
+            again = [name for name in tried[good:] if name in names]
+            text = tried[good - 1] if good else "none"
+            text += f" (and {_and(again)} again)" if again else ""
+            words.setdefault((-good, text), []).append(label)
+        return ", ".join(f"{_all(words[key], self.labels)} {key[1]}" for key in sorted(words))
+
+    def changes(self, measure: Measure, one: str, other: str, group: str = "", unit: str = "") -> str:
+        """Return each label's value in one condition and in another: "a 1.20 to 1.43 s".
+
+        A change below the least relevant difference is called that: "b no relevant change (0.535 s)".
+        """
+        value, parts = self._function(measure, group), []
+        before, after = (find("condition of the scene", name, self.traces) for name in (one, other))
+        for label in (label for label in before if label in after):
+            run = before[label]
+            pair = [value(run), value(after[label])]
+            size = _from_to(pair, unit or _unit(measure, run, group))
+            level = not any(map(math.isnan, pair)) and not _exceeds(max(pair), min(pair), _floor(measure, run, group))
+            parts.append(f"{label} no relevant change ({size})" if level else f"{label} {size}")
+        return ", ".join(parts) or "none"
+
+    def _where(self, holds: Callable[[Trace], bool]) -> dict[str, list[str]]:
+        """Return label -> the conditions in which something holds for it."""
+        where: dict[str, list[str]] = {label: [] for label in self.labels}
+        for name, runs in self:
+            for label, run in runs.items():
+                if _true(holds, run):
+                    where[label].append(name)
+        return where
+
+    def _function(self, measure: Measure, group: str) -> Callable[[Trace], float]:
+        """Return the function of a measure; its value is NaN for a run that failed."""
+        if isinstance(measure, str):
+            metric = find("metric", measure, CATALOGUE)
+            value = functools.partial(_of_group, name=measure, group=group) if group else metric.of
+        elif callable(measure):
+            value = measure
+        else:
+            raise ScenarioError(f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace")
+        return lambda run: math.nan if run.failure is not None else float(value(run))
+
+    def _level(self, condition: str, measure: Measure, group: str, least: bool) -> dict[str, float]:
+        """Return label -> value of the runs of a condition that have its least or largest value, or are level with it.
+
+        It is empty if all fail, or if the least value is "never".
+        """
+        found = self[condition].values(measure, group)[condition]
+        known = {label: value for label, value in found.items() if not math.isnan(value)}
+        if not known or (least and min(known.values()) == math.inf):
+            return {}
+        resolution = _floor(measure, self.traces[condition][next(iter(known))], group)
+        best = (min if least else max)(known.values())
+        ends = {label: (value, best) if least else (best, value) for label, value in known.items()}
+        return {label: known[label] for label, (a, b) in ends.items() if not _exceeds(a, b, resolution)}
+
+    def _first(self, measure: Measure, group: str, unit: str, least: bool) -> str:
+        """Return in words the runs with the least or largest value of each condition."""
+        winners: dict[tuple[str, ...], dict[str, list[float]]] = {}
+        for name in self.traces:
+            level = self._level(name, measure, group, least)
+            winners.setdefault(tuple(level), {})[name] = list(level.values())
+        parts = []
+        for labels, where in winners.items():
+            several = f"{_and(labels)} tied" if len(labels) > 1 else _and(labels) if labels else "none"
+            if 1 < len(labels) == len(self.labels):
+                several = f"{_all(labels, self.labels)} tied"
+            values = [value for each in where.values() for value in each]
+            units = {unit or _unit(measure, self.traces[name][labels[0]], group) for name in where if labels}
+            size = _range(values, units.pop()) if len(units) == 1 else ""
+            sized = f" ({size})" if size else ""
+            if len(self.traces) == 1:
+                parts.append(several + sized)
+            elif len(winners) == 1:
+                parts.append(f"{several} {_everywhere(len(where))}{sized}")
+            else:
+                parts.append(f"{several} ({', '.join(where)})")
+        return ", ".join(parts)
+
+
+def _true(holds: Callable[[Trace], bool], run: Trace) -> bool:
+    """Return whether something holds for a run; nothing holds for a run that failed."""
+    return run.failure is None and bool(holds(run))
+
+
+def _one_condition(yes: Sequence[str], no: Sequence[str], singular: str, plural: str) -> str:
+    """Return who does something and who does not, of the labels of one condition."""
+    count = len(yes) + len(no)
+    if not yes:
+        return f"{no[0]} does not {plural}" if count == 1 else f"none of the {count} {singular}"
+    if not no:
+        return f"{yes[0]} {singular}" if count == 1 else f"{_all(yes, yes)} {plural}"
+    return f"{_and(yes)} {singular if len(yes) == 1 else plural}, {_and(no)} {'does' if len(no) == 1 else 'do'} not"
+
+
+def _share(names: Sequence[str], tried: Sequence[str]) -> str:
+    """Return some of the conditions tried in words: "in all 3 conditions", "in all but 50 ms", "in none"."""
+    if len(names) == len(tried):
+        return _everywhere(len(tried))
+    if not names:
+        return "in none"
+    missing = [name for name in tried if name not in names]
+    return f"in all but {_and(missing)}" if len(missing) < len(names) else f"only in {_and(names)}"
+
+
+def _everywhere(conditions: int) -> str:
+    """Return in words that something is so in all conditions."""
+    return "in both conditions" if conditions == 2 else f"in all {conditions} conditions"
+
+
+def _all(some: Sequence[str], labels: Sequence[str]) -> str:
+    """Return labels in a row, or that they are all, if there are several."""
+    if len(some) == len(labels) > 1:
+        return "both" if len(some) == 2 else f"all {len(some)}"
+    return _and(some)
+
+
+def _and(names: Iterable[str]) -> str:
+    """Return names in a row, the last after "and"."""
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _exceeds(a: float, b: float, resolution: float) -> bool:
+    """Return whether a is larger than b by more than the least relevant difference; never is no later than never."""
+    return a != b and bool(exceeds(a, b, resolution=resolution))
+
+
+def _of_group(trace: Trace, name: str, group: str) -> float:
+    """Return a metric of one group of channels."""
+    return find(f"metric of group {group!r}", name, find("group of channels", group, scores(trace)))
+
+
+def _floor(measure: Measure, run: Trace, group: str) -> float:
+    """Return the least relevant difference of any two values of a measure: that of leaderboards, 0 for a function."""
+    return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) and not group else 0.0
+
+
+def _unit(measure: Measure, run: Trace, group: str) -> str:
+    """Return the unit of a metric in a run; "" for a function."""
+    from smc_mujoco.metrics.channel_groups import groups
+
+    if not isinstance(measure, str):
+        return ""
+    named = [one.unit for one in groups(run.scenario.plant) if one.name == group]
+    unit = CATALOGUE[measure].unit_for(named[0] if named else run.scenario.plant.unit)
+    return "" if unit == "1" else unit
+
+
+def _range(values: Sequence[float], unit: str) -> str:
+    """Return the value, or the least and the largest: "0.323 s", "1.12 to 1.13 s", "never"."""
+    known = [value for value in values if not math.isnan(value)]
+    return _from_to((min(known), max(known)), unit) if known else "failed"
+
+
+def _from_to(pair: Sequence[float], unit: str) -> str:
+    """Return two values, or one if they look the same: "1.12 to 1.13 s", "0.4 s to never"."""
+    texts = ["failed" if math.isnan(value) else number(value) for value in pair]
+    if all(map(math.isfinite, pair)):
+        return f"{' to '.join(dict.fromkeys(texts))} {unit}".rstrip()
+    sized = (f"{text} {unit}".rstrip() if math.isfinite(v) else text for v, text in zip(pair, texts, strict=True))
+    return " to ".join(dict.fromkeys(sized))
+
+
+def summary(runs: Outcome) -> str:
+    """Return who settles, who is first, and who failed: the answer of a scene that declares none."""
+    failed = [(label, name) for name, condition in runs for label, run in condition.items() if run.failure is not None]
+    parts = [runs.who("settles", "settle")]
+    if runs.those().labels:
+        parts.append(f"first: {runs.least('settling_time')}")
+    if failed:
+        parts.append(f"failed: {', '.join(f'{label} ({name})' for label, name in failed)}")
+    return "; ".join(parts)
