@@ -159,7 +159,7 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
     geom, zero, end = scene.geoms[scene.ngeom], np.zeros(3), low + (high - low) / (DRAWN if arrow.head else 1.0)
     mujoco.mjv_initGeom(geom, kind, zero, zero, np.zeros(9), np.array(arrow.rgba, np.float32))
     mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + end * along)
-    geom.specular = 0.0
+    geom.specular, geom.objtype = 0.0, mujoco.mjtObj.mjOBJ_UNKNOWN  # mjv_initGeom leaves that of an earlier shape
     scene.ngeom += 1
 
 

@@ -1,13 +1,13 @@
 """Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
 
-scene.py composes the model, stage.py poses and renders it, arrows.py shows forces, caption.py has the text, charts.py
-the charts. Frames are made and written one by one, so that memory does not grow with a film's length.
+scene.py composes the model, stage.py poses it, canvas.py renders it, arrows.py shows forces, caption.py has the text,
+charts.py the charts, encoder.py writes. Frames are made and written one by one, so that memory does not grow with a
+film's length.
 """
 
 import contextlib
 import os
-import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from smc_mujoco.draw.decimate import end, finite, windows
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
+from smc_mujoco.draw.film.encoder import encoder
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
@@ -29,9 +30,7 @@ MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS = 0.36  # height of the charts, of the film's
-VISIBLE = 1e-3  # rad, m, or of the longest arrow: smaller motion is less than half a pixel, and not rendered
 PAUSE = 1200  # ms for which a clip's last picture stays before it repeats
-CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
 Report = Callable[[int], None]
 
 
@@ -75,47 +74,6 @@ def film(
 def missing() -> str | None:
     """Return None if a film can be written, else one sentence that says why not and what to do."""
     return gl.missing() or extras.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
-
-
-@contextlib.contextmanager
-def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[np.ndarray], None]]:
-    """Yield a function that adds a picture (height, width, 3) to the film at `path`.
-
-    Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end first.
-
-    Raises:
-      MissingPackageError: there is no ffmpeg.
-      ScenarioError: it cannot write.
-    """
-    with extras.extra("film", "a film"):
-        import imageio_ffmpeg
-        import mediapy
-
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
-    writer = mediapy.VideoWriter(path, shape, **options, ffmpeg_args="-movflags +faststart")
-    try:
-        with sigint_blocked():
-            writer.__enter__()
-        with contextlib.closing(writer):
-            yield writer.add_image
-    except (OSError, RuntimeError) as error:
-        if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
-            raise KeyboardInterrupt from None
-        raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
-
-
-@contextlib.contextmanager
-def sigint_blocked() -> Iterator[None]:
-    """Block SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def clip(
@@ -206,7 +164,6 @@ def frames(
         caption.place(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, times, gap)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        rendered, picture = np.empty(0), np.empty(0)
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
@@ -216,11 +173,7 @@ def frames(
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
                 for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
-            ends = [end for _, _, arrow in drawn for end in (arrow.low, arrow.high)]
-            moved = [part[frame] for part in (*places, *ahead)]
-            now = np.concatenate([*moved, failed, stage.shape, ends])
-            if len(now) != len(rendered) or np.abs(now - rendered).max() > VISIBLE:
-                rendered, picture = now, stage.render(drawn)
+            picture = stage.render(drawn)
             words = tuple(each[frame] for each in timelines)
             yield np.concatenate([caption.over(picture, time, failed, words), charts.at(time)])
 

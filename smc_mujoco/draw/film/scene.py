@@ -21,7 +21,7 @@ from smc_mujoco.simulation.scenario import Scenario
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
 AISLE = 0.05  # m between machines, chosen
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
-QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 24, "numstacks": 14, "numquads": 1}  # looks and speed
+QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 20, "numstacks": 10, "numquads": 1}  # looks and speed
 LOOK = "look"
 FRONT = (1.0, 0.0, 0.0, 0.0, 0.2, 1.0)  # right and up of a camera before an own model, a little above it
 ABOVE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.35)  # of one above, for joints with vertical axes

@@ -9,15 +9,15 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import gl
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, scene
+from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joints
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.trace import Trace
 
-SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
+SLIDE, CAPSULE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtGeom.mjGEOM_CAPSULE
 POSES = 24  # poses of each trace that must be in the picture
 MAX_FIXED = 4.0  # size of a fixed thing, in sizes of what moves: larger ones may leave the picture; chosen
 
@@ -28,6 +28,7 @@ class Stage:
     Attributes:
       shown: number of channels of each machine that are drawn.
       boxes: place of each machine in the picture, (machines, 4) px: left, top, right, bottom.
+      canvas: draws the pictures.
     """
 
     def __init__(self, traces: Sequence[Trace], colours: Sequence[str], size: tuple[int, int], room: camera.Room):
@@ -40,12 +41,12 @@ class Stage:
         names = [[joint.name for joint in joints(assembly.spec([scenario]))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
         self.rotors = [[self.qpos_address(f"m{k}/{ROTOR}{name}") for name in each] for k, each in enumerate(names)]
-        self.shape = [-1] * len(scenarios)
+        self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
         corners = self.corners(traces)
-        turn = self.data.cam("m0/look").xmat.reshape(3, 3)
+        turn = self.data.cam("m0/look").xmat.reshape(3, 3).copy()
         place = camera.fit(np.concatenate(corners), turn, size, room)
         slides = [self.model.jnt_type[each] == SLIDE for each in self.joints]
         machines = zip(scenarios, self.joints, slides, self.rails, strict=True)
@@ -55,13 +56,14 @@ class Stage:
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
         seen = [camera.project(points, turn, place, size) for points in corners]
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in seen])
-        self.renderer = gl.renderer(self.model, size[1], size[0])
+        scene.forward(self.model, self.data)
+        self.canvas = Canvas(self.model, self.data, size)
 
     def __enter__(self) -> "Stage":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.renderer.close()
+        self.canvas.close()
 
     def set_shape(self, k: int, time: float) -> None:
         """Give machine k its shape at a time, s: a scenario's rod may be longer than the plant's, and may change."""
@@ -73,12 +75,16 @@ class Stage:
             name = single.geom(geom).name
             if name and name != "floor" and not self.own:
                 copy = self.model.geom(f"m{k}/{name}")
+                if copy.type[0] == CAPSULE:  # its box is that of the compiled size
+                    self.model.geom_aabb[copy.id, 5] += single.geom_size[geom, 1] - copy.size[1]
                 copy.pos, copy.size = single.geom_pos[geom], single.geom_size[geom]
+        self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
         """Colour the accent of machine k."""
-        if not self.own:
+        if not self.own and self.colours[k] != colour:
             self.model.mat(f"m{k}/accent").rgba[:3] = np.array(style.rgb(colour)) / 255
+            self.colours[k], self.changed = colour, True
 
     def qpos_address(self, name: str) -> int | None:
         """Return the index of a joint in qpos; None if there is no joint of that name."""
@@ -99,12 +105,15 @@ class Stage:
                 self.data.qpos[rotor] = value
 
     def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow)."""
+        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only."""
         scene.forward(self.model, self.data)
-        self.renderer.update_scene(self.data, camera="film")
-        for k, i, arrow in drawn:
-            arrows.draw(self.renderer.scene, self.model, self.data, self.mounts[k][i], arrow)
-        return self.renderer.render()
+
+        def add(shown: mujoco.MjvScene) -> None:
+            for k, i, arrow in drawn:
+                arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
+
+        anew, self.changed = self.changed, False
+        return self.canvas.draw(add, anew)
 
     def corners(self, traces: Sequence[Trace]) -> list[np.ndarray]:
         """Return for each machine the corners of its geoms' boxes over the poses of its trace, (points, 3) m.

@@ -16,6 +16,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
+from smc_mujoco.draw.film.encoder import sigint_blocked
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.report.plan import Report
 
@@ -108,7 +109,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
             path, SIZE, fps=FPS, codec="libvpx-vp9", output_params=VP9, macro_block_size=2, ffmpeg_log_level="error"
         )
         try:
-            with video.sigint_blocked():
+            with sigint_blocked():
                 writer.send(None)
             for k, picture in enumerate(video.frames(traces, times, None, title, SIZE)):
                 if k == min(round(POSTER * FPS), len(times) - 1):

@@ -1,0 +1,106 @@
+"""Pictures of which only a part is drawn again are those that are drawn whole."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw.film import camera
+from smc_mujoco.draw.film.arrows import Arrow
+from smc_mujoco.draw.film.canvas import Canvas
+from smc_mujoco.draw.film.stage import Stage
+
+pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
+SEEN = 24  # of 255: a sample of a smoothed edge more or less is no difference
+
+
+def stage(plant: str, **fields) -> Stage:
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=1.0, **fields))
+    return Stage([trace, trace], ["#0072B2", "#D55E00"], SIZE, ROOM)
+
+
+def poses(shown: Stage, count: int = 6) -> list[tuple[np.ndarray, ...]]:
+    """Positions of two machines, of which the second moves."""
+    return [(np.full(shown.shown[0], 0.2), np.full(shown.shown[1], 0.2 + 0.15 * k)) for k in range(count)]
+
+
+def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
+    found = []
+    for k, (first, second) in enumerate(poses(shown)):
+        shown.pose(0, first)
+        shown.pose(1, second)
+        arrow = Arrow(0.0, 0.2 * k - 0.5, (1.0, 0.0, 0.0, 1.0))
+        found.append(shown.render([(1, 0, arrow)] if push else ()))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("plant", "push"), [("inverted_pendulum", True), ("van_der_pol", True), ("pendulum_network", False)]
+)
+def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypatch):
+    """Shadows and springs too; the first machine stands still."""
+    areas, whole = [], lambda *_: (0, 0, *SIZE)
+    changed = Canvas.changed
+
+    def noted(self, *shapes):
+        areas.append(changed(self, *shapes))
+        return areas[-1]
+
+    with stage(plant) as shown:
+        monkeypatch.setattr(Canvas, "changed", noted)
+        parts = pictures(shown, push)
+        monkeypatch.setattr(Canvas, "changed", whole)
+        wholes = pictures(shown, push)
+    assert all((area[2] - area[0]) * (area[3] - area[1]) < 0.8 * SIZE[0] * SIZE[1] for area in areas)
+    assert np.abs(parts[0].astype(int) - parts[-1]).max() > 100  # it moves
+    for part, full in zip(parts, wholes, strict=True):
+        assert (np.abs(part.astype(int) - full).max(axis=2) > SEEN).mean() < 3e-4
+
+
+def test_a_picture_in_which_nothing_moves_is_not_drawn_again(monkeypatch):
+    with stage("inverted_pendulum") as shown:
+        pictures(shown, False)
+        monkeypatch.setattr(Canvas, "render", None)
+        first = shown.render()
+        for angle in 0.95 + np.linspace(0.0, 1e-4, 5):
+            shown.pose(1, np.array([angle]))
+            assert shown.render() is first
+
+
+def test_slow_motion_adds_up_until_it_is_drawn():
+    with stage("inverted_pendulum") as shown:
+        shown.pose(1, np.zeros(1))
+        last = first = shown.render()
+        for angle in np.arange(0.0, 0.1, 5e-4):  # less than a fifth of a pixel each
+            shown.pose(1, np.array([angle]))
+            last = shown.render()
+        assert (np.abs(first.astype(int) - last).max(axis=2) > 100).sum() > 50
+
+
+def test_a_changed_colour_or_shape_is_drawn():
+    jump = smc.Jump(0.5, {"l": 1.5})
+    with stage("inverted_pendulum", jump=jump) as shown:
+        shown.set_shape(0, 0.0)
+        first = shown.render()
+        shown.set_colour(0, "#A9AFB6")
+        grey = shown.render()
+        assert (np.abs(first.astype(int) - grey).max(axis=2) > 50).sum() > 50
+        shown.set_shape(0, 0.6)
+        longer = shown.render()
+        assert (np.abs(longer.astype(int) - grey).max(axis=2) > 50).sum() > 50
+        shown.pose(0, np.array([0.5]))
+        again = shown.render()
+        shown.changed = True
+        assert (np.abs(again.astype(int) - shown.render()).max(axis=2) > SEEN).mean() < 3e-4
+
+
+def test_a_model_with_a_lamp_has_its_pictures_drawn_whole():
+    """Where the shadows of a lamp fall is not foretold."""
+    with stage("inverted_pendulum") as shown:
+        model, data = shown.model, shown.data
+        model.light("key").type = 0  # a spot
+        assert Canvas(model, data, SIZE).lights is None
+    with stage("inverted_pendulum") as shown:
+        assert shown.canvas.lights is not None
+        assert [way[2] < -0.5 for way in shown.canvas.lights] == [True]
