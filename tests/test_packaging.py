@@ -204,7 +204,7 @@ figure(traces[:1], "a.svg")
 table = study(grid(["duffing"], ["classical"], ["nominal"], seeds=2, duration=0.05), "study")
 print(len(traces), score(traces[0])["itae"] > 0.0, len(table))
 """
-    assert without_extras(code, tmp_path) == "7 True 2\n"
+    assert without_extras(code, tmp_path) == "12 True 2\n"
 
 
 DM = "pip install 'smc-mujoco[dm]'" if sys.version_info < (3, 13) else "take Python 3.12"

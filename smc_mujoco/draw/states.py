@@ -91,6 +91,9 @@ def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) ->
 
 def has_dry_friction(scenario: Scenario) -> bool:
     """Return whether dry friction can hold the machine: in its joints, or of what it lies on."""
+    plant = scenario.plant
+    if any(plant.parameters[name] > 0.0 for name in plant.dry):
+        return True
     if any((isinstance(f, Coulomb) and f.level > 0.0) or isinstance(f, LuGre) for f in scenario.friction):
         return True
     if scenario.contact.kind == "none":

@@ -97,6 +97,7 @@ class Plant:
       placed: parameter -> its value in the geometry of the contacts, which another value would not fit.
       direct: whether disturbances act on its joints, not on the bodies that they carry.
       smooth: whether its model has no limits, contacts, dry friction and equality constraints.
+      dry: names of the parameters that are dry friction. A plant with one that is not 0 is not smooth.
       unmodelled: why there is no nominal model, or "".
       limits: largest force of each driven channel's motor, N m or N; empty: no limits.
       label, short: long and short name in figures; "": made from its name.
@@ -122,6 +123,7 @@ class Plant:
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
     direct: bool = False
     smooth: bool = True
+    dry: tuple[str, ...] = ()
     unmodelled: str = ""
     limits: tuple[float, ...] = ()
     ranges: tuple[tuple[str, float, float], ...] = ()
@@ -254,8 +256,11 @@ def plant(name: str, **parameters: float) -> Plant:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -LARGEST)
         values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=LARGEST)
+    for key in base.dry:
+        number(f"{name}'s {key}", values[key], least=0.0)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
-    return dataclasses.replace(base, parameters=values, n=n, x0=x0)
+    smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
+    return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth)
 
 
 def plants() -> list[str]:

@@ -1,6 +1,7 @@
 """Each model is its equation and nothing else: held against `nominal` at random states, for every plant."""
 
 from collections import namedtuple
+from types import SimpleNamespace
 
 import mujoco
 import numba
@@ -8,21 +9,29 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.mechanisms.plant import catalogue, model_path, plant, write
+from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.plant import Coupled, catalogue, model_path, plant, write
 
 NAMES = sorted(catalogue())
 SIZES = {1: [1], 2: [2]}  # largest n -> which are tested
 SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 3, 5, 40, 100])]
 CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
-DRIVEN = [
-    (name, n) for name, n in SIZED if not catalogue()[name].free
-]  # the others: tests/mechanisms/test_underactuated.py
+# one pendulum or cart a channel; the others: tests/mechanisms/test_underactuated.py and test_rig_plants.py
+DRIVEN = [(name, n) for name, n in SIZED if not catalogue()[name].free and name != "double_pendulum"]
 EVERY_JOINT_DRIVEN = pytest.mark.parametrize(("name", "n"), DRIVEN, ids=[f"{name}-{n}" for name, n in DRIVEN])
 PLANTS = pytest.mark.parametrize("name", NAMES)
+LINKED = {  # mechanisms whose joints differ -> these, in the order of the channels
+    "furuta": ["arm", "hinge"],
+    "pendubot": ["shoulder", "elbow"],
+    "acrobot": ["elbow", "shoulder"],
+    "double_pendulum": ["shoulder", "elbow"],
+}
 
 
-def sized(name, n):
-    return plant(name, n=n) if n > 1 else plant(name)
+def sized(name, n, **parameters):
+    """The plant without dry friction, which is tested in tests/mechanisms/test_rig_plants.py."""
+    size = {"n": n} if n > 1 else {}
+    return plant(name, **size, **dict.fromkeys(catalogue()[name].dry, 0.0), **parameters)
 
 
 def believed(p):
@@ -32,14 +41,15 @@ def believed(p):
 
 def changed(name, n, rng):
     """The plant with every parameter moved by up to 40%."""
-    base = sized(name, n)
-    return plant(name, n=n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in base.parameters.items()})
+    wet = {key: value for key, value in sized(name, n).parameters.items() if key not in catalogue()[name].dry}
+    return sized(name, n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in wet.items()})
 
 
 def expected(p, x, v, u):
     """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
-    parameters = believed(p)
-    terms = [p.nominal(x, v, i, parameters) for i in range(p.n)]
+    parameters = SimpleNamespace(**p.parameters)
+    others = (u,) if isinstance(p.nominal, Coupled) else ()
+    terms = [p.nominal(x, v, i, parameters, *others) for i in range(p.n)]
     forces = [u[i if i < p.driven else i - p.driven] for i in range(p.n)]  # that of the joint it moves with
     acc = np.array([f + g * force for (f, g), force in zip(terms, forces, strict=True)])
     size = max(max(abs(f), abs(g * force)) for (f, g), force in zip(terms, forces, strict=True))
@@ -47,9 +57,10 @@ def expected(p, x, v, u):
 
 
 def acceleration(model, data, x, v, u):
-    data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u[: model.nu]
+    joints = joint_ids(model)  # one coordinate each
+    data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u[: model.nu]
     mujoco.mj_forward(model, data)
-    return data.qacc.copy()
+    return data.qacc[joints].copy()
 
 
 def worst_error(p, model, rng, trials=20):
@@ -63,7 +74,7 @@ def worst_error(p, model, rng, trials=20):
     return worst
 
 
-@PLANTS
+@pytest.mark.parametrize("name", [name for name in NAMES if not isinstance(catalogue()[name].nominal, Coupled)])
 def test_nominal_compiles_to_the_same_numbers(name):
     p = catalogue()[name]
     parameters = believed(p)
@@ -103,18 +114,20 @@ def test_fields_alone_carry_a_parameter_change(name, n):
 def test_every_parameter_is_felt_by_the_model(name, n):
     """Without this, a parameter missing from `fields` and from `nominal` alike would pass."""
     rng = np.random.default_rng(4)
-    p = sized(name, n)
-    x, v, u = rng.uniform(1.1, 2, n), rng.uniform(1, 3, n), rng.uniform(1, 6, n)
-    before = p.load()
-    for key in p.parameters:
-        after = plant(name, **({"n": n} if n > 1 else {}), **{key: 1.25 * p.parameters[key] or 0.1}).load()
+    size = {"n": n} if n > 1 else {}
+    p = catalogue()[name]
+    values = {key: value or 0.01 * min((1.0, *p.limits)) for key, value in p.parameters.items()}
+    x, v, u = rng.uniform(1.1, 2, n), rng.uniform(1, 3, n), rng.uniform(1, 6, n) * min((1.0, *p.limits))
+    before = plant(name, **size, **values).load()
+    for key, value in values.items():
+        after = plant(name, **size, **values | {key: 1.25 * value}).load()
         a, b = (acceleration(m, mujoco.MjData(m), x, v, u) for m in (before, after))
         assert np.all(np.abs(a - b) > 1e-6), key
 
 
 @CASES
 def test_default_fields_change_nothing_of_the_compiled_file(name, n):
-    p = sized(name, n)
+    p = plant(name, n=n)
     model = p.spec().compile()
     for field, index, value, _ in p.fields(model, p.values({})):
         owner = model.opt if field.startswith("opt.") else model
@@ -158,21 +171,24 @@ def test_all_mass_sits_at_the_points_of_the_equation(name, n):
 def test_everything_the_contract_names_is_there(name, n):
     p = sized(name, n)
     model = p.load()
-    prefixes = [f"p{i}/" for i in range(n)] if p.network else [""]
-    for i, prefix in enumerate(prefixes):
-        assert model.actuator(i).name == f"{prefix}u"
-        assert model.sensor(2 * i).name == f"{prefix}x"
-        assert model.sensor(2 * i + 1).name == f"{prefix}v"
-    body, joint = ("pendulum", "hinge") if p.unit == "rad" else ("cart", "slide")
-    for i, prefix in enumerate(prefixes):
-        assert model.dof_bodyid[i] == model.body(prefix + body).id
-        assert model.actuator_trnid[i, 0] == model.joint(prefix + joint).id == i
+    if name in LINKED:
+        assert [model.joint(i).name for i in joint_ids(model)] == LINKED[name]
+    else:
+        prefixes = [f"p{i}/" for i in range(n)] if p.network else [""]
+        for i, prefix in enumerate(prefixes):
+            assert model.actuator(i).name == f"{prefix}u"
+            assert model.sensor(2 * i).name == f"{prefix}x"
+            assert model.sensor(2 * i + 1).name == f"{prefix}v"
+        body, joint = ("pendulum", "hinge") if p.unit == "rad" else ("cart", "slide")
+        for i, prefix in enumerate(prefixes):
+            assert model.dof_bodyid[i] == model.body(prefix + body).id
+            assert model.actuator_trnid[i, 0] == model.joint(prefix + joint).id == i
     for kind in ("body", "machine"), ("camera", "look"), ("material", "accent"), ("geom", "floor"):
         assert getattr(model, kind[0])(kind[1]).id >= 0
     counts = {"geom": model.ngeom, "body": model.nbody, "site": model.nsite, "tendon": model.ntendon}
     for kind, count in counts.items():
         assert all(getattr(model, kind)(i).name for i in range(count)), kind
-    np.testing.assert_array_equal(model.key("home").qpos, p.x0)
+    np.testing.assert_array_equal(model.key("home").qpos[joint_ids(model)], p.x0)
     assert model.nkey == 1
 
 
@@ -214,8 +230,7 @@ def energy_drift(p, h, seconds=2.0):
 
 @pytest.mark.parametrize("name", [n for n in NAMES if "pendulum" in n or n == "duffing"])
 def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
-    damping = {"delta": 0.0} if name == "duffing" else {"b": 0.0}
-    p = plant(name, **damping)
+    p = plant(name, **{key: 0.0 for key in ("delta", "b") if key in catalogue()[name].parameters})
     coarse, fine = energy_drift(p, 0.02), energy_drift(p, 0.01)
     assert coarse < 1e-2
     assert coarse / fine >= 16

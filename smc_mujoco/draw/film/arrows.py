@@ -19,7 +19,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 HINGE, SLIDE = 0.425, 0.08  # length of the longest arrow: of the pendulum's, of the rail's
-THICKNESS = 0.035  # m, at a slide
+THICKNESS, SHORT = 0.035, 0.008  # m, at a slide, and at most that part of its rail
 OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent
 NETWORK = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
@@ -62,7 +62,9 @@ def mounts(
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
     plant = scenario.plant
     extent = float(assembly.model([scenario]).stat.extent) if plant.direct else 0.0
-    length, thick = (OWN_LENGTH * extent, OWN_THICKNESS * extent) if plant.direct else (SLIDE * rail, THICKNESS)
+    length, thick = (
+        (OWN_LENGTH * extent, OWN_THICKNESS * extent) if plant.direct else (SLIDE * rail, min(THICKNESS, SHORT * rail))
+    )
     turning = NETWORK if plant.n > 1 and not plant.direct else 1.0
     before = front if plant.direct or plant.free else None
     return [Mount(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
@@ -141,7 +143,11 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
             return
-        reach, width, out = mount.unit * HINGE * length, 0.16 * radius + 0.012 * mount.unit, arm / length
+        reach, width, out = (
+            mount.unit * HINGE * length,
+            0.16 * radius + 0.024 * mount.unit * min(length, 0.5),
+            arm / length,
+        )
         along, start = np.cross(data.xaxis[mount.joint], out), radius + 1.6 * width
     else:
         reach, width, along, out = mount.unit, mount.thick, data.xaxis[mount.joint], np.array([0.0, 0.0, 1.0])

@@ -55,7 +55,7 @@ class Coulomb(Friction):
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         dofs = dof_ids(model)
-        yield Field("dof_frictionloss", dofs, self.level)
+        yield Field("dof_frictionloss", dofs, self.level, adds=True)
         yield Field("dof_solref", dofs, HARD_SOLREF)
         yield Field("dof_solimp", dofs, HARD_SOLIMP)
 

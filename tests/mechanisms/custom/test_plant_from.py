@@ -573,7 +573,7 @@ def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
             smc.Scenario(plant=arm(), law=law)
         assert ("give each channel a partner" in str(caught.value)) == (law == "hierarchical")
     with pytest.raises(
-        smc.ScenarioError, match="acrobot's channel 1 has no actuator, and lqr does not see such a joint"
+        smc.ScenarioError, match=r"acrobot\.xml's channel 1 has no actuator, and lqr does not see such a joint"
     ):
         design.lqr(acrobot())
     for of in (design.lqr, linearisation.linear):

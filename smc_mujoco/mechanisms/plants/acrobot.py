@@ -1,0 +1,40 @@
+"""Acrobot: a double pendulum that is driven at the elbow, with a free shoulder.
+
+The equation, the parameters and their source stand in double_pendulum.py, with u = (0, u). Driven channels come first:
+channel 0 is the elbow's angle q2; channel 1, which is only measured, the shoulder's angle q1, from hanging. (0, pi) is
+upright. Dry friction is left out of the nominal f and g.
+"""
+
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plants import double_pendulum as both
+
+
+def build(n):
+    spec = both.build(n)
+    spec.delete(spec.actuator("u1"))
+    return spec
+
+
+def nominal(x, v, i, p):
+    f1, f2, _, g1, g2 = both.accelerations(
+        x[1], x[0], v[1], v[0], p.m1, p.m2, p.l1, p.r1, p.r2, p.I1, p.I2, p.Ir, p.gear, p.b1, p.b2, p.grav
+    )
+    return (f2, g2) if i == 0 else (f1, g1)
+
+
+ACROBOT = Plant(
+    name="acrobot",
+    parameters=both.MODEL_1_1,
+    mass="m2",
+    unit="rad",
+    x0=(0.5, 1.0),
+    n=2,
+    sizes=(2, 2),
+    build=build,
+    fields=both.fields,
+    nominal=nominal,
+    lane=(0.9, 0.0, 0.0),
+    underactuated=True,
+    limits=(both.LIMIT,),
+    dry=("cf1", "cf2"),
+)

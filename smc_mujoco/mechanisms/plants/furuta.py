@@ -1,0 +1,85 @@
+"""Furuta pendulum: an inverted pendulum on the end of an arm that u turns about the vertical: two joints, one torque.
+
+    (J + m L^2 + Jp sin(q)^2) x'' + m L l cos(q) q'' + 2 Jp sin(q) cos(q) x' q' - m L l sin(q) q'^2
+                                                                              = u + d - b x' - cf sgn(x')
+    m L l cos(q) x'' + Jp q'' - Jp sin(q) cos(q) x'^2 - m grav l sin(q) = -bq q' - cfq sgn(q'),    Jp = Jc + m l^2
+
+Channel 0 is the arm's angle x in rad about the vertical. Channel 1, which is only measured, is the angle q in rad of
+the pendulum from upright, positive towards growing x; pi is hanging. J is the inertia of arm and rotor about the
+vertical, L the arm's length, l the pendulum's centre of mass from its hinge and Jc its inertia about this centre. It
+has none about its length. The friction b, bq, cf, cfq is 0. The dry friction is left out of the nominal f and g.
+Source: Quanser's QUBE-Servo 2 with the rotary pendulum, its published numbers: rotor 4e-6 kg m^2, arm 0.095 kg of
+0.085 m, pendulum 0.024 kg of 0.129 m, uniform. The arm's inertia is m r^2/12 as in BlueRiverTech's
+quanser-openai-driver; Quanser's own file for the QUBE-Servo 3 has m r^2/3. The motor gives at most k V / R = 0.05 N m
+at rest, with k = 0.042 N m/A, R = 8.4 ohm and V = 10 V.
+"""
+
+from math import cos, sin
+
+import mujoco
+
+from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+
+LEAST = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
+STALL = 0.042 * 10.0 / 8.4  # N m
+
+
+def build(n):
+    return mujoco.MjSpec.from_file(str(model_path("furuta.xml")))
+
+
+def fields(model, p):
+    arm, pendulum = model.body("arm").id, model.body("pendulum").id
+    dofs = [model.joint(name).dofadr[0] for name in ("arm", "hinge")]
+    yield Field("body_mass", pendulum, p.m)
+    yield Field("body_inertia", arm, (p.J, p.J, p.J - LEAST))
+    yield Field("body_inertia", pendulum, (p.Jc + LEAST, p.Jc, LEAST))  # as none about its length, with the arm's
+    yield Field("body_ipos", pendulum, (0.0, 0.0, p.l))
+    yield Field("body_pos", pendulum, (0.0, -p.L, 0.0))
+    yield Field("dof_damping", dofs, (p.b, p.bq))
+    yield Field("dof_frictionloss", dofs, (p.cf, p.cfq))
+    yield Field("opt.gravity", 2, -p.grav)
+    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, p.l))
+    yield Field("geom_size", (model.geom("rod").id, 1), p.l)
+
+
+def nominal(x, v, i, p):
+    s, c, Jp = sin(x[1]), cos(x[1]), p.Jc + p.m * p.l * p.l
+    around, lever = p.J + p.m * p.L * p.L + Jp * s * s, p.m * p.L * p.l * c
+    along = p.m * p.L * p.l * s * v[1] * v[1] - 2.0 * Jp * s * c * v[0] * v[1] - p.b * v[0]
+    about = Jp * s * c * v[0] * v[0] + p.m * p.grav * p.l * s - p.bq * v[1]
+    whole = around * Jp - lever * lever
+    if i == 0:
+        return (Jp * along - lever * about) / whole, Jp / whole
+    return (around * about - lever * along) / whole, -lever / whole
+
+
+FURUTA = Plant(
+    name="furuta",
+    label="Furuta pendulum",
+    # kg m^2, m, kg, m, kg m^2, N m s/rad, N m s/rad, N m, N m, m/s^2
+    parameters={
+        "J": 4e-6 + 0.095 * 0.085**2 / 12,
+        "L": 0.085,
+        "m": 0.024,
+        "l": 0.129 / 2,
+        "Jc": 0.024 * 0.129**2 / 12,
+        "b": 0.0,
+        "bq": 0.0,
+        "cf": 0.0,
+        "cfq": 0.0,
+        "grav": 9.81,
+    },
+    mass="m",
+    unit="rad",
+    x0=(0.0, 0.2),
+    n=2,
+    sizes=(2, 2),
+    build=build,
+    fields=fields,
+    nominal=nominal,
+    lane=(0.32, 0.0, 0.0),
+    underactuated=True,
+    limits=(STALL,),
+    dry=("cf", "cfq"),
+)

@@ -1,0 +1,238 @@
+"""The plants of real rigs: Furuta pendulum, double pendulum with its two ways to drive it, servo axis.
+
+The equations are written again here, as mass matrix and forces; nothing of the plants' own `nominal` is used for them.
+"""
+
+import functools
+import math
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.part import joint_ids
+from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_0
+
+GRAV = 9.81
+STATES = 1000
+# plant -> parameters that have friction and rotors of every kind
+ROUGH = {
+    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5},
+    "double_pendulum": MODEL_1_0,
+    "pendubot": MODEL_1_0,
+    "acrobot": MODEL_1_0,
+    "servo_axis": {},
+}
+PLANTS = pytest.mark.parametrize("name", ROUGH)
+# Channels of a plant -> its joints in the order of the equation below.
+ORDER = {"acrobot": [1, 0]}
+
+
+def furuta(p, q, v, u):
+    """(x'', q'') by Lagrange's equations of the arm and of the pendulum as a rod without thickness."""
+    Jp = p.Jc + p.m * p.l**2
+    s, c = math.sin(q[1]), math.cos(q[1])
+    mass = np.array([[p.J + p.m * p.L**2 + Jp * s * s, p.m * p.L * p.l * c], [p.m * p.L * p.l * c, Jp]])
+    gyration = np.array([2 * Jp * s * c * v[0] * v[1] - p.m * p.L * p.l * s * v[1] ** 2, -Jp * s * c * v[0] ** 2])
+    friction = np.array([p.b, p.bq]) * v + np.array([p.cf, p.cfq]) * np.sign(v)
+    return np.linalg.solve(mass, [u[0], 0.0] - gyration - friction + [0.0, p.m * GRAV * p.l * s])
+
+
+def double_pendulum(p, q, v, u):
+    """(q1'', q2''): each link's mass at its centre, by Jacobians, with its inertia and the rotors'."""
+    mass, force = np.zeros((2, 2)), np.array(u, float)
+    one, two = q[0], q[0] + q[1]
+    turns = (np.array([1.0, 0.0]), np.array([1.0, 1.0]))  # of each link, by the joints
+    for m, I, r, arm, turn in ((p.m1, p.I1, p.r1, (), turns[0]), (p.m2, p.I2, p.r2, (p.l1,), turns[1])):
+        parts = [(length, one, turns[0]) for length in arm] + [(r, one if turn is turns[0] else two, turn)]
+        jacobian = sum(length * np.outer([math.cos(a), math.sin(a)], by) for length, a, by in parts)
+        drift = np.sum([length * (by @ v) ** 2 * np.array([-math.sin(a), math.cos(a)]) for length, a, by in parts], 0)
+        mass += m * jacobian.T @ jacobian + (I - m * r**2) * np.outer(turn, turn)
+        force -= m * jacobian.T @ (drift + np.array([0.0, p.grav]))
+    mass += p.Ir * (p.gear**2 * np.outer([1, 0], [1, 0]) + np.outer([1, -p.gear], [1, -p.gear]))
+    return np.linalg.solve(mass, force - np.array([p.b1, p.b2]) * v - np.array([p.cf1, p.cf2]) * np.sign(v))
+
+
+def servo_axis(p, q, v, u):
+    return (u - p.b * v - p.cf * np.sign(v) - p.offset) / p.M
+
+
+def acceleration(name, p, x, v, u):
+    """x'' of the channels, (n,), from their x and v, (n,) each, and the commands of the driven ones."""
+    order = ORDER.get(name, [0, 1])[: len(x)]
+    equation = {"furuta": furuta, "servo_axis": servo_axis}.get(name, double_pendulum)
+    force = np.zeros(len(x))
+    force[: len(u)] = u
+    return equation(p, np.take(x, order), np.take(v, order), np.take(force, order))[order]
+
+
+def states(name, plant, rng):
+    """Random states and commands, each joint fast enough that dry friction cannot stop it within a step."""
+    for _ in range(STATES):
+        v = rng.uniform(1, 5, plant.n) * rng.choice([-1, 1], plant.n)
+        scale = 0.01 if name == "furuta" else 1.0
+        yield rng.uniform(-3, 3, plant.n), v, scale * rng.uniform(-1, 1, plant.driven) * plant.limits[0]
+
+
+@PLANTS
+@pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
+def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
+    rng = np.random.default_rng(5)
+    plant = smc.plant(name, **ROUGH[name] if rough else dict.fromkeys(smc.plant(name).dry, 0.0))
+    assert plant.smooth == (not rough)
+    model, p = plant.load(), SimpleNamespace(**plant.parameters)
+    data, joints = mujoco.MjData(model), joint_ids(model)
+    worst = 0.0
+    for x, v, u in states(name, plant, rng):
+        data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u
+        mujoco.mj_forward(model, data)
+        expected = acceleration(name, p, x, v, u)
+        worst = max(worst, np.abs(data.qacc[joints] - expected).max() / max(1.0, np.abs(expected).max()))
+    assert worst < 1e-9
+
+
+@PLANTS
+def test_nominal_is_the_equation_without_dry_friction(name):
+    rng = np.random.default_rng(6)
+    plant = smc.plant(name, **ROUGH[name])
+    p = SimpleNamespace(**{**plant.parameters, **dict.fromkeys(plant.dry, 0.0)})
+    for x, v, u in list(states(name, plant, rng))[:50]:
+        expected = acceleration(name, p, x, v, u)
+        for i in range(plant.n):
+            others = (u,) if name == "double_pendulum" else ()
+            f, g = plant.nominal(x, v, i, p, *others)
+            assert f + g * u[i % plant.driven] == pytest.approx(expected[i], rel=1e-10, abs=1e-10)
+
+
+START = {"furuta": (0.0, 2.6), "servo_axis": 0.1, "acrobot": (0.5, 1.0)}  # the Furuta pendulum about hanging
+
+
+@PLANTS
+def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(name):
+    plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))
+    v0 = 1.0 if name == "servo_axis" else 0.0
+    common = {"control_period": 2e-3, "physics_step": 2e-3, "duration": 2.0}
+    trace = smc.run(smc.Scenario(plant=plant, law="none", x0=START.get(name, (1.0, 0.5)), v0=v0, **common))
+    assert trace.scenario.resolved.integrator == "RK4"
+    p, n = SimpleNamespace(**plant.parameters), plant.n
+
+    def slope(t, y):
+        return np.concatenate([y[n:], acceleration(name, p, y[:n], y[n:], np.zeros(plant.driven))])
+
+    start = np.concatenate([trace.x[0], trace.v[0]])
+    found = solve_ivp(slope, (0, 2), start, "DOP853", trace.t, rtol=1e-11, atol=1e-12)
+    assert np.abs(found.y[:n].T - trace.x).max() < 1e-6
+    assert np.ptp(trace.x) > 0.2
+
+
+def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):
+    """q of an independent RK4 at 2 ms of the double pendulum, (K+1, 2), under torques (K, 2)."""
+    y, found = np.array([*x, 0.0, 0.0]), [x]
+
+    def slope(y, u):
+        return np.concatenate([y[2:], double_pendulum(p, y[:2], y[2:], u)])
+
+    for u in torque[: round(seconds / period)]:
+        k1 = slope(y, u)
+        k2 = slope(y + period / 2 * k1, u)
+        k3 = slope(y + period / 2 * k2, u)
+        k4 = slope(y + period * k3, u)
+        y = y + period / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        found.append(y[:2])
+    return np.array(found)
+
+
+@functools.cache
+def played(times, torque):
+    """A law that gives the torque of a table, held between its times, whatever it measures."""
+
+    @smc.law_function(plants=("pendubot", "acrobot"), memory=1)
+    def table(y, gains, memory):
+        k = min(int(y.t / times + 0.5), len(torque) - 1)
+        return torque[k], 0.0
+
+    return table()
+
+
+@pytest.mark.parametrize("name", ["pendubot", "acrobot"])
+@pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
+def test_model_1_1_equals_an_independent_rk4(name, driven):
+    profile = np.sin(np.arange(1000) * 2e-3 * 7.0) * 2.0 * driven
+    trace = smc.run(
+        smc.Scenario(
+            plant=name,
+            law=played(2e-3, tuple(profile)),
+            x0=(0.8, -0.3),
+            control_period=2e-3,
+            physics_step=2e-3,
+            duration=2.0,
+        )
+    )
+    column, order = (0, [0, 1]) if name == "pendubot" else (1, [1, 0])
+    torque = np.zeros((1000, 2))
+    torque[:, column] = profile
+    expected = runge_kutta(SimpleNamespace(**smc.plant(name).parameters), np.take((0.8, -0.3), order), torque)
+    assert np.abs(trace.x[:, order] - expected).max() < 1e-6
+    assert np.abs(trace.u[:-1, 0] - profile).max() == 0.0
+
+
+def test_the_published_mass_matrix_has_rotors_as_here():
+    """M of the published design: gear^2 Ir + Ir at the shoulder, gear^2 Ir at the elbow, -gear Ir between them."""
+    plant = smc.plant("double_pendulum", **MODEL_1_0)
+    p, model = SimpleNamespace(**plant.parameters), plant.load()
+    data, full = mujoco.MjData(model), np.zeros((2, 2))
+    data.qpos[1] = 0.7
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, full)
+    a = p.m2 * p.l1 * p.r2 * math.cos(0.7)
+    rotor = p.gear**2 * p.Ir
+    first = p.I1 + p.I2 + p.m2 * p.l1**2 + 2 * a + rotor + p.Ir
+    np.testing.assert_allclose(full, [[first, p.I2 + a - p.gear * p.Ir], [p.I2 + a - p.gear * p.Ir, p.I2 + rotor]])
+
+
+def test_the_weight_is_drawn_at_the_end_of_the_lower_link():
+    model = smc.plant("double_pendulum", l1=0.25).load()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    shoulder = data.xanchor[model.joint("shoulder").id]
+    down = shoulder[2] - data.geom_xpos[model.geom("weight").id][2]
+    assert down == pytest.approx(0.25 + L2)
+
+
+def test_dry_friction_holds_the_axis_and_lets_go_at_its_level():
+    cf, offset = (smc.plant("servo_axis").parameters[name] for name in ("cf", "offset"))
+    pushes = [sign * cf * part + offset for sign in (-1, 1) for part in (0.95, 1.05)]
+    runs = [
+        smc.Scenario(plant="servo_axis", law="none", x0=0.0, disturbance=smc.Constant(push), duration=0.5)
+        for push in pushes
+    ]
+    moved = [abs(trace.x[-1, 0]) for trace in smc.run(runs)]
+    assert max(moved[0], moved[2]) < 1e-6
+    assert min(moved[1], moved[3]) > 1e-4
+
+
+def test_friction_of_a_part_is_added_to_that_of_the_plant():
+    """The axis of the plant's friction and a part's is that of both in the plant."""
+    base = smc.plant("servo_axis").parameters
+    common = {"law": "none", "v0": 1.0, "duration": 0.4}
+    both = smc.plant("servo_axis", cf=base["cf"] + 5.0)
+    beside, inside = smc.run(
+        [smc.Scenario(plant="servo_axis", friction=smc.Coulomb(5.0), **common), smc.Scenario(plant=both, **common)]
+    )
+    np.testing.assert_allclose(beside.x, inside.x, atol=1e-12)
+
+
+@PLANTS
+def test_a_negative_dry_friction_is_refused(name):
+    key = smc.plant(name).dry[0]
+    with pytest.raises(smc.ScenarioError, match=f"{name}'s {key} is -1: give at least 0"):
+        smc.plant(name, **{key: -1.0})
+
+
+@PLANTS
+def test_the_motor_limits_the_command(name):
+    limit = {"furuta": 0.05, "servo_axis": 351.507}.get(name, 6.0)
+    assert smc.Scenario(plant=name, law="none").limits == (pytest.approx(limit),) * smc.plant(name).driven
