@@ -2,27 +2,27 @@
 
     median_interval([1.2, 1.3, math.inf])              # Interval(median=1.3, low=1.2, high=inf, n=3)
 
-Seeds are the sample. Conditions and plants are fixed blocks, and a seed gives all of them, under every law, the same
-start and noise; so seeds are drawn again as wholes (A. C. Davison, D. V. Hinkley, Bootstrap Methods and Their
-Application, 1997, 3.8). inf is "never" or a failed run: worst, and as bad as any other.
+Seeds are the sample. Conditions and plants are fixed blocks. A seed determines the initial state and the noise in all
+blocks, for every law, so the bootstrap draws whole seeds (A. C. Davison, D. V. Hinkley, Bootstrap Methods and Their
+Application, 1997, 3.8). inf stands for "never" or a failed run. It is the worst value, and two of them are equal.
 
-Intervals are percentile bootstraps (B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13): their
-ends are values of the sample, so that inf is no difficulty. BCa needs the jackknife, which fails for the median
-(ch. 11). The percentiles are those of T. C. Hesterberg (The American Statistician 69(4), 2015), farther out where seeds
-are few. The binomial interval of order statistics, the alternative, knows no blocks; of a single block the bootstrap's
-ends are order statistics too, and cover as the binomial distribution says: 93 % or more with 6 to 40 seeds, and
-1 - 2^(1 - n) with fewer, which is all that the range of a sample can cover.
+Intervals are percentile bootstraps (B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13). Their
+ends are values of the sample, so inf is no problem. BCa needs the jackknife, which fails for the median (ch. 11). The
+percentiles are those of T. C. Hesterberg (The American Statistician 69(4), 2015), which are wider for few seeds. The
+alternative, the binomial interval of order statistics, cannot treat blocks. For a single block the ends of the
+bootstrap are order statistics too, and their coverage follows from the binomial distribution: 93 % or more with 6 to 40
+seeds, and 1 - 2^(1 - n) with fewer, the coverage of the sample's range.
 
-A block may have fewer runs than there are seeds: seeds that change nothing in it are one run. It is fixed all the same,
-and a resample that draws none of its runs takes each of them once.
+A block may have fewer runs than there are seeds, because seeds that change nothing in it count as one run. A resample
+that draws none of the block's runs takes each of them once.
 
-An interval is about starts and noise, and little else. Gains that were tuned from three seeds come in turn, run s
-with those of tuning seed s modulo 3, and so 16 runs have three samples of tuning, not 16. If gains differ much from one
-tuning seed to the next, the runs of one tuning are alike, the interval is too narrow, and the sign test of `ranking`
-too sure. For laws tuned from one seed the intervals hold for these gains alone.
+An interval expresses the effect of initial states and noise only. Gains that were tuned from three seeds are used in
+turn: run s has those of tuning seed s modulo 3. So 16 runs have three samples of tuning, not 16. If gains differ much
+between tuning seeds, the runs with one tuning are alike, the interval is too narrow, and the p-values of `ranking` are
+too small. For laws tuned from one seed, intervals hold for these gains only.
 
-The median of several blocks is the median of their medians. A law with the lower median in every block then has the
-lower one over all of them; the median of all runs together does not promise that.
+The median of several blocks is the median of their medians. Then a law with the lower median in every block also has
+the lower median overall, which the median of all runs together does not guarantee.
 """
 
 import functools
@@ -35,17 +35,17 @@ from numpy.typing import ArrayLike
 
 from smc_mujoco.common.errors import ScenarioError, number, whole
 
-RESAMPLES = 1999  # chosen; one more is a whole number of usual percentiles
+RESAMPLES = 1999  # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
 
 
 class Interval(NamedTuple):
     """A median, or a share, with its interval.
 
     Attributes:
-      median: of the values; of `share_interval` the share.
-      low: NaN if unknown, for the median of a single seed.
-      high: likewise; inf where it may be "never".
-      n: seeds.
+      median: of the values; for `share_interval` the share.
+      low: lower end; NaN for the median of a single seed.
+      high: upper end; NaN for the median of a single seed, inf if it may be "never".
+      n: number of seeds.
     """
 
     median: float
@@ -61,12 +61,13 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
     of the two to the resampled higher.
 
     Args:
-      values: (n,), a value a seed; or (blocks, n), whose columns are drawn together, for the median of the
-        blocks' medians; inf for never.
-      level: of the interval.
+      values: (n,), a value per seed; or (blocks, n), whose columns are drawn together, for the median of the
+        blocks' medians. inf for never.
+      level: level of confidence.
+      resamples, seed: number of resamples, and seed of their draws.
 
     Raises:
-      ScenarioError: no values, or NaN: whether it stands for a failure or for nothing is for the caller to say.
+      ScenarioError: no values, or NaN, which may mean a failure or a missing value.
     """
     rows = np.atleast_2d(np.asarray(values, float))
     if rows.ndim != 2 or not rows.size:
@@ -77,7 +78,7 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
 
 
 def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
-    """As `median_interval`, of (blocks, n) in which NaN is a cell without a run; no column is without any."""
+    """As `median_interval`, for (blocks, n) in which NaN is a cell without a run. Every column has a run."""
     n, centre = values.shape[1], float(middle(middle(values)))
     if n < 2:
         return Interval(centre, math.nan, math.nan, n)
@@ -87,17 +88,17 @@ def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLE
 
 
 def middle(values: np.ndarray) -> np.ndarray:
-    """Return the median over the last axis, leaving out NaN; NaN where all values are."""
+    """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
     low, high = (np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2))
     return ((low + high) / 2)[..., 0]
 
 
 def drawn_medians(values: np.ndarray, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and upper of the middle two values of each block, in each resample of its seeds.
+    """Return the lower and the upper of the two middle values of each block, in each resample of its seeds.
 
     Args:
-      values: (blocks, n), NaN where no run is; no block is without any.
+      values: (blocks, n), NaN where there is no run. Every block has a run.
       drawn: (n, resamples), how often each seed is drawn.
 
     Returns:
@@ -121,10 +122,10 @@ def counts(drawn: np.ndarray, runs: np.ndarray) -> np.ndarray:
 
 
 def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
-    """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not empty at 0 and 1.
+    """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not empty for 0 and 1.
 
-    A seed's own share lies in [0, 1] and so varies by p (1 - p) at most: with n the seeds, however many runs each has
-    and however alike they are, the interval is wide enough.
+    The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number of seeds the
+    interval is wide enough, however many runs a seed has and however alike they are.
     """
     number("share", share, least=0.0, most=1.0)
     whole("n", n, 1, 10**9)
@@ -147,7 +148,7 @@ def draws(n: int, resamples: int, seed: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=32)
 def outermost(n: int, level: float, resamples: int) -> int:
-    """Return at which resample, counted from either end, an interval of n >= 2 seeds ends.
+    """Return the index of the resample, counted from either end, at which an interval of n >= 2 seeds ends.
 
     Hesterberg's expanded percentile, Phi(-sqrt(n / (n - 1)) t), t being Student's with n - 1 degrees of freedom.
     """
@@ -158,5 +159,5 @@ def outermost(n: int, level: float, resamples: int) -> int:
 
 
 def confidence(level: float) -> float:
-    """Return a level of confidence, or refuse it."""
+    """Return a level of confidence. Raise ScenarioError if it is out of range."""
     return number("level", level, least=0.5, most=0.999)

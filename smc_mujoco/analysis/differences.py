@@ -1,27 +1,27 @@
-"""When two values of a metric differ: by more than rounding, and by enough to matter.
+"""The least relevant difference of two values of a metric, and differences by rounding.
 
     exceeds(0.31, 0.30)                                # True: more than 3 % of the larger value
     exceeds(0.31, 0.30, scale=2.5)                     # False: less than 0.5 % of the scale
 
-The least relevant difference is one for all that is compared: laws in `ranking`, and what claims call larger or slower.
+All comparisons use the same least relevant difference: `ranking` of laws, and claims about larger or slower values.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-OF_VALUE, OF_SCALE = 0.03, 0.005  # the least relevant difference: more than these shares, see `least_difference`
-# In SI units, and relative: runs that differ by less are tied, for how they are integrated decides about it.
+OF_VALUE, OF_SCALE = 0.03, 0.005  # shares in the least relevant difference, see `least_difference`
+# In SI units, and relative: smaller differences are a tie, because they depend on how runs are integrated.
 ROUNDING, ALIKE = 1e-9, 1e-6
 
 
 def least_difference(value: ArrayLike, scale: ArrayLike = 0.0, resolution: ArrayLike = 0.0) -> np.ndarray:
     """Return the least relevant difference between a value >= 0 and a smaller one.
 
-    It is the largest of 3 % of the value, 0.5 % of the scale, and the resolution; any difference from inf is relevant.
+    It is the largest of 3 % of the value, 0.5 % of the scale, and the resolution. Any difference from inf is relevant.
 
     Args:
-      scale: of such values: of a position error the largest |x0|, of a command u_max, of a percentage 100.
-      resolution: the least difference that the sensor can tell; 0 for any.
+      scale: usual size of such values: the largest |x0| for a position error, u_max for a command, 100 for percentages.
+      resolution: least difference that the sensor can resolve; 0 for any.
     """
     own = OF_VALUE * np.where(np.isinf(value), 0.0, np.abs(value))
     return np.maximum(np.maximum(own, OF_SCALE * np.abs(scale)), np.maximum(resolution, ROUNDING))
@@ -33,7 +33,7 @@ def exceeds(a: ArrayLike, b: ArrayLike, scale: ArrayLike = 0.0, resolution: Arra
 
 
 def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return 1.0 where a is larger than b, -1.0 where smaller, 0.0 for a difference of rounding; NaN where both are."""
+    """Return 1.0 where a is larger than b, -1.0 where smaller, 0.0 where equal up to rounding; NaN where a is NaN."""
     tie = np.maximum(ROUNDING, ALIKE * np.minimum(np.abs(a), np.abs(b)))
     return np.where(np.isnan(a), np.nan, (a > b + tie).astype(float) - (b > a + tie))
 

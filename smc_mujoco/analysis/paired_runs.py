@@ -1,7 +1,7 @@
-"""A table's runs by group, and in each the cells - plant, condition, seed - in which every law ran.
+"""Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran.
 
 for group in groups(table, by=("plant",)):
-    group.scores(values(table, "itae"))        # law -> (blocks, seeds), and its outcomes, as `ranking` takes them
+    group.scores(values(table, "itae"))        # blocks, law -> (blocks, seeds), and outcomes, for `ranking`
 """
 
 import contextlib
@@ -20,27 +20,27 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
 
-SETTLES = "settles"  # no metric of a run: whether its settling time is finite
+SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 GROUPS = ("plant", "condition")
-FREE = ("law", "model", "surface", "velocity", "versions")  # of a run's description: what may differ within a cell
+FREE = ("law", "model", "surface", "velocity", "versions")  # entries of descriptions that may differ within a cell
 
 
 class Columns(Protocol):
-    """A table, a row a run: plant, law, condition, seed, failure, diverged_at, and every metric."""
+    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and every metric."""
 
     def column(self, name: str) -> np.ndarray:
-        """Return values by row; None or NaN for none."""
+        """Return the values of a column, with None or NaN for missing ones."""
         ...
 
     def scenario(self, i: int) -> Scenario:
-        """Return what ran in row i, or raise ScenarioError where that cannot be restored."""
+        """Return the scenario of row i. Raise ScenarioError if it cannot be restored."""
         ...
 
 
 def values(table: Columns, metric: str) -> np.ndarray:
-    """Return a metric by row: inf for a failed run, NaN where it does not apply. "settles" is 0.0 if it does, else 1.0.
+    """Return a metric by row: inf for a failed run, NaN where it does not apply.
 
-    A metric does not apply to a plant if all runs lack it that did not fail.
+    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no successful run has it.
     """
     scores = np.array(table.column("settling_time" if metric == SETTLES else metric), float)
     failed = np.array([failure is not None for failure in table.column("failure")], bool)
@@ -57,11 +57,11 @@ class Group:
     """The runs that share a plant, a condition, or both.
 
     Attributes:
-      name: what they share.
-      laws: that ran, by name.
+      name: the plant or condition that they share, or both, as column -> value.
+      laws: names of the laws that ran.
       blocks: (plant, condition), in the table's order.
-      rows: (laws, blocks, seeds), the row of each run in the table; -1 where no run is.
-      outcome: (laws, blocks, seeds), equal for runs of a law that are the same but for rounding; -1 where no run is.
+      rows: (laws, blocks, seeds), the row of each run in the table; -1 where there is no run.
+      outcome: (laws, blocks, seeds), equal for runs of a law that differ only by rounding; -1 where there is no run.
     """
 
     name: Mapping[str, str]
@@ -88,8 +88,8 @@ class Group:
     def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Return the blocks in which a metric applies, law -> (these blocks, seeds), and law -> its outcomes in them.
 
-        Of no blocks, {} twice. Scores are NaN in cells that not all laws have, and in seeds in which every law has done
-        the same as in an earlier one.
+        Without such blocks both dicts are empty. Scores are NaN in cells that not all laws have, and in seeds in which
+        every law did the same as in an earlier seed.
 
         Raises:
           ScenarioError: the laws share no cell.
@@ -146,7 +146,7 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
     first: dict[tuple, tuple[str, dict[str, Any]]] = {}
     for cell, law, text in zip(cells, columns["law"], texts, strict=True):
         about = {name: value for name, value in json.loads(text).items() if name not in FREE}
-        about["plant"].get("mjcf", {}).pop("path", None)  # its contents tell models apart
+        about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
         known, other = first.setdefault(cell, (law, about))
         if about != other and (difference := _difference(other, about)):
             what, one, two = difference
@@ -157,7 +157,7 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, Any, Any] | None:
-    """Return the first entry in which two descriptions differ, with its values; None where only one of them has it."""
+    """Return the first entry in which two descriptions differ, with its values; None if common entries are equal."""
     for name in (key for key in one if key in two):
         a, b = one[name], two[name]
         if isinstance(a, list) and isinstance(b, list) and a and isinstance(a[0], dict) and len(a) == len(b):
@@ -166,19 +166,19 @@ def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, An
             if a != b:
                 return str(name), a, b
         elif difference := _difference(a, b):
-            inner = isinstance(name, int) or name == "values"  # no names of a user's
+            inner = isinstance(name, int) or name == "values"  # these are not names that users know
             return difference if inner else (f"{name}'s {difference[0]}", *difference[1:])
     return None
 
 
 def _outcomes(table: Columns) -> np.ndarray:
-    """Return a number for each row: the same for runs that are the same in every metric, but for rounding."""
+    """Return a number for each row: the same for runs whose metrics are all equal up to rounding."""
     columns = []
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
-        with contextlib.suppress(ScenarioError):  # a metric that was not there when the table was written
+        with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
             columns.append(np.array(table.column(name), float))
     numbers = np.ascontiguousarray(coarse(np.stack(columns, axis=1)))
-    numbers[np.isnan(numbers)] = math.nan  # one kind of it
+    numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
     return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
 
 
@@ -210,8 +210,8 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
 def floor(scenario: Scenario | None, unit: str) -> float:
     """Return the least relevant difference of any two values of a metric in this unit; 0 for no scenario.
 
-    0.5 % of the scale of such values, see `differences`: of the largest |x0| of a driven channel, of the bound on u, of
-    100 %. For a position also half a count of the encoder, where there is one.
+    It is 0.5 % of the scale of such values, see `differences`: the largest |x0| of a driven channel, the bound on u, or
+    100 %. For a position it is at least half a count of the encoder, if there is one.
     """
     if scenario is None:
         return 0.0

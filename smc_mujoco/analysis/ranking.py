@@ -1,11 +1,11 @@
-"""Laws compared on the runs that they share: which is better in which block, and their places over all blocks.
+"""Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
     comparison = compare({"classical": a, "adaptive": b})  # a, b: (blocks, seeds), lower is better
     comparison.best                                    # the laws of each block that no other is better than
     ranks(comparison)                                  # the laws' places over all blocks
 
-As in `bootstrap`, seeds are the sample, blocks are fixed, and inf is worst, two of them tied. One law is better than
-another in a block if three things hold.
+As in `bootstrap`, seeds are the sample, blocks are fixed, and inf is the worst value, equal to itself. One law is
+better than another in a block if three conditions hold.
 
 - Its median is lower by more than the least relevant difference, see `differences`. Smaller differences are ties.
 - It is ahead in more seeds, and the sign test over them rejects that both are ahead equally often (W. J. Conover,
@@ -14,15 +14,15 @@ another in a block if three things hold.
   of laws in all blocks: the probability that any law is wrongly called better, in any block, is at most 1 - level.
 - There are at least 16 seeds. With fewer, hardly anything survives the correction.
 
-A seed is a sample of two laws if it changes one of them. If both do what they did in an earlier seed, it is the same
-run again: such seeds count once in the test and among the 16, whatever other laws do in them.
+A seed is a sample of two laws if it changes the result of one of them. If both have the same results as in an earlier
+seed, the pair of runs is repeated: such seeds count once in the test and among the 16, whatever other laws do in them.
 
 A law that no other is better than is among the best of its block; if it is the only one, it is the winner. "Better"
 follows the medians, so every block has a best law, and a winner has the lowest median.
 
 A law's rank in a block is that of its median; medians that differ by less than the least relevant difference are tied.
-Its place is by its mean rank over the blocks. Hence a law that wins in every block has the first place. Friedman's test
-says whether the order would hold in other conditions.
+Its place follows from its mean rank over the blocks. So a law that wins in every block has the first place. Friedman's
+test says whether the order would hold in other conditions.
 """
 
 import dataclasses
@@ -45,14 +45,13 @@ class Rank(NamedTuple):
     """A law's place among laws, 1 the best; ties share the mean of their places.
 
     Attributes:
-      law: its name.
-      mean: its mean rank over the blocks.
-      place: by mean rank.
-      median: of that place over draws of the seeds.
-      low: of its interval; NaN for a single seed.
-      high: likewise.
-      p: the least corrected p-value with which another law is ahead of it in a block; 1 if none is.
-      best: whether it is among the best of every block.
+      law: name of the law.
+      mean: mean rank over the blocks.
+      place: place by mean rank.
+      median: median of the place over resamples of the seeds.
+      low, high: interval of the place; NaN for a single seed.
+      p: least corrected p-value with which another law is ahead of it in a block; 1 if none is.
+      best: whether the law is among the best of every block.
     """
 
     law: str
@@ -70,13 +69,13 @@ class Comparison:
     """Laws compared in blocks.
 
     Attributes:
-      laws: by name.
-      cells: (laws, blocks, seeds), their scores; NaN where no run is.
-      shares: whether scores are 0.0 or 1.0, and means are compared in place of medians.
-      floors: (blocks,), the least difference of medians that is relevant whatever they are.
-      level: of confidence.
-      p: (blocks, laws, laws), of the sign test, corrected, that a law is ahead of another; 1 where it is not.
-      runs: (blocks, laws, laws), in how many seeds two laws did not do what both did in an earlier one.
+      laws: names, in alphabetical order.
+      cells: (laws, blocks, seeds), the scores; NaN where there is no run.
+      shares: whether scores are 0.0 or 1.0, and means are compared instead of medians.
+      floors: (blocks,), lower bound on the least relevant difference of medians.
+      level: level of confidence.
+      p: (blocks, laws, laws), corrected p-value of the sign test that a law is ahead of another; 1 where it is not.
+      runs: (blocks, laws, laws), number of seeds that are samples of two laws.
     """
 
     laws: tuple[str, ...]
@@ -111,7 +110,7 @@ class Comparison:
 
     @property
     def pairs(self) -> int:
-        """The number of comparisons that the p-values are corrected for."""
+        """The number of comparisons for which the p-values are corrected."""
         return len(self.p) * math.comb(len(self.laws), 2)
 
 
@@ -125,12 +124,14 @@ def compare(
     """Compare every law with every other in every block.
 
     Args:
-      scores: law -> (blocks, n) or (n,), lower is better, inf for never; NaN, in all laws, where no run is.
+      scores: law -> (blocks, n) or (n,), lower is better, inf for never. NaN, for all laws alike, where there is no
+        run.
       floors: one for all blocks, or one for each, see `Comparison`.
-      outcomes: law -> a number a cell, equal where the law did the same from two seeds. Default: all runs differ.
+      shares, level: see `Comparison`.
+      outcomes: law -> a number per cell, equal if the law had the same result from two seeds. Default: all runs differ.
 
     Raises:
-      ScenarioError: no laws, or not of the same cells.
+      ScenarioError: no laws, or laws with different cells.
     """
     laws, cells = _cells(scores)
     k, blocks, _ = cells.shape
@@ -150,7 +151,7 @@ def compare(
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the laws by name and their scores (laws, blocks, seeds), if all laws have the same cells."""
+    """Return the laws by name and their scores, (laws, blocks, seeds). Raise ScenarioError if their cells differ."""
     laws = tuple(sorted(scores))
     each = [np.atleast_2d(np.asarray(scores[law], float)) for law in laws]
     if not each or not each[0].size or len({one.shape for one in each}) > 1:
@@ -163,10 +164,11 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
 
 
 def first_of_kind(outcomes: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Return where cells (blocks, seeds) that are there are not the same as an earlier one of their block.
+    """Return which cells (blocks, seeds) exist and do not repeat the outcomes of an earlier cell of their block.
 
     Args:
-      outcomes: (laws, blocks, seeds), a number for what each law did.
+      outcomes: (laws, blocks, seeds), a number for the result of each law.
+      there: (blocks, seeds), which cells exist.
     """
     first = np.zeros(there.shape, bool)
     for block, own in enumerate(there):
@@ -185,7 +187,7 @@ def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holm(p: np.ndarray) -> np.ndarray:
-    """Correct p-values, in any shape, for their number."""
+    """Return p-values, of any shape, corrected for their number by Holm's method."""
     order = np.argsort(p, axis=None)
     corrected = np.empty(p.size)
     corrected[order] = np.minimum(np.maximum.accumulate(p.flat[order] * np.arange(p.size, 0, -1)), 1.0)
@@ -239,14 +241,14 @@ def _places(mean: np.ndarray) -> np.ndarray:
 class Friedman:
     """M. Friedman's test that laws rank alike, with P. Nemenyi's critical difference (J. Demsar, JMLR 7(1), 2006).
 
-    Here the blocks are the sample, not the seeds: would the order hold in other conditions? Demsar trusts the chi^2
-    distribution from about ten blocks on.
+    Here the sample is the blocks, not the seeds: would the order hold in other conditions? Demsar considers the chi^2
+    distribution accurate from about ten blocks on.
 
     Attributes:
-      blocks: how many.
-      mean_ranks: law -> mean rank over the blocks, in each by its median over the seeds.
-      p: the probability that laws which rank alike differ by this much.
-      critical_difference: of mean ranks; laws that differ by less cannot be distinguished.
+      blocks: number of blocks.
+      mean_ranks: law -> mean rank over the blocks, where ranks follow from medians over the seeds.
+      p: probability that laws which rank alike differ by this much.
+      critical_difference: difference of mean ranks; laws that differ by less cannot be distinguished.
     """
 
     blocks: int

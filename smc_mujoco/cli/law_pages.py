@@ -122,9 +122,9 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
       ScenarioError: an unknown property, family or plant.
     """
     found = suitable(needs, family, plant)
-    said = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
+    filters = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
     kind = plant if plant is None or isinstance(plant, str) else plant.name
-    title = f"{len(found)} of {len(laws())} laws" + f" that {' and '.join(said)}" * bool(said)
+    title = f"{len(found)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
     title += f" for {kind}" * (kind is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor where the scenario estimates it: velocity="levant".'
@@ -179,7 +179,7 @@ def _gains(template: Template) -> Iterable[str]:
 
 
 def _promises(template: Template) -> str:
-    """Return in words what theory says of a law's u and of its arrival; "" for what is no law."""
+    """Return what theory says about a law's u and its convergence, in words; "" for surfaces and estimators."""
     if template.kind != "law":
         return ""
     u = "a continuous u" if template.continuous else "u jumps"

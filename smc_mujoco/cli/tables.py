@@ -1,4 +1,4 @@
-"""Every table that the command line prints: scores, answers, traces, leaderboards, margins, tunings, claims."""
+"""Tables of the command line: scores, answers, traces, leaderboards, margins, tunings, claims."""
 
 import math
 import textwrap
@@ -242,7 +242,7 @@ def _sample(blocks: Sequence[Block]) -> str:
 
 
 def _block_cell(board: Board | None, like: Block) -> Text:
-    """Return the winner of the board's block like another's, with its median and the second; or how many are level."""
+    """Return the winner of the block with the plant and condition of `like`, and two medians; or how many are level."""
     blocks = {(block.plant, block.condition): block for block in board.blocks} if board else {}
     block = blocks.get((like.plant, like.condition))
     if board is None or block is None:
@@ -348,7 +348,7 @@ def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:
-    """Return a line for each claim: its verdicts, and the check that decides under the last set of gains."""
+    """Return a table with a line per claim: its verdicts, and the check that decides for the last set of gains."""
     sets = list(claims[0].verdicts) if claims else []
     shown = sets if len(sets) > 1 else []
     table = Table(
@@ -400,7 +400,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
 
 
 def check_sentence(one: Check) -> str:
-    """Return a check in a line: what was measured, and what the claim asks for."""
+    """Return a check in one line: the measured value, and the limit of the claim."""
     return f"{one.what} = {_measured(one.value, one.what)} (asked: {one.relation} {_measured(one.limit, one.what)})"
 
 

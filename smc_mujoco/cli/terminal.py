@@ -1,4 +1,4 @@
-"""What commands share: a console, a clock, and errors as sentences."""
+"""Console, clock, and errors as sentences, for all commands."""
 
 import contextlib
 import os

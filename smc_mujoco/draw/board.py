@@ -1,4 +1,4 @@
-"""Boards: the medians of a study's laws with their intervals, as dots, by condition."""
+"""Dot plots of a study: the median of each law with its interval, by condition."""
 
 import itertools
 import os
@@ -35,13 +35,13 @@ def plot(
 ) -> Figure | SubFigure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by condition.
 
-    A column a metric, a row of panels a plant. A dot at the right edge, under "never", is a law whose median run does
-    not settle or fails.
+    There is a column of panels per metric and a row per plant. A dot at the right edge, under "never", is a law whose
+    median run fails or does not settle.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
-      metrics: names of metrics, or "settles": the share of runs that settle.
-      path, title, size, format, fig: as of `figure`.
+      metrics: names of metrics, or "settles" for the share of runs that settle.
+      path, title, size, format, fig: as in `figure`.
 
     Returns:
       The figure.
@@ -88,7 +88,7 @@ def _there(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
 
 
 def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, colours, marks) -> None:
-    """Draw a metric of one plant: a block of lines a condition, in each a dot a law."""
+    """Draw a metric of one plant: a block of lines per condition, with a dot per law."""
     column, found = values(table, metric), {}
     of_plant, of_law, of_condition = (table.column(name) for name in ("plant", "law", "condition"))
     there = _there(table, plant, conditions)
@@ -118,7 +118,7 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
 
 
 def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
-    """Draw a median with its interval; one that is infinite stands at the right edge, under "never"."""
+    """Draw a median with its interval. An infinite median is at the right edge, under "never"."""
     never = {"transform": ax.get_yaxis_transform(), "clip_on": False}
     if np.isfinite(one.median):
         ax.plot(one.median, line, **look)
@@ -127,7 +127,7 @@ def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
         drawing.note(ax, "never")
     if np.isfinite(one.low) and np.isfinite(one.high):
         ax.plot([one.low, one.high], [line, line], color=look["color"], lw=style.points(1.5))
-    elif np.isfinite(one.low):  # reaches to "never"
+    elif np.isfinite(one.low):  # up to "never"
         ax.plot(one.low, line)  # nothing is seen: the axis comprises the interval
         look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
         ax.annotate("", (1.0, line), (one.low, line), ("axes fraction", "data"), "data", arrowprops=look)

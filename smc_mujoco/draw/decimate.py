@@ -1,8 +1,8 @@
-"""Reduce a dense signal for paper: its range in few windows of time, and one line.
+"""Reduction of a dense signal for drawing: its range in few windows of time, and one line.
 
-A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches. Its mean is what the
-plant feels: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is that mean while
-the signal chatters, and the signal itself elsewhere.
+A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches. Its mean acts on the
+plant: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is this mean while the
+signal chatters, and the signal itself elsewhere.
 """
 
 import dataclasses
@@ -14,9 +14,9 @@ import numpy as np
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 WINDOW = 0.01, 40  # of a mean: share of the run, and fewest samples; chosen, see `window`
-STILL = 2e-3  # of the largest value: smaller steps from sample to sample do not count as moves
-REVERSALS = 6  # in a row are chattering, if they follow each other within a quarter of a window
-POINTS = 250  # of a line: the least and the largest value of each is kept
+STILL = 2e-3  # of the largest value: smaller steps between samples are no moves
+REVERSALS = 6  # so many in a row are chattering, if each follows within a quarter of a window
+POINTS = 250  # parts of a line, of which the least and the largest value are kept
 
 
 class Envelope(NamedTuple):
@@ -29,7 +29,7 @@ class Envelope(NamedTuple):
 
 
 def finite(trace: Trace) -> Trace:
-    """Return the trace up to its last finite sample; if there is none, one sample: the start, and NaN for the rest."""
+    """Return the trace up to its last finite sample; if there is none, one sample with the initial state."""
     bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
     if not bad.any():
         return trace
@@ -72,8 +72,8 @@ def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
 def window(trace: Trace) -> int:
     """Return the number of samples that a mean is taken over: a multiple of 4.
 
-    Of a control that switches irregularly between +-1, the mean over w samples is uncertain by about 2 / w, and the
-    line gets teeth. The window is chosen so wide that they are thinner than a line.
+    If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w, which makes the line
+    jagged. The window is so wide that this is less than the width of the line.
     """
     share, least = WINDOW
     return 4 * round(max(share * trace.scenario.samples, least) / 4)
@@ -82,11 +82,11 @@ def window(trace: Trace) -> int:
 def stretches(y: np.ndarray, width: int) -> list[slice]:
     """Return where y (K+1,) chatters.
 
-    A move is a step from one sample to the next of more than STILL of the largest |y|. A reversal is two moves in a row
-    of opposite signs. Reversals follow each other within n samples if neither the value held in one nor the way to the
-    next takes longer. Chattering is REVERSALS of them within a quarter of the width, with all that follow each other
-    within the width before and after: from the first of their moves to the last, and to an end of y that is as near.
-    The rule is the same read backwards.
+    A move is a step between samples of more than STILL of the largest |y|. A reversal is a pair of successive moves
+    with opposite signs. Reversals are close, within n samples, if neither the time between a reversal's moves nor the
+    time to the next reversal is longer. y chatters where at least REVERSALS of them in a row are close within a quarter
+    of `width`. The stretch includes the reversals before and after that are close within `width`, from the first move
+    to the last, and extends to an end of y if that is as close. The rule is symmetric in time.
     """
     step = np.diff(y)
     moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
@@ -109,11 +109,11 @@ def stretches(y: np.ndarray, width: int) -> list[slice]:
 
 
 def smooth(y: np.ndarray, width: int) -> np.ndarray:
-    """Return y (K+1,), where it chatters replaced by its mean over `width` samples, the nearer ones weighing more.
+    """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular weights.
 
-    It is the mean of means over half the width each: a triangle, which leaves far less of a periodic signal than one
-    mean does. Within half a width of the ends of a stretch it is that of the nearest whole triangle. In a stretch
-    shorter than the width, one triangle as long as the stretch.
+    The weights result from averaging twice over half the width, which suppresses a periodic signal far better than one
+    average. Within half a width of the ends of a stretch the value is that of the nearest whole triangle. In a stretch
+    shorter than the width the triangle is as long as the stretch.
     """
     line = y.astype(float)
     for part in stretches(y, width):
@@ -129,7 +129,7 @@ def running(y: np.ndarray, width: int) -> np.ndarray:
 
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a curve for y (K+1,): smoothed where it chatters, in few points that keep every extreme."""
+    """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points that keep extremes."""
     y, size = smooth(y, width), -(-len(t) // POINTS)
     starts = np.arange(0, len(t), size)
     padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)

@@ -28,7 +28,7 @@ OVER_TIME = {  # panel -> quantity
 BESIDE = ("phase", "transient", "end")
 PANELS = (*OVER_TIME, "channels", *BESIDE)
 ROW = 1.5  # inches on a full page, height of a panel over time
-HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # of the panels beside, in proportion
+HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
 
 
 def figure(
@@ -43,16 +43,17 @@ def figure(
 ) -> Figure | SubFigure:
     """Draw traces of one plant: x, u and s over time, the phase portrait, close-ups of the transient and of the end.
 
-    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Driven
-    joints of a model of yours have small panels, one a joint, with the reference and the error. Joints without an
-    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of what the actuator
-    delivers and of what friction and contacts exert; diamonds show where friction holds them. The end of a failed run
+    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Each driven
+    joint of your own model has two small panels, with its position and reference, and with its error. Joints without an
+    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the actuator's
+    force and of the reaction of friction and contacts; diamonds show where friction holds them. The end of a failed run
     and the instant at which a plant changes are marked. Curves that coincide are dashed in turn.
 
     Args:
-      traces: several, or a single one.
-      path: file to write; default: none. Without an ending, or with .svg or .png, both are written; or give .pdf.
-      labels: one a trace; default: the laws' labels, and what differs between runs of one law.
+      traces: one or several traces.
+      path: file to write; default: none. Without an ending, or with .svg or .png, an SVG and a PNG are written; with
+        .pdf, a PDF.
+      labels: one label per trace; default: the laws' labels, with the differences between runs of one law.
       title: default: the plant's label.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels" (small panels
         of every channel), "phase", "transient" (close-up of x), "end" (close-up of u). Default: those that suit the
@@ -65,7 +66,8 @@ def figure(
       The figure.
 
     Raises:
-      ScenarioError: no traces, several plants, an unknown panel, size or format, or a path that cannot be written.
+      ScenarioError: no traces, traces of several plants, an unknown panel, size or format, or a path that cannot be
+        written.
     """
     paths = [] if path is None else pages.files(path, format)
     if path is None and format is not None:
@@ -119,7 +121,7 @@ def figure(
 
 
 def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
-    """Return cells one below the other, their heights in proportion."""
+    """Return cells one below the other, with these relative heights."""
     grid = cell.subgridspec(len(heights), 1, height_ratios=heights)
     return [grid[i] for i in range(len(heights))]
 
@@ -135,7 +137,7 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
 
 
 def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
-    """Return the panels over time, from top to bottom; of those that the plant has by default only these."""
+    """Return the chosen panels over time, from top to bottom: the plant's default ones first."""
     by_default = drawing.overview(traces)
     found = [panel for panel in by_default if any(OVER_TIME.get(name) == panel.quantity for name in chosen)]
     there = {panel.quantity for panel in by_default}
@@ -215,17 +217,18 @@ def signals(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw u alone: a column for each condition, a row for each law.
+    """Draw only u: a column for each condition, a row for each law.
 
     Args:
-      labels: the condition of each trace; traces under the same condition share it.
-      path, title, size, format, fig: as of `figure`.
+      traces: one or several traces.
+      labels: condition of each trace; traces under the same condition have the same label.
+      path, title, size, format, fig: as in `figure`.
 
     Returns:
       The figure.
 
     Raises:
-      ScenarioError: as `figure`; also two traces of one law under one condition, or u in two units.
+      ScenarioError: as in `figure`; also two traces of one law under one condition, or u in several units.
     """
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
@@ -292,7 +295,7 @@ def _key(
 
 
 def _meaning(shown: Sequence[Panel]) -> list[Handle]:
-    """Return the entries of a legend that say what bands and lines are."""
+    """Return the entries of a legend that explain bands and lines."""
     looks = {
         "band": Patch(color=style.MUTED, alpha=0.3),
         "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),

@@ -1,7 +1,7 @@
 """A page of figures: its size, title, legend and files.
 
-A figure is made anew, or drawn into a matplotlib Figure or SubFigure of the caller's, as wide as a page of this package
-(12.8 in), an IEEE page or column, or any size in inches.
+A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. It is as wide as a page of this package
+(12.8 in), an IEEE page or column, or has any size in inches.
 """
 
 import os
@@ -29,10 +29,10 @@ Size = str | tuple[float, float] | None
 
 
 def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:
-    """Return the width and height of a figure in inches; None for a height that depends on its contents.
+    """Return the width and height of a figure in inches; None for a height that depends on the contents.
 
     Raises:
-      ScenarioError: another name, other numbers, or a size for a figure that has one.
+      ScenarioError: an unknown name, numbers out of range, or a size together with `fig`, which has one.
     """
     if fig is not None:
         if size is not None:
@@ -55,7 +55,7 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
-    """Return a page to draw on, of that size in inches: `fig`, with a layout that keeps text apart, or a new one."""
+    """Return a page to draw on: `fig`, or a new one of this size in inches. Its layout keeps texts apart."""
     layout = ConstrainedLayoutEngine(
         w_pad=style.points(7.2) / 72, h_pad=style.points(5.0) / 72, wspace=0.02, hspace=0.02
     )
@@ -109,12 +109,12 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
 
 
 def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:
-    """Return the files that a figure is written to: as its ending says, SVG and PNG for .svg, .png or none.
+    """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
 
-    What follows the point in "lam_0.5" or "a.b c" is no ending.
+    ".5" in "lam_0.5" and ".b c" in "a.b c" are no endings.
 
     Raises:
-      ScenarioError: no name, another format, or an ending that is not that of the format.
+      ScenarioError: no name, an unknown format or ending, or an ending that contradicts the format.
     """
     base = Path(path)
     if not base.name or "\0" in base.name:

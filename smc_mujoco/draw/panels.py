@@ -1,8 +1,9 @@
 """Panels of figures and films: a quantity of several traces over time, a phase portrait, the last samples of u.
 
-Traces are cut to their finite samples (decimate.finite) and to a group of channels (style.split). Over time, the line
-is the mean of the channels, and where it chatters also a mean over a window of time (decimate.smooth). The band behind
-it is the range within a column of the picture, of u and s over all channels. Single channels of a network are light.
+Traces are cut to their finite samples (decimate.finite) and to a group of channels (style.split). A line over time is
+the mean of the channels; where that chatters, it is also averaged over a window of time (decimate.smooth). The band
+behind it is the range within a column of pixels; for u, s and forces, of all channels. Single channels of a network are
+drawn light.
 """
 
 import dataclasses
@@ -87,7 +88,7 @@ class Panel(NamedTuple):
 
 
 def overview(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels of a figure, from top to bottom; of realistic mechanisms also what acts on the joints."""
+    """Return the default panels of a figure, from top to bottom; with forces on the joints for realistic mechanisms."""
     groups = style.split(traces)
     driven = {group: parts for group, parts in groups.items() if group.driven}
     panels = []
@@ -103,7 +104,7 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, Panel]]:
-    """Return small panels of the channels of a group: of each, x with its reference, and the error."""
+    """Return two small panels for each channel of a group: x with its reference, and the error."""
     chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
     pairs = []
     for i in (group.channels[k] for k in chosen):
@@ -120,7 +121,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
-    """Return what bands and lines mean, where it needs words: "band", "line", "light" -> words."""
+    """Return the meaning of bands and lines that need an explanation: "band", "line", "light" -> words."""
     n = max(len(panel.group.channels) for panel in panels)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
@@ -143,7 +144,7 @@ def titles(panels: Sequence[Panel], pitch: float) -> list[str]:
 
 
 def curve(trace: Trace, y: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the line of a quantity y (K+1,): times in s, and values. Few samples are drawn as they are."""
+    """Return the line of a quantity y (K+1,): times in s, and values. A short trace is not smoothed."""
     return line(trace.t, y, 0 if name in UNBANDED else window(trace)) if smoothed(trace) else (trace.t, y)
 
 
@@ -153,7 +154,7 @@ def smoothed(trace: Trace) -> bool:
 
 
 def mean_window(traces: Sequence[Trace]) -> float | None:
-    """Return the longest time that lines of u are means over, s; None if no u chatters."""
+    """Return the longest window of the means drawn for u, s; None if no u chatters."""
     times = [
         window(trace) * trace.scenario.control_period
         for trace in traces
@@ -163,9 +164,10 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
 
 
 def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> list[Artist]:
-    """Draw the panel, the first trace on top, set its vertical range, and return the artists of the traces.
+    """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
-    The reference of x is drawn over them, its settling band behind. `label`: print what a clipped range leaves out.
+    The reference of x is drawn in front, its settling band behind. `label`: whether to print the size of blows outside
+    the range.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
@@ -197,7 +199,7 @@ def cross() -> dict[str, Any]:
 
 
 def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
-    """Return a line style for each line: solid, but dashed in turn for lines that coincide, so that all are seen."""
+    """Return a style for each line: solid, or dashed in turn for lines that coincide, so that all are visible."""
     near = COINCIDENT * (limits[1] - limits[0])
     groups: list[list[int]] = []
     for i, (t, y) in enumerate(lines):
@@ -216,7 +218,7 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
 
 
 def clip_blows(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> None:
-    """Fit the vertical range to what lasts of a reaction; mark blows, which are short, outside it, with their size."""
+    """Fit the vertical range to lasting reactions. Mark short blows outside the range, and print their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
     lasting = [float(np.quantile(size, LASTING)) for size in sizes if size.size]
@@ -252,7 +254,7 @@ def rests(trace: Trace) -> list[int]:
 
 
 def target(ax: Axes, panel: Panel) -> None:
-    """Draw each reference (of an error: zero) over the curves, as long as a run has it, and its settling band."""
+    """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
     several = sorted(panel.traces, key=lambda trace: len(trace.t))
     for trace in {trace.scenario.reference: trace for trace in several}.values():
         known = np.isfinite(trace.r[:, 0])
@@ -355,7 +357,7 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> N
 
 
 def light(n: int) -> np.ndarray:
-    """Return the indices of those of n channels that are drawn one by one."""
+    """Return the indices of the channels, of n, that are drawn one by one."""
     return np.unique(np.linspace(0, n - 1, min(n, MAX_LIGHT)).round().astype(int))
 
 
@@ -369,7 +371,7 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the least and largest value of the runs that lasted; if none did, of all but the ends of diverged ones."""
+    """Return the least and largest value of successful runs; if there are none, of failed ones without their ends."""
     seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
     for trace in traces if not seen else ():
         y = QUANTITIES[name](trace)
@@ -380,7 +382,7 @@ def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
 
 
 def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the vertical range for a quantity: its span with the reference, of an error zero, and some margin."""
+    """Return the vertical range for a quantity: its span with the reference (zero for an error), and a margin."""
     low, high = span(traces, name)
     if name == "x":
         r = np.concatenate([trace.r[np.isfinite(trace.r)] for trace in traces])

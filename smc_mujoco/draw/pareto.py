@@ -2,8 +2,8 @@
 
     pareto([tune("duffing", law) for law in ("observer_free", "classical")], "fronts.svg")
 
-Down and to the left is better. A front consists of the gains that no others of the search beat in both. Nothing that
-was tried lies below the staircase. The chosen gains have the least objective, see `objective`.
+Down and to the left is better. A front consists of the gains that no others of the search beat in both. No tried gains
+lie below the staircase. The chosen gains have the least objective, see `analysis.tuning.objective`.
 """
 
 import itertools
@@ -21,7 +21,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 
 HEIGHT = 6.4  # inches on a full page
-MIN_VARIATION = 1e-6  # 1/s: none has no place on a logarithmic axis
+MIN_VARIATION = 1e-6  # 1/s, drawn for smaller ones, because the axis is logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 CHOSEN = {"mfc": "none", "lw": 0}
 
@@ -37,8 +37,9 @@ def pareto(
     """Draw the fronts of tunings of one plant that have the same objective, budget and seed.
 
     Args:
-      path, size, format, fig: as of `figure`.
-      title: default: names the plant.
+      tunings: one per law.
+      path, size, format, fig: as in `figure`.
+      title: default: one with the plant's name.
 
     Returns:
       The figure.

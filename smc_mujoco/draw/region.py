@@ -1,4 +1,4 @@
-"""Maps of regions of attraction: blue where a law brings the plant to rest, the sooner the darker."""
+"""Maps of regions of attraction: blue where a law brings the plant to rest, darker if it does so sooner."""
 
 import os
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from smc_mujoco.draw.page import Size
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-# From soon to late, then undecided, then not: different in lightness alone, so also with colour blindness and in grey.
-# Blue and orange are those of Okabe and Ito.
+# From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Blue
+# and orange are those of Okabe and Ito.
 BLUES, OPEN, NOT = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
 PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
 
@@ -36,10 +36,10 @@ def draw(
     size: Size = None,
     fig: "Figure | SubFigure | None" = None,
 ) -> "Figure | SubFigure":
-    """Draw maps side by side, to the file `path`, if there is one; `size` and `fig` as of `figure`.
+    """Draw maps side by side, and write them to the file `path` if it is given. `size` and `fig` are as in `figure`.
 
     Raises:
-      ScenarioError: another kind of file, no maps, or an unknown size.
+      ScenarioError: an unknown kind of file, no maps, or an unknown size.
     """
     paths = [] if path is None else [checked(path)]
     if not maps:

@@ -1,9 +1,9 @@
 """States of a machine over time: whether it sticks or slides, touches something, and where it lies in its backlash.
 
-States are shown for HOLD seconds at least: a blow of 5 ms for HOLD, and a rest only if it lasts that long. Rest is that
-of `metrics.conventions.at_rest`. Contact is geometry: MuJoCo's collisions of the scenario's own model, posed at each
-sample. A backlash alone at a joint is read off the reaction: its sign is the flank that pushes. Beside friction and
-contacts, whose forces mix with it, it is read off the actuator's force, which does not show when it is in play.
+States are shown for HOLD seconds at least: a blow of 5 ms for HOLD, and rest only if it lasts that long. Rest is
+defined by `metrics.conventions.at_rest`. Contact is found by MuJoCo's collision detection, with the scenario's model
+posed at each sample. The flank of a backlash is the sign of the joint's reaction. With friction or contacts, whose
+forces are in the reaction too, it is the sign of the actuator's force, which does not show when the rotor is in play.
 """
 
 import itertools
@@ -28,14 +28,14 @@ SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
 class State(NamedTuple):
-    """Words for what a machine does, and their mood, which sets their colour."""
+    """The state of a machine in words, and its mood, which sets the colour."""
 
     words: str
     mood: int
 
 
 class Shape(NamedTuple):
-    """A scenario's mechanism from a time on, s."""
+    """The model of a scenario's mechanism from a time on, s."""
 
     time: float
     model: mujoco.MjModel
@@ -49,7 +49,7 @@ def shapes(scenario: Scenario) -> list[Shape]:
 
 
 def timeline(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | None]:
-    """Return the state at each time, s; None for a machine without states, and once its run has failed."""
+    """Return the state at each time, s; None for a machine without states, and after its run failed."""
     dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
     contact = np.any(np.stack([held(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
     sliding = np.array([held(on_at_start(~on, trace.t, hold), trace.t, hold) for on in at_rest(trace).T])
@@ -90,7 +90,7 @@ def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) ->
 
 
 def has_dry_friction(scenario: Scenario) -> bool:
-    """Return whether dry friction can hold the machine: in its joints, or of what it lies on."""
+    """Return whether dry friction can hold the machine, in its joints or under it."""
     plant = scenario.plant
     if any(plant.parameters[name] > 0.0 for name in plant.dry):
         return True
@@ -151,7 +151,7 @@ def flanks(trace: Trace) -> np.ndarray:
 
 
 def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return a signal (K + 1,) that stays on for `hold` s more each time, and has no shorter gaps."""
+    """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter than that."""
     last = np.maximum.accumulate(np.where(on, t, -np.inf))
     on = t - last < hold - 1e-9
     edges = np.flatnonzero(np.diff(on.astype(int), prepend=0))  # on, off, on, ...
@@ -161,13 +161,13 @@ def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
 
 
 def on_at_start(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return the signal, on from the start if it is so within `hold` s: a machine let go at rest does not stick."""
+    """Return the signal, on from the start if it is on within `hold` s: a machine released at rest does not stick."""
     early = t < t[0] + hold
     return on | (early & on[early].any())
 
 
 def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return -1 or 1 on that flank, 0 in play, 2 where it crosses more often than can be shown, (K + 1,)."""
+    """Return the key of SIDES at each sample, (K + 1,): flank -1 or 1, 0 in play, 2 if it crosses too often to show."""
     touched = np.flatnonzero(flank)
     crossed = touched[1:][np.diff(flank[touched]) != 0]
     rattles = np.zeros(len(t), bool)

@@ -27,16 +27,16 @@ from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.trace import Trace
 
 # Colours of laws that state none. Chosen from a grid as the farthest in CIEDE2000 from the stated ones, from each other
-# and from whatever else is drawn: 18 and more with normal vision, 9 without red or green cones, 7.5 without blue ones.
-# A just noticeable difference is about 1. The closest two stated ones are at 16 and 6.
+# and from everything else in figures: at least 18 with normal vision, 9 without red or green cones, 7.5 without blue
+# cones. A just noticeable difference is about 1. The closest two stated ones are at 16 and 6.
 OTHERS = ("#005A3C", "#960000", "#96B469", "#78784B", "#B42D69", "#7887FF")
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
-CHROMA = 0.12  # stronger colours differ by hue and lightness alone, see `distance`; chosen
-ALIKE = 0.10  # closer colours look alike beside each other, see `distance`; chosen
+CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
+ALIKE = 0.10  # colours closer than this look alike, see `distance`; chosen
 OKLAB_CONES = np.array([
     [0.4122214708, 0.5363325363, 0.0514459929],
     [0.2119034982, 0.6806995451, 0.1073969566],
@@ -83,9 +83,10 @@ RC = {
 
 
 def page(width: float = FULL_PAGE):
-    """Return a context in which matplotlib draws in this style, on a page of that width in inches.
+    """Return a context in which matplotlib draws in this style, on a page of this width in inches.
 
-    Letters and lines are those of RC on a full page, and of 8 points on journal pages and columns.
+    A full page has the letters and lines of RC. On journal pages and columns they are smaller, with letters of 8
+    points.
     """
     from matplotlib import rc_context
 
@@ -95,7 +96,7 @@ def page(width: float = FULL_PAGE):
 
 
 def points(size: float) -> float:
-    """Return the size in points, on this page, of what has `size` points on a full page."""
+    """Return a size in points on this page, given the size on a full page."""
     from matplotlib import rcParams
 
     return size * rcParams["font.size"] / RC["font.size"]
@@ -108,10 +109,10 @@ def law_colour(law: Component | str) -> str:
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
-    """Return one colour a law for one picture, all different.
+    """Return one colour per law for one picture, all different.
 
-    Laws that state a colour have it. The others have theirs of OTHERS, or, if that looks like one already in the
-    picture, such as a second green, the colour that is farthest from all of them.
+    Laws that state a colour have it. Each other law has its colour of OTHERS or, if that looks like one already in the
+    picture, such as a second green, the colour farthest from all of them.
     """
     wanted = [law_colour(law) for law in laws]
     stated = [bool((template := _template(law)[0]) and template.colour) for law in laws]
@@ -124,7 +125,7 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 
 
 def _free(used: set[str]) -> str:
-    """Return the colour farthest from those in use and from what else is drawn: of the laws', else of a grid."""
+    """Return the colour farthest from all in the picture: one of the laws', or of a grid if none is far enough."""
     stated = [template.colour for template in catalogue().values() if template.colour]
 
     def apart(colour: str) -> float:
@@ -160,7 +161,7 @@ def _lab(colour: str) -> tuple[float, float, float]:
 
 
 def distance(one: str, other: str) -> float:
-    """Return how far two colours are apart in OKLab; hue counts most, so that two greens are close."""
+    """Return the distance of two colours in OKLab, in which hue counts most, so that two greens are close."""
     (l1, a1, b1), (l2, a2, b2) = _lab(one), _lab(other)
     return math.hypot((l1 - l2) / 3, a1 - a2, b1 - b2)
 
@@ -172,7 +173,7 @@ def law_name(law: Component | str) -> str:
 
 
 def label(name: str) -> str:
-    """Return the label of a law, surface or estimator of the library, for its name; other words as they are."""
+    """Return the label of the library's law, surface or estimator of this name; other words unchanged."""
     known = {**surfaces.catalogue(), **estimators.catalogue()}
     return law_name(name) if name in catalogue() else in_words(name) if name in known else name
 
@@ -191,14 +192,14 @@ def _template(law: Component | str) -> tuple[Template | None, str]:
 
 
 def in_words(name: str) -> str:
-    """Return a name of the code as words: boundary_layer as "Boundary layer"."""
+    """Return an identifier as words: boundary_layer as "Boundary layer"."""
     return name[:1].upper() + name[1:].replace("_", " ")
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """Return one label a trace: the given ones, else the laws' labels, with what differs between runs of one law.
+    """Return one label per trace: the given ones, else the laws' labels, with the differences between runs of one law.
 
-    Runs of one law that differ in nothing are numbered.
+    Runs of one law without differences are numbered.
 
     Raises:
       ScenarioError: the number of labels is not that of the traces.
@@ -215,7 +216,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 
 
 def differences(trace: Trace, others: Sequence[Trace]) -> str:
-    """Return what a run has that others of its law have not, such as "k1 = 6, no noise"; "" if they are the same."""
+    """Return how a run differs from others of its law, such as "k1 = 6, no noise"; "" if it does not."""
     words = []
     tables = [_settings(other) for other in others]
     for name, value in _settings(trace).items():
@@ -258,7 +259,7 @@ def ending(trace: Trace) -> str:
 
 
 def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
-    """Return the changes of plants, time in s -> "mass × 2"; begins with the runs' labels if only some change."""
+    """Return the changes of plants, time in s -> "mass × 2", preceded by the labels of the runs if only some change."""
     found: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
         if jump := trace.scenario.jump:
@@ -272,7 +273,7 @@ def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
 
 @functools.cache
 def font(size: float, bold: bool = False):
-    """Return DejaVu Sans, which matplotlib ships, as a font of Pillow; letters `size` high."""
+    """Return DejaVu Sans, which comes with matplotlib, as a font of Pillow with letters `size` high."""
     import matplotlib
     from PIL import ImageFont
 
@@ -341,5 +342,5 @@ def letters_on(colour: str) -> str:
 
 
 def short(value: float, digits: int = 2) -> str:
-    """Return a number in few digits, as 0.25, 6, 280; with an exponent only from 1e6 on."""
+    """Return a number with few digits, such as 0.25, 6, 280; with an exponent only from 1e6 on."""
     return f"{float(f'{value:.{digits}g}'):g}"

@@ -1,8 +1,8 @@
 """A run in MuJoCo's viewer in real time, controlled by the reference loop, with a slider for each gain of its law.
 
-The viewer shows a model of its own, which has the sliders and takes positions from the run. So the run is that of
-`smc.run`, whatever the viewer's panels do to the model on screen. Three things act on the run: the gains, the mouse's
-push, and the viewer's reset, which restarts it.
+The viewer shows a second model, which has the sliders and copies its positions from the run. So the run equals that of
+`smc.run`, whatever the viewer's panels change in the model on screen. Three things act on the run: the gains, the push
+of the mouse, and the viewer's reset, which restarts it.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ from smc_mujoco.simulation.scenario import Scenario
 GAIN = "gain:"  # prefix of the sliders' names
 SPACE = 32  # code of the key in GLFW
 FRAME = 1.0 / 60.0  # s, of most screens
-MAX_FRAME = 0.1  # s that a frame simulates, and takes: runs slower than real time still answer the mouse
+MAX_FRAME = 0.1  # s, most time that a frame simulates and takes, so that slow runs still respond to the mouse
 SETTLED = 30  # frames without a change after which gains are printed: half a second
 
 
@@ -42,7 +42,7 @@ def watch(scenario: Scenario) -> None:
                 aim(live.model, live.data, window.cam)
             play(live, window)
     finally:
-        for thread in set(threading.enumerate()) - others:  # or the process crashes if it ends while it draws
+        for thread in set(threading.enumerate()) - others:  # if the process ends while it draws, that crashes
             thread.join(timeout=10.0)
         print(as_code(live.law))
 
@@ -140,7 +140,7 @@ class Live:
             self.say(as_code(self.law))
 
     def advance(self, seconds: float) -> None:
-        """Simulate the time that is due, at most MAX_FRAME. A run that is over restarts, a failed one is paused."""
+        """Simulate the time that is due, at most MAX_FRAME. Restart a finished run, pause a failed one."""
         if self.loop.failure or self.step > self.loop.total:
             self.begin(self.loop.scenario)
         loop, h = self.loop, self.loop.scenario.resolved.physics_step
@@ -159,7 +159,7 @@ class Live:
             self.say(f"{loop.failure}, at t = {loop.failed_step * h:.6g} s: space starts again")
 
     def show(self) -> None:
-        """Copy the run's state and gains to the model on screen; of a failed run the last state before."""
+        """Copy the run's state and gains to the model on screen; for a failed run the state before the failure."""
         seen, run = self.data, self.loop.data
         if not self.loop.failure:
             seen.time, seen.qpos[:], seen.qvel[:], seen.act[:] = run.time, run.qpos, run.qvel, run.act

@@ -1,11 +1,11 @@
-"""How a study's runs are computed: in batches, on threads of this process or by the workers of an Executor.
+"""Computation of a study's runs: in batches, on threads of this process or by the workers of an Executor.
 
     compute_here(batches(scenarios, threads), threads, finish)
     compute_elsewhere(batches(scenarios, 1), ProcessPoolExecutor(8), finish)
 
-A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a kill loses at most
-one. An outcome is the part of a table's row that follows from the run alone: its scores and how it failed. It depends
-neither on the batch nor on the place where the run was computed.
+A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a killed study loses
+at most one. An outcome is the part of a table's row that follows from the run: its scores, or how it failed. It depends
+neither on the batch nor on the machine that computed it.
 
 A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the same versions, and
 
@@ -36,10 +36,10 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
 
-# Limits of a batch: `Scenario.work` per thread, 2 to 5 s of a core; in all, for the memory of logs and scores; runs.
+# Limits of a batch: `Scenario.work` per thread, 2 to 5 s of a core; work in all, which bounds the memory; runs.
 STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
-UNDER_WAY = 1000  # batches sent to workers and not finished; chosen
+UNDER_WAY = 1000  # most batches sent to workers and not finished; chosen
 ADDRESS = "dask://"
 WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
@@ -112,7 +112,7 @@ def compute_elsewhere(
       report: called with the number of steps of each batch.
 
     Raises:
-      ScenarioError: the workers died, cannot load what they are to run, or have other code than this process.
+      ScenarioError: the workers died, cannot load the scenarios, or have other code than this process.
     """
     sent: dict[Future[list[Outcome]], Batch] = {}
 
@@ -210,7 +210,7 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
       executor: an Executor, which stays open, or dask://HOST:PORT.
 
     Raises:
-      ScenarioError: no package for it, no scheduler there, no workers, or workers that die of what they run.
+      ScenarioError: dask is not installed, there is no scheduler or worker, or the workers crash.
     """
     if isinstance(executor, Executor):
         yield executor
@@ -239,7 +239,7 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
 
 
 class _DaskExecutor(Executor):
-    """A dask client's workers. With `Client.get_executor()` a result never comes if the scheduler dies meanwhile."""
+    """A dask client's workers. `Client.get_executor()` waits for ever if the scheduler dies."""
 
     def __init__(self, client: Any):
         self.client = client

@@ -1,14 +1,14 @@
-"""Leaderboards: a study's laws compared on equal runs, with the uncertainty of every number.
+"""Leaderboards: comparison of a study's laws on equal runs, with the uncertainty of every number.
 
     boards = leaderboard(table)                        # a Board for each plant and metric
-    boards[0].winner                                   # a law's name, or None inside the noise
+    boards[0].winner                                   # a law's name, or None if no law is significantly better
     rich.print(tables.leaderboard(boards))             # of `cli.tables`
 
-What intervals, ranks and winners mean: `analysis.bootstrap`, `analysis.ranking`. A board is one metric in one group of
-runs. Laws are compared in each of its blocks, a plant in a condition. The correction for many comparisons is over all
-pairs of laws in all blocks of the board. The winner of a board with several blocks wins in every one. The conclusions
-hold for the plants and conditions of the table, over starts and noise; `Board.friedman` says how they would carry over
-to other conditions.
+`analysis.bootstrap` and `analysis.ranking` define intervals, ranks and winners. A board is one metric in one group of
+runs. Laws are compared in each of its blocks, a plant in a condition. The p-values are corrected for all pairs of laws
+in all blocks of the board. The winner of a board with several blocks wins in every one. The conclusions hold for the
+plants and conditions of the table, over initial states and noise. `Board.friedman` says whether they would hold in
+others.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A law's line: its median, or the share of its runs that settle, and its place."""
+    """A law's line in a board: its median, or the share of its runs that settle, and its place."""
 
     law: str
     interval: Interval
@@ -41,14 +41,13 @@ class Block:
     """Laws compared on one plant in one condition.
 
     Attributes:
-      plant: its name.
-      condition: its name.
-      medians: law -> median over the seeds; of "settles" the share of runs that do not.
+      plant, condition: their names.
+      medians: law -> median over the seeds; for "settles" the share of runs that do not settle.
       best: the laws that no other law is better than.
-      seeds: number of seeds that every law ran from.
-      runs: number of distinct runs among these: in the others every law does what it does in an earlier one.
-      most: largest number of distinct runs of two laws: a seed that changes neither is no sample of the two.
-      fewest: smallest number of distinct runs of two of the best laws; `most` where one law is best.
+      seeds: number of seeds in which every law ran.
+      runs: number of distinct runs among these. In the others every law has the same result as in an earlier seed.
+      most: largest number of distinct runs of any two laws. A seed that changes neither law is no sample of the two.
+      fewest: smallest number of distinct runs of any two of the best laws; `most` if only one law is best.
     """
 
     plant: str
@@ -80,13 +79,13 @@ class Board:
       group: what the runs have in common, such as {"plant": "duffing"}.
       metric: a metric's name, or "settles".
       unit: of the medians, with {x} and {u} as in `conventions.Metric.unit`; "" for "settles", which is 0 to 1.
-      entries: lowest mean rank first. A median over several plants is NaN where its unit depends on the plant.
-      blocks: the same laws on each plant in each condition by itself.
-      cells: number of runs of each law: those that all laws have, and equal ones once.
+      entries: lowest mean rank first. A median over several plants is NaN if its unit depends on the plant.
+      blocks: the same laws on each plant in each condition.
+      cells: number of runs of each law, counting only cells that all laws have, and equal runs once.
       seeds: number of seeds, equal runs included.
-      pairs: number of comparisons that the tests are corrected for: of every two laws, in every block.
-      level: of intervals and tests.
-      friedman: None of one law, or one plant in one condition.
+      pairs: number of comparisons for which the tests are corrected: all pairs of laws, in every block.
+      level: level of intervals and tests.
+      friedman: Friedman's test; None for one law, or for one plant in one condition.
     """
 
     group: Mapping[str, str]
@@ -102,7 +101,7 @@ class Board:
 
     @property
     def best(self) -> tuple[str, ...]:
-        """The laws that none is better than, in any block; there may be none over several blocks."""
+        """The laws that no other is better than, in any block. With several blocks there may be none."""
         return tuple(entry.law for entry in self.entries if entry.rank.best)
 
     @property
@@ -112,26 +111,26 @@ class Board:
         return winners.pop() if len(winners) == 1 else None
 
     def wins(self, law: str) -> list[str]:
-        """The names of the blocks in which a law wins, see `name`."""
+        """Return the names of the blocks in which a law wins, see `name`."""
         return [self.name(block) for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """The names of the blocks in which another law is better."""
+        """Return the names of the blocks in which another law is better."""
         return [self.name(block) for block in self.blocks if law not in block.best]
 
     def name(self, block: Block) -> str:
-        """What tells a block from the others of the board: its condition, its plant, or both."""
+        """Return the name of a block within the board: its condition, its plant, or both."""
         own = {"plant": block.plant, "condition": block.condition}
         return ", ".join(value for what, value in own.items() if what not in self.group)
 
     @property
     def kind(self) -> str:
-        """What the blocks are: "conditions", "plants", or "cells" where they differ in both."""
+        """The kind of the blocks: "conditions", "plants", or "cells" if they differ in both."""
         return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
 
     @property
     def verdict(self) -> str:
-        """In words: the winner, or who wins and loses where, or why there is no winner, or who is undefeated."""
+        """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         if self.winner:
             return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
         results = []
@@ -149,7 +148,7 @@ class Board:
 
     @property
     def why(self) -> str:
-        """Why there is no winner, "" if there is one, or if several laws are the best."""
+        """Why there is no winner; "" if there is one, or if several laws are the best."""
         if len(self.entries) == 1:
             return "one law"
         return self.too_few or ("" if self.best else "each loses to another")
@@ -172,7 +171,7 @@ def _distinct(runs: int) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names in a row, joined by semicolons where a name has a comma in it."""
+    """Join names by commas, or by semicolons if a name has a comma in it."""
     return ("; " if any("," in name for name in names) else ", ").join(names)
 
 
@@ -186,16 +185,19 @@ def leaderboard(
 ) -> list[Board]:
     """Compare the laws of a table in each metric within each group.
 
-    Only cells - plant, condition, seed - that every law of the group has are compared. A run that failed is inf in all
-    metrics. A seed in which two laws both do what they did in an earlier one is no further sample of the two. A metric
-    that does not apply to a group has no board there.
+    Only cells (plant, condition, seed) that every law of the group has are compared. A failed run is inf in all
+    metrics. A seed in which two laws both have the same results as in an earlier seed is no further sample of the two.
+    A metric that does not apply to a group has no board for it.
 
     Args:
-      metrics: names of metrics, lower being better, or "settles".
-      by: what the runs of a group share, of "plant" and "condition"; () is one group of all runs.
+      table: a study's runs, as `smc.Table.read` returns them.
+      metrics: names of metrics, for which lower is better, or "settles".
+      by: what the runs of a group have in common, of "plant" and "condition"; () for one group of all runs.
+      level: level of confidence.
+      resamples, seed: number of resamples of the bootstrap, and seed of their draws.
 
     Raises:
-      ScenarioError: no runs, an unknown metric or group, two runs of a cell, or laws without a common cell.
+      ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a common cell.
     """
     if isinstance(metrics, str) or not metrics:
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
@@ -230,7 +232,7 @@ def leaderboard(
 
 
 def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
-    """Return block k of a group, which is number `at` of those compared."""
+    """Return block k of a group, which is number `at` of the compared blocks."""
     plant, condition = group.blocks[k]
     runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws], bool)
     best = runs[np.ix_(laws, laws)][np.triu_indices(laws.sum(), 1)]
@@ -248,7 +250,7 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
 
 
 def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
-    """Return the laws' lines; `mixed`: values have several units, so that there is no median."""
+    """Return the laws' lines. If `mixed`, values have several units, so there is no median."""
     entries = []
     for rank in ranks(found, resamples, seed):
         scores = found.cells[found.laws.index(rank.law)]

@@ -16,9 +16,9 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.paper import scenarios
 
 OURS = "smc_mujoco."
-# Fields of a description that are no part of the condition: they belong to the plant, the law or the run.
+# Fields of a description that do not belong to the condition, but to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
-UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that change no run
+UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that do not affect runs
 LONGEST = 60  # characters of a condition's name
 
 
@@ -30,19 +30,19 @@ def described(scenario: Scenario) -> dict[str, Any]:
 
 
 def key(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return a hash of everything that decides a run: its scenario, the code of its parts and of the package, versions.
+    """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions.
 
-    32 hex digits. `data`: what `described` returns, where it is at hand.
+    `data` is the result of `described`, if the caller has it.
     """
     data = data or described(scenario)
-    if scenario.condition in NAMED:  # a name for what the fields say
+    if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
     text = to_json([data, _codes(scenario), fingerprint.package(*UNRELATED)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def row(scenario: Scenario) -> dict[str, Any]:
-    """Return the columns of a table that say what ran."""
+    """Return the columns of a table that describe a run."""
     data = described(scenario)
     return {
         "hash": key(scenario, data),
@@ -58,9 +58,10 @@ def row(scenario: Scenario) -> dict[str, Any]:
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return the name of the run's condition: as given, the suite's own, or its differences from the nominal one.
+    """Return the name of the run's condition: the given name, the suite's, or the differences from the nominal one.
 
-    Plant, law, start, seed and duration are no part of it. `data`: what `described` returns, where it is at hand.
+    Plant, law, initial state, seed and duration do not belong to it. `data` is the result of `described`, if the caller
+    has it.
     """
     if scenario.condition:
         return scenario.condition
@@ -75,7 +76,7 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
 
 
 def _codes(s: Scenario) -> list[str]:
-    """Return hashes of the code that a run calls: law, estimator, surface, signals, plants and parts of yours."""
+    """Return hashes of the code that a run calls: law, estimator, surface, signals, a user's own plant and parts."""
     functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
     signals = [type(signal) for signal in (s.reference, *s.disturbance)]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
@@ -96,11 +97,11 @@ def _conditions(plant: Plant, duration: float) -> dict[str, str]:
     found: dict[str, str] = {}
     common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
     common["control_period"] = scenarios.CONTROL_PERIOD
-    if not plant.limits:  # else the bound is that of its motors
+    if not plant.limits:  # else its motors bound u
         common["u_max"] = scenarios.U_MAX
     for name in NAMED:
-        # ScenarioError: a condition that is not for this plant, or not for runs as short as this.
-        # `recorded`: the scenario is not to be run, so its start may be outside a joint's range.
+        # ScenarioError: the condition does not fit this plant, or runs as short as this.
+        # `recorded`: the scenario will not be run, so x0 may be outside a joint's range.
         with contextlib.suppress(ScenarioError):
             scenario = Scenario.recorded(**common | scenarios.fields(name, plant, duration))
             found.setdefault(_compared(described(scenario)), name)

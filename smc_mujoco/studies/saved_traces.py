@@ -24,8 +24,8 @@ def path(folder: Path, row: Mapping[str, Any]) -> Path:
 def worst(table: Table) -> list[int]:
     """Return the row of the worst run for every plant and condition.
 
-    Runs that failed come first, then those that never settle, then all others. Among equals it is the one with the
-    largest ultimate bound; where channels of two units have none, with the largest overshoot.
+    Failed runs are the worst, then those that never settle. Among equals it is the one with the largest ultimate bound,
+    or with the largest overshoot if channels have different units and so no ultimate bound.
     """
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
@@ -39,7 +39,7 @@ def worst(table: Table) -> list[int]:
 
 
 def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
-    """Run those of the chosen runs again that have no file yet, and save their traces.
+    """Repeat the chosen runs that have no file yet, and save their traces.
 
     Raises:
       ScenarioError: the folder cannot be written.

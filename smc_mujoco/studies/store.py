@@ -1,12 +1,12 @@
-"""A study's folder: part files of finished runs, and the table made of them.
+"""A study's folder: part files of finished runs, and the table made from them.
 
     store = Store(Path("study"))
     store.open(resume=True)
-    store.add(rows)                        # a part: there whole or not at all
-    store.collect(["5f0c...", ...])        # results.parquet, in this order, from whatever parts hold it
+    store.add(rows)                        # a part, written whole or not at all
+    store.collect(["5f0c...", ...])        # results.parquet, in this order, from the parts
 
-A part is a parquet file, named by a hash of the runs in it. A file that is damaged, or has other columns or scores of
-other code, is passed over, and its runs count as not done. The bytes of results.parquet depend on its rows alone.
+A part is a parquet file, named by a hash of the runs in it. A file that is damaged, or has other columns, or scores by
+other code, is ignored, and its runs count as not done. The bytes of results.parquet depend on its rows only.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 GROUP = 4096  # rows in memory at once while the table is written; chosen
 PARTS_HELD = 64  # parts in memory, likewise
-ABANDONED = 3600.0  # s, after which a temporary file is one that a killed study left; chosen
+ABANDONED = 3600.0  # s, age of temporary files that belong to a killed study; chosen
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
 
@@ -41,10 +41,10 @@ class Store:
     def __init__(self, out: Path):
         self.parts, self.results = out / "parts", out / "results.parquet"
         self.schema = table.schema({"scores": fingerprint.of(tuple(m.formula for m in metrics()))})
-        self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, its row there
+        self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, and its row in it
 
     def open(self, resume: bool) -> None:
-        """Make the folder and list the runs in it; without `resume` remove them, and the table.
+        """Make the folder and list the runs in it. Without `resume`, remove them and the table.
 
         Raises:
           ScenarioError: the folder cannot be made.
@@ -65,7 +65,7 @@ class Store:
     def _tidy(self) -> None:
         """Remove the temporary files of studies that were killed long ago."""
         for path in [*self.parts.glob(".*.parquet"), *self.parts.parent.glob(".results.*.parquet")]:
-            with contextlib.suppress(FileNotFoundError):  # of another study, which has just ended
+            with contextlib.suppress(FileNotFoundError):  # another study has just finished it
                 if time.time() - path.stat().st_mtime > ABANDONED:
                     path.unlink()
 
@@ -86,7 +86,7 @@ class Store:
         """Write the table of these finished runs, in this order.
 
         Raises:
-          ScenarioError: the folder cannot be written, or a part was removed meanwhile.
+          ScenarioError: the folder cannot be written, or a part has been removed.
         """
         import pyarrow as pa
 
@@ -108,7 +108,7 @@ class Store:
         table.write(self.results, self.schema, map(rows, groups))
 
     def _read(self, path: Path) -> "pa.Table | None":
-        """Return a part, or None for a file that is no part, or is damaged."""
+        """Return a part, or None for a file that is damaged or not a part."""
         try:
             with reading(path, "part", "start the study once more") as file:
                 part = table.read(file, sealed=True)

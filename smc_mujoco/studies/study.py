@@ -1,11 +1,11 @@
-"""A study: many runs, computed so that nothing is lost, to a table of scores.
+"""A study: many runs, stored as they finish, and a table of their scores.
 
     scenarios = smc.grid(["duffing"], ["observer_free", "classical"], ["noise", "coulomb"], seeds=20)
     table = smc.study(scenarios, "study")          # study/results.parquet; killed, it continues where it was
     print(table.select(law="classical").column("ultimate_bound"))
 
-A run is identified by everything that decides its outcome: the scenario, the code of its law, signals and other parts
-of yours, and the versions of the packages. A run with a result in the folder is not run again, unless its law was
+A run is identified by everything that determines its outcome: the scenario, the code of its law, signals and your other
+own parts, and the versions of the packages. A run with a result in the folder is not repeated, unless this code was
 edited.
 """
 
@@ -34,7 +34,7 @@ key, condition = run_key.key, run_key.condition
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Extent:
-    """The grid of a study; arguments as of `grid`."""
+    """The grid of a study; its fields are arguments of `grid`."""
 
     plants: tuple[str, ...] = paper.PLANTS
     laws: tuple[str, ...] = LAWS
@@ -43,7 +43,7 @@ class Extent:
     duration: float = paper.DURATION
 
 
-# One condition of each kind: of the paper's; and of a real machine's friction, drive, gear, sensor and obstacles.
+# One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
@@ -64,25 +64,26 @@ def study(
     progress: bool = False,
     traces: str = "none",
 ) -> Table:
-    """Run scenarios, score them, and write a table with a row for each, out/results.parquet.
+    """Run scenarios, score them, and write the table out/results.parquet with a row for each.
 
     Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored in out/parts, some
-    seconds of work in each file. A study that was killed, or that filled the disk, can be started again with the same
-    arguments: it continues there and ends with the same file, bit for bit.
+    seconds of work in each file. If a study was killed, or filled the disk, start it again with the same arguments: it
+    continues, and ends with the same file, bit for bit.
 
     Args:
-      out: the folder; it may hold the parts of other studies.
+      scenarios: any number of Scenarios, such as those of `smc.grid`.
+      out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
       executor: "local", "dask://HOST:PORT" for the workers of that scheduler, or any concurrent.futures.Executor, whose
-        workers run a simulation each; it stays open.
-      threads: simulations at once, if local; None for one per available core.
+        workers run one simulation each. It stays open.
+      threads: number of simulations at a time, if local; None for one per available core.
       progress: whether to show a progress bar.
-      traces: which to save in out/traces: "none", "all", or for every plant and condition the "worst": a run that
-        failed, else one that never settles, else any, with the largest ultimate bound.
+      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: a failed run,
+        else one that never settles, else the one with the largest ultimate bound.
 
     Raises:
-      ScenarioError: what cannot be run, a folder that cannot be written, workers that are not there or die; what was
-        finished stays.
+      ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that are missing or die.
+        Finished runs stay.
     """
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
@@ -118,10 +119,10 @@ def study(
 
 
 def _by_key(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
-    """Return key -> scenario, in order; of equal ones the first."""
+    """Return key -> scenario, in order, with the first of equal ones."""
     found: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
-    for scenario in scenarios if several else ():  # one by one, as they may be without end
+    for scenario in scenarios if several else ():  # one by one, so that a wrong item in an endless generator is found
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         checked_name(scenario.law)

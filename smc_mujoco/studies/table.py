@@ -1,12 +1,12 @@
-"""The table of a study: a row per run, as parquet, from which every run can be made again.
+"""The table of a study: a parquet file with a row per run, from which every run can be repeated.
 
     table = smc.Table.read("study/results.parquet")
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
-    table.scenario(0), table.trace(0)          # what ran, and what it did, by running it again
+    table.scenario(0), table.trace(0)          # the scenario of a row, and its trace, by repeating the run
 
-Columns: what ran (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); every metric of
-`metrics.score`, null where the run failed or the metric does not apply, inf for "never"; how the run failed if it did
-(`diverged_at` in s, `failure`); and what it is made again from (`versions`, `scenario`, both JSON).
+Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); every metric of
+`smc.score`, null if the run failed or the metric does not apply, inf for "never"; how the run failed (`diverged_at` in
+s, `failure`); and the data to repeat it (`versions`, `scenario`, both JSON).
 """
 
 import dataclasses
@@ -62,7 +62,7 @@ def content(rows: "pa.Table") -> bytes:
 def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
     """Write a parquet file with a row group for each table, and a digest of all rows in its metadata.
 
-    Checksums of parquet cover pages, but neither headers of pages nor the footer.
+    The digest is needed because parquet's checksums cover neither the headers of pages nor the footer.
 
     Raises:
       ScenarioError: the folder cannot be written.
@@ -85,10 +85,10 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
     """Return the rows that `write` wrote.
 
     Args:
-      sealed: whether to refuse a file without a digest, as version 0.1 wrote them.
+      sealed: whether to refuse a file without a digest, such as version 0.1 wrote.
 
     Raises:
-      ScenarioError: the file holds something else. Other errors: it is no parquet file.
+      ScenarioError: the file has changed since it was written. Other errors: it is not a parquet file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -112,7 +112,7 @@ class Table:
 
     Attributes:
       data: the pyarrow Table.
-      known: hash -> Scenario, for laws and signals of yours, whose code no file holds.
+      known: hash -> Scenario, for your own laws and signals, whose code is not in the file.
     """
 
     data: "pa.Table"
@@ -123,7 +123,7 @@ class Table:
         """Return the table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:
-          ScenarioError: no such file, no table of a study, or one that does not hold what was written.
+          ScenarioError: no such file, not a table of a study, or one that has changed since it was written.
         """
         if isinstance(path, str | os.PathLike) and os.path.isdir(path):
             path = Path(path) / "results.parquet"

@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share, and functions that read their texts."""
+"""Options and arguments that several commands have, and functions that parse them."""
 
 import ast
 import os
@@ -20,7 +20,7 @@ Conditions = Annotated[
     typer.Option(
         "--condition",
         metavar="TEXT|FILE",
-        help='A condition of your own, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file'
+        help='Your own condition, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file'
         " with one on each line; may be repeated.",
     ),
 ]
@@ -37,7 +37,7 @@ Json = Annotated[Path | None, typer.Option(help="Also write the result to a .jso
 LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law that `laws` shows.")]
 PlantName = Annotated[
     str,
-    typer.Argument(metavar="PLANT", help="A plant that `list` shows, or FILE.xml:joint+joint for a model of yours."),
+    typer.Argument(metavar="PLANT", help="A plant that `list` shows, or FILE.xml:joint+joint for your own model."),
 ]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")]
 Spread = Annotated[
@@ -86,7 +86,7 @@ def law(text: str) -> "str | Law":
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
-    """Return in words where the gains of laws are from: a set, unless every law has gains of its own."""
+    """Return the source of the laws' gains in words: a set, unless every law is given with its own gains."""
     return f"gains {gains!r}" if any(isinstance(one, str) for one in laws) else "gains as given"
 
 
