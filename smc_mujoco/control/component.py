@@ -15,7 +15,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from types import SimpleNamespace
-from typing import NamedTuple, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, users_frame, whole
@@ -25,7 +25,7 @@ from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
-RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # names in version 0.1
+RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # options in version 0.1 -> present names
 
 
 class Rest(NamedTuple):
@@ -77,12 +77,12 @@ class GainWarning(UserWarning):
     """Gains violate a condition of the law's theorem."""
 
 
-def renamed(old: str) -> property:
-    """Return a property that reads an attribute under its old name, with a DeprecationWarning."""
+def renamed(old: str, new: str) -> Any:
+    """Return a property that reads the attribute `new` under its old name, with a DeprecationWarning."""
 
     def read(self: object) -> object:
-        warnings.warn(f"{old} is now {RENAMED[old]}: read that", DeprecationWarning, users_frame())
-        return getattr(self, RENAMED[old])
+        warnings.warn(f"{old} is now {new}: read that", DeprecationWarning, users_frame())
+        return getattr(self, new)
 
     return property(read)
 
@@ -106,8 +106,8 @@ class Component:
     requires_model: bool = False
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
 
-    degree = renamed("degree")
-    modelled = renamed("modelled")
+    degree = renamed("degree", RENAMED["degree"])
+    modelled = renamed("modelled", RENAMED["modelled"])
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
@@ -192,8 +192,8 @@ class Template:
     continuous: bool = False
     finite_time: str = ""
 
-    degree = renamed("degree")
-    modelled = renamed("modelled")
+    degree = renamed("degree", RENAMED["degree"])
+    modelled = renamed("modelled", RENAMED["modelled"])
 
     @property
     def defaults(self) -> dict[str, float]:

@@ -15,18 +15,21 @@ law, otherwise with f = 0 and g = 1.
 
 import functools
 import math
+import warnings
 from collections.abc import Callable
 from typing import NamedTuple, Unpack, overload
 
-from numba import njit
+from numba import njit, types
+from numba.extending import overload_attribute
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.control.component import Component, LawOptions, Template, decorated, discover
+from smc_mujoco.control.component import Component, LawOptions, Template, decorated, discover, renamed
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
 
 Law = Component
+OLD_FIELDS = {"surfaced": "has_surface", "eq": "v_eq"}  # fields of the measurement in version 0.1 -> present names
 
 
 class Measurement(NamedTuple):
@@ -46,24 +49,47 @@ class Measurement(NamedTuple):
     a: float = 0.0  # estimated acceleration; r'' if the estimator gives none
     limit: float = math.inf  # bound on |u|: u_max, or the limit of the channel's motor
     model: float = 0.0  # 1 if the scenario lets the law use f and g, else 0
-    surfaced: float = 0.0  # 1 if the scenario has a surface, else 0
+    has_surface: float = 0.0  # 1 if the scenario has a surface, else 0
     s: float = 0.0  # sliding variable of the scenario's surface
-    eq: float = 0.0  # acceleration of the error that keeps s constant
+    v_eq: float = 0.0  # equivalent control: acceleration of the error that keeps s constant
     q: float = 0.0  # measured position of the joint without actuator that this one moves; 0 without such a joint
     dq: float = 0.0  # its velocity
     fq: float = 0.0  # its nominal q'' = fq + gq u
     gq: float = 0.0
 
+    surfaced = renamed("surfaced", "has_surface")
+    eq = renamed("eq", "v_eq")
+
+
+def _keep_old_field(old: str, new: str) -> None:
+    """Let compiled laws read a field of the measurement under its name in version 0.1, with a DeprecationWarning."""
+
+    def read(y):  # without annotations, which numba compares with those of the result
+        if old in y.fields:  # of other tuples, such as gains
+            i = y.fields.index(old)
+        elif y.instance_class is Measurement:
+            warnings.warn(f"y.{old} is now y.{new}: read that", DeprecationWarning, 2)
+            i = y.fields.index(new)
+        else:
+            return None
+        return lambda y: y[i]
+
+    overload_attribute(types.NamedUniTuple, old)(read)
+
+
+for _old, _new in OLD_FIELDS.items():
+    _keep_old_field(_old, _new)
+
 
 @njit
 def sliding(y, c):
-    """Return the sliding variable s, and eq, the acceleration of the error that keeps s constant.
+    """Return the sliding variable s, and v_eq, the acceleration of the error that keeps s constant.
 
     Both are those of the scenario's surface, with the model and without. If the scenario has no surface, s = de + c e.
-    Then eq is -c de with the model and 0 without, because model-free laws are published without this term.
+    Then v_eq is -c de with the model and 0 without, because model-free laws are published without this term.
     """
-    if y.surfaced != 0.0:
-        return y.s, y.eq
+    if y.has_surface != 0.0:
+        return y.s, y.v_eq
     return y.de + c * y.e, -y.model * c * y.de
 
 

@@ -1,7 +1,7 @@
-"""Sliding surfaces: pure functions (y, gains, memory) -> (s, eq).
+"""Sliding surfaces: pure functions (y, gains, memory) -> (s, v_eq).
 
-A surface gives a first-order law its sliding variable s, of relative degree `relative_degree`, and eq, the acceleration
-of the error that keeps s constant: s' = 0 for e'' = eq. Notation as in laws.
+A surface gives a first-order law its sliding variable s, of relative degree `relative_degree`, and v_eq, the
+acceleration of the error that keeps s constant: s' = 0 for e'' = v_eq. Notation as in laws.
 """
 
 import functools
@@ -21,7 +21,7 @@ def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable], 
 def surface_function(
     function: Callable | None = None, /, **options: Unpack[SurfaceOptions]
 ) -> Callable[[Callable], Template] | Template:
-    """Turn a function (y, gains, memory) -> (s, eq) into a surface.
+    """Turn a function (y, gains, memory) -> (s, v_eq) into a surface.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree, conditions and label.
     """

@@ -165,11 +165,11 @@ def _inform(at, sim, y, i, partner):
     y.e, y.de = y.x - y.r, y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
     y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
-    y.surfaced, y.s, y.eq = 0.0, 0.0, 0.0
+    y.has_surface, y.s, y.v_eq = 0.0, 0.0, 0.0
     if sim.surface.address != 0:
         if _call(sim.surface, i, at + record.MEASUREMENT_AT, at + record.SLIDING_AT) != 0:
             return record.SURFACE_RAISED
-        y.surfaced, y.s, y.eq = 1.0, sim.sliding.s, sim.sliding.v_eq
+        y.has_surface, y.s, y.v_eq = 1.0, sim.sliding.s, sim.sliding.v_eq
     return record.FINE
 
 

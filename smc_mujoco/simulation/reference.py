@@ -197,7 +197,7 @@ class Loop:
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
             if self.surface:
                 sliding, v_eq = self.surface(i, y)
-                y = y._replace(surfaced=1.0, s=sliding, eq=v_eq)
+                y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
             u[i], s[i] = self.law(i, y)
             self.latest[i] = np.clip(u[i], -limits[i], limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)

@@ -47,7 +47,7 @@ def sine(size: float, omega: float = 1.0) -> Force:
     return Force(lambda n, t: size * omega**-n * math.sin(omega * t - n * math.pi / 2))
 
 
-T, X, V, E, DE, A, SURFACED, S = map(Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "surfaced", "s"))
+T, X, V, E, DE, A, SURFACED, S = map(Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s"))
 
 rest = constant(0.0)
 wave = sine(1.0) + constant(0.5)  # |d| <= 1.5, |d'| <= 1
@@ -62,7 +62,7 @@ def measured(e=0.0, de=0.0, dt=1e-3, f=0.0, g=1.0, t=0.0, a=0.0, limit=math.inf,
 
 def on_surface(s, dt=1e-3, eq=0.0, **y):
     """What a law sees whose scenario has a surface; e = 0, de = s for laws that take none."""
-    return measured(de=s, dt=dt, **y)._replace(surfaced=1.0, s=s, eq=eq)
+    return measured(de=s, dt=dt, **y)._replace(has_surface=1.0, s=s, v_eq=eq)
 
 
 def called(law: Law, y: Measurement, memory: np.ndarray):

@@ -49,9 +49,9 @@ int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, s
     int16_t on_e = word(gains[GAIN_k1] * gains[GAIN_e_range] / 8.0, 16.0);
     int16_t on_de = word(gains[GAIN_de_range] / 8.0, 16.0), lam = word(gains[GAIN_lam], gains[GAIN_u_range]);
     int16_t s = smc_q15_s(word(y->e, gains[GAIN_e_range]), word(y->de, gains[GAIN_de_range]), on_e, on_de);
-    smc_real v = y->surfaced != 0 ? y->eq : -y->model * gains[GAIN_k1] * y->de; /* keeps s; 0 without the model */
+    smc_real v = y->has_surface != 0 ? y->v_eq : -y->model * gains[GAIN_k1] * y->de; /* keeps s; 0 without the model */
     (void)memory;
-    if (y->surfaced != 0) {
+    if (y->has_surface != 0) {
         s = word(y->s, 8.0);
     }
     v += smc_q15_u(s, lam) * gains[GAIN_u_range] / FULL;

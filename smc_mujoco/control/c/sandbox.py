@@ -292,7 +292,7 @@ class Trial:
             seen = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
             seen |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
             if surfaced:
-                seen |= {"surfaced": 1.0, "s": de + 2.0 * e, "eq": -2.0 * de}
+                seen |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
             y, before = self.measurement(**seen), bytes(memory.own)
             code, u, s = self.call(y, memory)
             if code != 0 or not (math.isfinite(u) and math.isfinite(s)):

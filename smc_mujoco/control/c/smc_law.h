@@ -15,26 +15,26 @@ typedef SMC_REAL smc_real;
 
 /* Inputs of a law: its channel at a sample, in SI units. */
 typedef struct {
-    smc_real t;        /* time of the sample */
-    smc_real dt;       /* control period */
-    smc_real x;        /* measured position */
-    smc_real v;        /* measured or estimated velocity */
-    smc_real e;        /* x - r */
-    smc_real de;       /* v - r' */
-    smc_real r;        /* reference */
-    smc_real dr;       /* r' */
-    smc_real ddr;      /* r'' */
-    smc_real f;        /* nominal f and g of x'' = f + g u, at the measured x and v */
+    smc_real t;           /* time of the sample */
+    smc_real dt;          /* control period */
+    smc_real x;           /* measured position */
+    smc_real v;           /* measured or estimated velocity */
+    smc_real e;           /* x - r */
+    smc_real de;          /* v - r' */
+    smc_real r;           /* reference */
+    smc_real dr;          /* r' */
+    smc_real ddr;         /* r'' */
+    smc_real f;           /* nominal f and g of x'' = f + g u, at the measured x and v */
     smc_real g;
-    smc_real a;        /* estimated acceleration; r'' if the estimator gives none */
-    smc_real limit;    /* bound on |u|, may be infinite */
-    smc_real model;    /* 1 if the law may use f and g, else 0 */
-    smc_real surfaced; /* 1 if the scenario has a surface, else 0 */
-    smc_real s;        /* sliding variable of the scenario's surface */
-    smc_real eq;       /* acceleration of the error that keeps s constant */
-    smc_real q;        /* position of the joint without actuator that this one moves; 0 without such a joint */
-    smc_real dq;       /* its velocity */
-    smc_real fq;       /* its nominal q'' = fq + gq u */
+    smc_real a;           /* estimated acceleration; r'' if the estimator gives none */
+    smc_real limit;       /* bound on |u|, may be infinite */
+    smc_real model;       /* 1 if the law may use f and g, else 0 */
+    smc_real has_surface; /* 1 if the scenario has a surface, else 0 */
+    smc_real s;           /* sliding variable of the scenario's surface */
+    smc_real v_eq;        /* acceleration of the error that keeps s constant */
+    smc_real q;           /* position of the joint without actuator that this one moves; 0 without such a joint */
+    smc_real dq;          /* its velocity */
+    smc_real fq;          /* its nominal q'' = fq + gq u */
     smc_real gq;
 } smc_measurement;
 

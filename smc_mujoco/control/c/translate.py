@@ -19,7 +19,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control.component import Component
-from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 # Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
 KINDS = ("bool", "int", "single", "real")
@@ -460,6 +460,7 @@ class Function:
             return literal(constant, self.program.single, node)
         home, name = self.value(node.value), node.attr
         if home.kind == "y":
+            name = OLD_FIELDS.get(name, name)
             known(name, "measurement", Measurement._fields)
             return Value(f"{home.text}->{name}", "real")
         if home.kind == "gains":

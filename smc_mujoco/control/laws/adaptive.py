@@ -24,7 +24,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
     colour="#D55E00",
 )
 def adaptive(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     K = gains.k0 + memory[0]
     memory[0] += y.dt * gains.gamma * abs(s)
-    return command(y, eq - K * sgn(s)), s
+    return command(y, v_eq - K * sgn(s)), s

@@ -26,8 +26,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
     colour="#56B4E9",
 )
 def adaptive_leak(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     K = gains.k0 + memory[0]
     growth = gains.gamma * abs(s) if abs(s) > gains.deadzone else 0.0
     memory[0] = max(K + y.dt * (growth - gains.leak * K), 0.0) - gains.k0
-    return command(y, eq - K * sgn(s)), s
+    return command(y, v_eq - K * sgn(s)), s

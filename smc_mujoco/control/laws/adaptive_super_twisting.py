@@ -29,9 +29,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
     memory=2,
 )
 def adaptive_super_twisting(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     K = gains.k0 + memory[1]
     v = memory[0] - K * power(s, 0.5)
     memory[0] -= y.dt * 2.0 * gains.eps * K * sgn(s)
     memory[1] += y.dt * gains.rate * (sgn(abs(s) - gains.mu) if gains.least <= K else 1.0)
-    return command(y, eq + v), s
+    return command(y, v_eq + v), s

@@ -28,7 +28,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
     memory=2,
 )
 def barrier_adaptive(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     size = abs(s)
     if size <= 0.5 * gains.eps:
         memory[1] = 1.0
@@ -37,4 +37,4 @@ def barrier_adaptive(y, gains, memory):
         memory[0] += y.dt * gains.K0 * size
     else:
         K = min(size / (gains.eps - size), gains.k_max) if size < gains.eps else gains.k_max
-    return command(y, eq - K * sgn(s)), s
+    return command(y, v_eq - K * sgn(s)), s

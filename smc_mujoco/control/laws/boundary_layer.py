@@ -31,5 +31,5 @@ REST = Rest(
     rest=REST,
 )
 def boundary_layer(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    return command(y, eq - gains.k * min(max(s / gains.phi, -1.0), 1.0)), s
+    s, v_eq = sliding(y, gains.c)
+    return command(y, v_eq - gains.k * min(max(s / gains.phi, -1.0), 1.0)), s

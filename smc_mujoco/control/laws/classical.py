@@ -18,5 +18,5 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     colour="#E69F00",
 )
 def classical(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    return command(y, eq - gains.k * sgn(s)), s
+    s, v_eq = sliding(y, gains.c)
+    return command(y, v_eq - gains.k * sgn(s)), s

@@ -31,9 +31,9 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     colour="#6A4C93",
 )
 def conditioned_super_twisting(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     free = memory[0] - gains.k1 * power(s, 0.5)
-    u = command(y, eq + free)
+    u = command(y, v_eq + free)
     bounded = min(max(u, -y.limit), y.limit)
     memory[0] -= y.dt * gains.k2 * sgn(memory[0] - free - input_gain(y) * (bounded - u))
     return bounded, s

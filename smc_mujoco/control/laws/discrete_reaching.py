@@ -25,6 +25,6 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
     },
 )
 def discrete_reaching(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    stretch = 1.0 + 0.5 * gains.c * y.dt if y.surfaced == 0.0 else 1.0
-    return command(y, (eq - gains.q * s - gains.eps * sgn(s)) / stretch), s
+    s, v_eq = sliding(y, gains.c)
+    stretch = 1.0 + 0.5 * gains.c * y.dt if y.has_surface == 0.0 else 1.0
+    return command(y, (v_eq - gains.q * s - gains.eps * sgn(s)) / stretch), s

@@ -23,10 +23,10 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     memory=3,
 )
 def discrete_time(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     d = (s - memory[0]) / y.dt - memory[1] if memory[2] != 0.0 else 0.0
     v = min(max(-(s / y.dt + d), -gains.k), gains.k)
-    u = command(y, eq + v)
+    u = command(y, v_eq + v)
     held = v
     if abs(u) > y.limit:
         held = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)

@@ -1,4 +1,4 @@
-"""Disturbance observer with sliding mode: u = (eq - k sgn(s) - d^) / b, s = de + c e, d^ the estimate of e'' - b u = d.
+"""Disturbance observer with sliding mode: u = (v_eq - k sgn(s) - d^) / b, s = de + c e, d^ estimates e'' - b u = d.
 
     d^ = z + l de;  z' = -l (z + l de) - l b u:  so d^' = l (d - d^), a first-order lag of 1 / l
 
@@ -36,7 +36,7 @@ def disturbance_observer(y, gains, memory):
     if memory[0] != 0.0:  # memory: started, d^, last de, the acceleration b u + f - r'' of the last period
         acceleration = (y.de - memory[2]) / y.dt
         memory[1] += (1.0 - math.exp(-gains.l * y.dt)) * (acceleration - memory[3] - memory[1])
-    s, eq = sliding(y, gains.c)
-    u = (eq - gains.k * sgn(s) - memory[1] - known) / b
+    s, v_eq = sliding(y, gains.c)
+    u = (v_eq - gains.k * sgn(s) - memory[1] - known) / b
     memory[0], memory[2], memory[3] = 1.0, y.de, b * min(max(u, -y.limit), y.limit) + known
     return u, s

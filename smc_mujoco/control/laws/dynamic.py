@@ -26,11 +26,11 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
     short="DY",
 )
 def dynamic(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     rate = (s - memory[1]) / y.dt if memory[2] != 0.0 else 0.0
     memory[1], memory[2] = s, 1.0
-    u, w = command(y, eq + memory[0]), memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
-    after = command(y, eq + w)
+    u, w = command(y, v_eq + memory[0]), memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
+    after = command(y, v_eq + w)
     if abs(after) <= y.limit or abs(after) < abs(u):
         memory[0] = w
     return u, s

@@ -23,5 +23,5 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, Gain
     conditions={"k > 0": lambda g: g.k > 0.0},
 )
 def exponential_reaching(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    return command(y, eq - (gains.k * sgn(s) + gains.q * s)), s
+    s, v_eq = sliding(y, gains.c)
+    return command(y, v_eq - (gains.k * sgn(s) + gains.q * s)), s

@@ -29,6 +29,6 @@ from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
     conditions={"a < 1 < b": lambda g: g.a < 1.0 < g.b, "k1, k2 > 0": lambda g: g.k1 > 0.0 and g.k2 > 0.0},
 )
 def fixed_time(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     pull = gains.k1 * power(s, gains.a) + gains.k2 * power(s, gains.b)
-    return command(y, eq - (pull + gains.k * sgn(s))), s
+    return command(y, v_eq - (pull + gains.k * sgn(s))), s

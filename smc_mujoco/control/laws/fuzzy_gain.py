@@ -53,8 +53,8 @@ def inferred(size, rate):
     memory=2,
 )
 def fuzzy_gain(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     rate = (abs(s) - memory[0]) / y.dt if memory[1] != 0.0 else 0.0
     memory[0], memory[1] = abs(s), 1.0
     K = gains.k_min + (gains.k_max - gains.k_min) * inferred(abs(s) / gains.width, rate / gains.rate)
-    return command(y, eq - K * sgn(s)), s
+    return command(y, v_eq - K * sgn(s)), s

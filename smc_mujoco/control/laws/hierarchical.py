@@ -46,10 +46,10 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
     requires_model=True,
 )
 def hierarchical(y, gains, memory):
-    s1, eq = sliding(y, gains.c1)
+    s1, v_eq = sliding(y, gains.c1)
     s = gains.a * s1 + y.dq + gains.c2 * y.q
     reaching = -gains.k * sgn(s) - gains.rate * s
     if y.model == 0.0:
         return reaching / gains.a, s
-    drift = gains.a * (y.f - y.ddr - eq) + y.fq + gains.c2 * y.dq  # S' without u
+    drift = gains.a * (y.f - y.ddr - v_eq) + y.fq + gains.c2 * y.dq  # S' without u
     return (reaching - drift) / (gains.a * y.g + y.gq), s

@@ -21,5 +21,5 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
 )
 def implicit_first_order(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    return command(y, eq - min(max(s / y.dt, -gains.k), gains.k)), s
+    s, v_eq = sliding(y, gains.c)
+    return command(y, v_eq - min(max(s / y.dt, -gains.k), gains.k)), s

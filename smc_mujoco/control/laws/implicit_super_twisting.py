@@ -31,12 +31,12 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
 )
 def implicit_super_twisting(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     b, step = s + y.dt * memory[0], y.dt * gains.k2
     if abs(b) <= y.dt * step:
         memory[0] -= b / y.dt
-        return command(y, eq + memory[0]), s
+        return command(y, v_eq + memory[0]), s
     half = 0.5 * y.dt * gains.k1
     root = math.sqrt(half * half + abs(b) - y.dt * step) - half
     memory[0] -= step * sgn(b)
-    return command(y, eq - gains.k1 * root * sgn(b) + memory[0]), s
+    return command(y, v_eq - gains.k1 * root * sgn(b) + memory[0]), s

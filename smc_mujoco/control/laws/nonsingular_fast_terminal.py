@@ -1,9 +1,9 @@
-"""Non-singular fast terminal: u = eq - k sgn(s) - rate s, s = e + a [e]^q + b [de]^p, 1 < p < 2, q > p.
+"""Non-singular fast terminal: u = v_eq - k sgn(s) - rate s, s = e + a [e]^q + b [de]^p, 1 < p < 2, q > p.
 
-eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - eq). s = 0 is reached in finite time for
-e'' = u + d, |d| <= D < k, and sooner from far away because of the term rate s. On s = 0, de = -[(e + a [e]^q) /
+v_eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - v_eq). s = 0 is reached in finite time
+for e'' = u + d, |d| <= D < k, and sooner from far away because of the term rate s. On s = 0, de = -[(e + a [e]^q) /
 b]^(1/p), so e reaches 0 in finite time, faster from far away than with a = 0. Without the model, e'' = f + g u + d
-contains (g - 1) eq too: the condition is k g > |f + d| + |g - 1| |eq|, with the de above on s = 0.
+contains (g - 1) v_eq too: the condition is k g > |f + d| + |g - 1| |v_eq|, with the de above on s = 0.
 Gains: k, switching gain [N]; rate, reaching rate [N/m]; a [m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q,
 exponents.
 Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J.
@@ -32,5 +32,5 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
 def nonsingular_fast_terminal(y, gains, memory):
     s = y.e + gains.a * power(y.e, gains.q) + gains.b * power(y.de, gains.p)
     slope = 1.0 + gains.a * gains.q * abs(y.e) ** (gains.q - 1.0)
-    eq = -power(y.de, 2.0 - gains.p) * slope / (gains.b * gains.p)
-    return command(y, eq - (gains.k * sgn(s) + gains.rate * s)), s
+    v_eq = -power(y.de, 2.0 - gains.p) * slope / (gains.b * gains.p)
+    return command(y, v_eq - (gains.k * sgn(s) + gains.rate * s)), s

@@ -28,5 +28,5 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
     rest=REST,
 )
 def observer_free(y, gains, memory):
-    s, eq = sliding(y, gains.k1)
-    return command(y, eq - gains.lam * math.tanh(s)), s
+    s, v_eq = sliding(y, gains.k1)
+    return command(y, v_eq - gains.lam * math.tanh(s)), s

@@ -36,8 +36,8 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
     memory=1,
 )
 def observer_free_adaptive(y, gains, memory):
-    s, eq = sliding(y, gains.k1)
+    s, v_eq = sliding(y, gains.k1)
     w = memory[0]
     growth = gains.gamma * max(abs(s) - gains.deadzone, 0.0)
     memory[0] = min(max(w + y.dt * (growth - gains.leak * w), 0.0), gains.w_max)
-    return command(y, eq - (gains.lam + w) * math.tanh(s)), s
+    return command(y, v_eq - (gains.lam + w) * math.tanh(s)), s

@@ -30,9 +30,9 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
     memory=1,
 )
 def observer_free_integral(y, gains, memory):
-    s, eq = sliding(y, gains.k1)
+    s, v_eq = sliding(y, gains.k1)
     whole = s + gains.ki * memory[0]
-    u = command(y, eq - y.model * gains.ki * y.e - gains.lam * math.tanh(whole))
+    u = command(y, v_eq - y.model * gains.ki * y.e - gains.lam * math.tanh(whole))
     if (abs(whole) <= 2.0 and abs(u) <= y.limit) or y.e * whole < 0.0:
         memory[0] += y.dt * y.e
     return u, whole

@@ -66,10 +66,10 @@ def observer_free_q15(y, gains, memory):
     e, de = word(y.e, gains.e_range), word(y.de, gains.de_range)
     on_e, on_de = word(gains.k1 * gains.e_range / 8.0, 16.0), word(gains.de_range / 8.0, 16.0)
     s = saturated(product(on_e, e, 11) + product(on_de, de, 11))
-    slid, eq = sliding(y, gains.k1)
-    if y.surfaced != 0.0:
+    slid, v_eq = sliding(y, gains.k1)
+    if y.has_surface != 0.0:
         s = word(slid, 8.0)
     i, part = abs(s) >> 7, abs(s) & 127
     T = TABLE[i] + product(TABLE[i + 1] - TABLE[i], part, 7)
     u = product(word(gains.lam, gains.u_range), T if s >= 0 else -T, 15)
-    return command(y, eq - u * gains.u_range / FULL), s * 8.0 / FULL
+    return command(y, v_eq - u * gains.u_range / FULL), s * 8.0 / FULL

@@ -26,12 +26,12 @@ QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 )
 def observer_free_single(y, gains, memory):
     s = np.float32(y.de) + np.float32(gains.k1) * np.float32(y.e)
-    slid, eq = sliding(y, gains.k1)
-    if y.surfaced != 0.0:
+    slid, v_eq = sliding(y, gains.k1)
+    if y.has_surface != 0.0:
         s = np.float32(slid)
     a = QUARTER * min(max(s, -END), END)
     z = a * a
     T = a * (A105 + TEN * z) / (A105 + z * (A45 + z))
     T = (T + T) / (ONE + T * T)
     T = (T + T) / (ONE + T * T)
-    return command(y, eq - float(np.float32(gains.lam) * T)), float(s)
+    return command(y, v_eq - float(np.float32(gains.lam) * T)), float(s)

@@ -29,11 +29,11 @@ TABLE = np.array([math.tanh(END * i / MOST) for i in range(MOST)] + [1.0])
     conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MOST},
 )
 def observer_free_table(y, gains, memory):
-    s, eq = sliding(y, gains.k1)
+    s, v_eq = sliding(y, gains.k1)
     stride = int(MOST / min(max(gains.size, 1.0), MOST))
     place = min(abs(s), END) * (MOST / (END * stride))
     i = int(place)
     low = min(i * stride, MOST)
     high = min(low + stride, MOST)
     T = TABLE[low] + (place - i) * (TABLE[high] - TABLE[low])
-    return command(y, eq - gains.lam * math.copysign(T, s)), s
+    return command(y, v_eq - gains.lam * math.copysign(T, s)), s

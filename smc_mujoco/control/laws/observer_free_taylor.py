@@ -25,7 +25,7 @@ END = 8.0  # 1 - tanh(8) = 2.3e-7
     conditions={"terms is 1, 2, 3, 4 or 5": lambda g: g.terms in (1.0, 2.0, 3.0, 4.0, 5.0)},
 )
 def observer_free_taylor(y, gains, memory):
-    s, eq = sliding(y, gains.k1)
+    s, v_eq = sliding(y, gains.k1)
     a = min(max(s, -END), END) / 8.0
     P = 0.0
     for i in range(min(max(int(gains.terms), 1), 5) - 1, -1, -1):
@@ -33,4 +33,4 @@ def observer_free_taylor(y, gains, memory):
     P *= a
     for _ in range(3):
         P = 2.0 * P / (1.0 + P * P)
-    return command(y, eq - gains.lam * P), s
+    return command(y, v_eq - gains.lam * P), s

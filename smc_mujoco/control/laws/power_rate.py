@@ -25,5 +25,5 @@ from smc_mujoco.control.units import RATE, Gain, force_per
     conditions={"a < 1": lambda g: g.a < 1.0},
 )
 def power_rate(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    return command(y, eq - gains.k * power(s, gains.a)), s
+    s, v_eq = sliding(y, gains.c)
+    return command(y, v_eq - gains.k * power(s, gains.a)), s

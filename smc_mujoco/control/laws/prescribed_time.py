@@ -28,7 +28,7 @@ from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
     conditions={"m >= 1, or u grows without bound towards T": lambda g: g.m >= 1.0},
 )
 def prescribed_time(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     left = gains.T - y.t
     pull = s * min(gains.m / left, 1.0 / y.dt) if left > 0.5 * y.dt else 0.0
-    return command(y, eq - pull - gains.k * sgn(s)), s
+    return command(y, v_eq - pull - gains.k * sgn(s)), s

@@ -31,7 +31,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
 )
 def proper_super_twisting(y, gains, memory):
-    s, eq = sliding(y, gains.c)
+    s, v_eq = sliding(y, gains.c)
     w, root = memory[0], 0.0
     if abs(s) <= y.dt * y.dt * gains.k2:
         memory[0] = w - s / y.dt
@@ -39,4 +39,4 @@ def proper_super_twisting(y, gains, memory):
         half = 0.5 * y.dt * gains.k1
         root = math.sqrt(half * half + abs(s) - y.dt * y.dt * gains.k2) - half
         memory[0] = w - y.dt * gains.k2 * sgn(s)
-    return command(y, eq - gains.k1 * root * sgn(s) + 2.0 * memory[0] - w), s
+    return command(y, v_eq - gains.k1 * root * sgn(s) + 2.0 * memory[0] - w), s

@@ -36,7 +36,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_ROOT, FORCE_RATE, RATE, Ga
     colour="#009E73",
 )
 def super_twisting(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    v = eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
+    s, v_eq = sliding(y, gains.c)
+    v = v_eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
     memory[0] = min(max(memory[0] - y.dt * gains.k2 * sgn(s), -gains.w_max), gains.w_max)
     return command(y, v), s

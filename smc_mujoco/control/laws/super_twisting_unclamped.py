@@ -24,7 +24,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     label="Super-twisting, unclamped",
 )
 def super_twisting_unclamped(y, gains, memory):
-    s, eq = sliding(y, gains.c)
-    v = eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
+    s, v_eq = sliding(y, gains.c)
+    v = v_eq - gains.k1 * math.copysign(math.sqrt(abs(s)), s) + memory[0]
     memory[0] -= y.dt * gains.k2 * sgn(s)
     return command(y, v), s

@@ -1,9 +1,9 @@
-"""Terminal: u = eq - k sgn(s), s = de + b [e]^p, eq = -b p |e|^(p-1) de bounded by `bound`, 1/2 < p < 1.
+"""Terminal: u = v_eq - k sgn(s), s = de + b [e]^p, v_eq = -b p |e|^(p-1) de bounded by `bound`, 1/2 < p < 1.
 
-s = 0 is reached in finite time for e'' = u + d, |d| <= D < k. From there e = 0 after |e|^(1-p) / (b (1-p)). eq is
+s = 0 is reached in finite time for e'' = u + d, |d| <= D < k. From there e = 0 after |e|^(1-p) / (b (1-p)). v_eq is
 singular at e = 0 away from the surface. On the surface it is b^2 p |e|^(2p-1), where the bound changes nothing. Without
-the model, e'' = f + g u + d contains (g - 1) eq too: the condition is k g > |f + d| + |g - 1| |eq|.
-Gains: k, switching gain [N]; b, of the surface [m^(1-p)/s]; p, exponent; bound, on |eq| [N].
+the model, e'' = f + g u + d contains (g - 1) v_eq too: the condition is k g > |f + d| + |g - 1| |v_eq|.
+Gains: k, switching gain [N]; b, of the surface [m^(1-p)/s]; p, exponent; bound, on |v_eq| [N].
 Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
 Control 115(3):554, 1993 (law); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
 systems", Automatica 49(6):1715, 2013 (bound).
@@ -28,7 +28,7 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     short="TE",
 )
 def terminal(y, gains, memory):
-    s, eq = y.de + gains.b * power(y.e, gains.p), 0.0
+    s, v_eq = y.de + gains.b * power(y.e, gains.p), 0.0
     if y.e != 0.0:
-        eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
-    return command(y, min(max(eq, -gains.bound), gains.bound) - gains.k * sgn(s)), s
+        v_eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
+    return command(y, min(max(v_eq, -gains.bound), gains.bound) - gains.k * sgn(s)), s

@@ -1,8 +1,8 @@
 """Predefined time: s = de + exp(|e|^p) [e]^(1-p) / (p T), 0 < p < 1/2; on s = 0 the error ends before T from anywhere.
 
-It ends at T (1 - exp(-|e(0)|^p)): the bound T is itself a gain. eq is singular at e = 0 away from the surface. On the
-surface it is of order |e|^(1-2p), where `bound` changes nothing unless eq exceeds it.
-Gains: T, bound on the time of convergence [s]; p, exponent; bound, on |eq| [m/s^2].
+It ends at T (1 - exp(-|e(0)|^p)): the bound T is itself a gain. v_eq is singular at e = 0 away from the surface. On the
+surface it is of order |e|^(1-2p), where `bound` changes nothing unless v_eq exceeds it.
+Gains: T, bound on the time of convergence [s]; p, exponent; bound, on |v_eq| [m/s^2].
 Source: J. Sanchez-Torres, E. Sanchez & A. Loukianov, "Predefined-time stability of dynamical systems with sliding
 modes", Proc. American Control Conf., 5842, 2015.
 """
@@ -28,5 +28,5 @@ def predefined_time(y, gains, memory):
     if size == 0.0:
         return y.de, 0.0
     grown = math.exp(min(size**p, 300.0)) / (p * gains.T)
-    eq = -grown * (p + (1.0 - p) * size**-p) * y.de
-    return y.de + grown * power(y.e, 1.0 - p), min(max(eq, -gains.bound), gains.bound)
+    v_eq = -grown * (p + (1.0 - p) * size**-p) * y.de
+    return y.de + grown * power(y.e, 1.0 - p), min(max(v_eq, -gains.bound), gains.bound)

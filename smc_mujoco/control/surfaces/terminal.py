@@ -1,8 +1,8 @@
 """Terminal: s = de + b [e]^p, 1/2 < p < 1; on s = 0 the error ends at |e(0)|^(1-p) / (b (1-p)).
 
-eq = -b p |e|^(p-1) de is singular at e = 0 away from the surface. On the surface it is b^2 p [e]^(2p-1), finite for p >
-1/2, where `bound` changes nothing unless eq exceeds it.
-Gains: b, of the surface [m^(1-p)/s]; p, exponent; bound, on |eq| [m/s^2].
+v_eq = -b p |e|^(p-1) de is singular at e = 0 away from the surface. On the surface it is b^2 p [e]^(2p-1), finite for p
+> 1/2, where `bound` changes nothing unless v_eq exceeds it.
+Gains: b, of the surface [m^(1-p)/s]; p, exponent; bound, on |v_eq| [m/s^2].
 Sources: S. Venkataraman & S. Gulati, "Control of nonlinear systems using terminal sliding modes", J. Dyn. Syst. Meas.
 Control 115(3):554, 1993 (surface); Y. Feng, X. Yu & F. Han, "On nonsingular terminal sliding-mode control of nonlinear
 systems", Automatica 49(6):1715, 2013 (bound).
@@ -26,5 +26,5 @@ def terminal(y, gains, memory):
     s = y.de + gains.b * power(y.e, gains.p)
     if y.e == 0.0:
         return s, 0.0
-    eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
-    return s, min(max(eq, -gains.bound), gains.bound)
+    v_eq = -gains.b * gains.p * abs(y.e) ** (gains.p - 1.0) * y.de
+    return s, min(max(v_eq, -gains.bound), gains.bound)

@@ -124,14 +124,23 @@ def test_every_number_of_the_measurement_is_where_the_header_says(file):
     def summed(y, gains, memory):
         return (
             0.0 * y.t + 1.0 * y.dt + 2.0 * y.x + 3.0 * y.v + 4.0 * y.e + 5.0 * y.de + 6.0 * y.r + 7.0 * y.dr
-            + 8.0 * y.ddr + 9.0 * y.f + 10.0 * y.g + 11.0 * y.a + 13.0 * y.model + 14.0 * y.surfaced + 15.0 * y.s
-            + 16.0 * y.eq + 17.0 * y.q + 18.0 * y.dq + 19.0 * y.fq + 20.0 * y.gq
+            + 8.0 * y.ddr + 9.0 * y.f + 10.0 * y.g + 11.0 * y.a + 13.0 * y.model + 14.0 * y.has_surface + 15.0 * y.s
+            + 16.0 * y.v_eq + 17.0 * y.q + 18.0 * y.dq + 19.0 * y.fq + 20.0 * y.gq
         ), y.limit  # fmt: skip
 
     more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
     mine = smc.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
     theirs = smc.law_function(plants=("cart_pole",))(summed.function)
     assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
+
+
+def test_fields_of_the_measurement_keep_their_old_names(file):
+    with pytest.warns(DeprecationWarning, match="my_law.c reads y->(eq|surfaced), which is now y->(v_eq|has_surface)"):
+        former = smc.law_from_c(file(law("out[0] = y->eq - 2.0 * y->surfaced;")), name="former")
+    present = smc.law_from_c(file(law("out[0] = y->v_eq - 2.0 * y->has_surface;")), name="present")
+    before, now = smc.run([scenario(one, surface="linear", duration=0.02) for one in (former, present)])
+    assert same(before, now)
+    assert now.u.max() < 0.0
 
 
 def test_single_precision_is_single_within_and_double_without(file):
