@@ -31,7 +31,7 @@ from smc_mujoco.simulation.trace import Trace, from_log
 RAISES = (Exception, SystemExit)  # what may end a user's function while the other runs go on
 RETURNS = {  # what a component returns, for messages
     "law": "the two numbers u, s",
-    "surface": "the two numbers s, eq",
+    "surface": "the two numbers s, v_eq",
     "estimator": "a velocity, or it and an acceleration",
 }
 LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {MAX_STATE:g}, or NaN)"

@@ -25,8 +25,8 @@ def changes(name):
     law, found, random = smc.law(name), set(), np.random.default_rng(0)
     for _ in range(40):
         numbers = random.normal(size=len(Measurement._fields))
-        model, surfaced = random.choice([0.0, 1.0], size=2)
-        known = {"t": abs(numbers[0]), "dt": 1e-3, "limit": 3.0, "model": model, "surfaced": surfaced, "g": 2.0}
+        model, has_surface = random.choice([0.0, 1.0], size=2)
+        known = {"t": abs(numbers[0]), "dt": 1e-3, "limit": 3.0, "model": model, "has_surface": has_surface, "g": 2.0}
         y = Measurement(*numbers)._replace(**known)
         memory = np.abs(random.normal(size=law.memory))
         one = memory.copy()
@@ -63,7 +63,7 @@ def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
     assert reads(position_only) == {"e", "g"}
     assert PROPERTIES["no-velocity"].holds(position_only)
     assert reads(hands_on) == set(Measurement._fields)
-    assert {"surfaced", "model", "ddr"} <= reads(catalogue()["classical"])  # in `sliding` and `command`
+    assert {"has_surface", "model", "ddr"} <= reads(catalogue()["classical"])  # in `sliding` and `command`
 
 
 # continuity
