@@ -127,43 +127,52 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 def _free(used: set[str]) -> str:
     """Return the colour farthest from all in the picture: one of the laws', or of a grid if none is far enough."""
     stated = [template.colour for template in catalogue().values() if template.colour]
-
-    def apart(colour: str) -> float:
-        return min(distance(colour, other) for other in (*used, PAPER, DISTURBANCE, REACTION, FAILED))
-
+    drawn = [*used, PAPER, DISTURBANCE, REACTION, FAILED]
     for colours in (OTHERS, stated):
-        best = max(colours, key=apart)
-        if apart(best) > ALIKE:
+        best, apart = _farthest(colours, drawn)
+        if apart > ALIKE:
             return best
-    return max((colour for colour in _grid(len(used)) if colour not in used), key=apart)
+    return _farthest([colour for colour in _grid(len(used)) if colour not in used], drawn)[0]
+
+
+def _farthest(colours: Sequence[str], others: Sequence[str]) -> tuple[str, float]:
+    """Return the colour whose `distance` to the nearest of the others is largest, and that distance."""
+    from scipy.spatial.distance import cdist
+
+    nearest = cdist([_place(colour) for colour in colours], [_place(other) for other in others]).min(axis=1)
+    return colours[int(nearest.argmax())], float(nearest.max())
 
 
 @functools.cache
 def _grid(count: int) -> tuple[str, ...]:
     """Return a grid of colours that are neither pale nor dull, at least twice as many as `count`."""
-    hues = max(24, -(-count // 2))
+    hues = 24
+    while hues < count / 2:
+        hues *= 2  # a few grids serve all counts
     parts = itertools.product(range(hues), (0.26, 0.4, 0.52), (0.45, 0.7))
     colours = (
         "#" + "".join(f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation))
         for k, lightness, saturation in parts
     )
-    return tuple(colour for colour in colours if _lab(colour)[0] < 0.75)
+    return tuple(colour for colour in colours if 3.0 * _place(colour)[0] < 0.75)
 
 
 @functools.cache
-def _lab(colour: str) -> tuple[float, float, float]:
-    """Return lightness, green-red and blue-yellow of a colour in OKLab (B. Ottosson, 2020), strong colours dampened."""
+def _place(colour: str) -> tuple[float, float, float]:
+    """Return where a colour is for `distance`: a third of its lightness, green-red and blue-yellow.
+
+    They are those of OKLab (B. Ottosson, 2020), strong colours dampened.
+    """
     c = np.array(rgb(colour)) / 255
     cones = OKLAB_CONES @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     lightness, a, b = (OKLAB @ np.cbrt(cones)).tolist()
     damp = min(1.0, CHROMA / math.hypot(a, b)) if a or b else 1.0
-    return lightness, damp * a, damp * b
+    return lightness / 3.0, damp * a, damp * b
 
 
 def distance(one: str, other: str) -> float:
     """Return the distance of two colours in OKLab, in which hue counts most, so that two greens are close."""
-    (l1, a1, b1), (l2, a2, b2) = _lab(one), _lab(other)
-    return math.hypot((l1 - l2) / 3, a1 - a2, b1 - b2)
+    return math.dist(_place(one), _place(other))
 
 
 def law_name(law: Component | str) -> str:

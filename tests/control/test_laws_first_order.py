@@ -295,20 +295,10 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
     stable = m > -damping and ki > 0 and (damping + m) * (K + m * k1) > J * m * ki
     roots = np.roots([J, damping + m, K + m * k1, m * ki])
     assert stable == bool(roots.real.max() < 0)
-    plant = smc.plant("duffing", M=J, delta=damping, alpha=K, beta=0.0)
     law = smc.law("observer_free_integral", lam=lam, k1=k1, ki=ki)
-    # leapfrog from beside the rest that the load leaves
-    size, h, state, z = 1e-6, 1e-3, np.zeros(2), math.atanh(d / lam) / ki
-    memory, largest = np.array([z]), []
-    state[0] = size
-    for _ in range(60_000):
-        u, _ = called(law, measured(*state, dt=h), memory)
-        v = state[1] + h / 2 * (u + d - damping * state[1] - K * state[0]) / J
-        x = state[0] + h * v
-        state[:] = x, v + h / 2 * (u + d - damping * v - K * x) / J
-        largest.append(abs(state[0]))
-    assert plant.n == 1
-    assert (max(largest[-2000:]) < size) == stable
+    size, rest = 1e-6, [math.atanh(d / lam) / ki]  # beside the rest that the load leaves
+    run = plant_b(law, x=(size, 0.0), f=d / J, g=1 / J, rates=(-K / J, -damping / J), memory=rest, duration=60.0)
+    assert (np.abs(run.s[-2000:]).max() < size) == stable
 
 
 def test_observer_free_integral_leaves_no_error_under_a_constant_load_and_the_plain_law_does():

@@ -13,22 +13,24 @@ plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0.
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
+from scipy.linalg import expm
 
-from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import native, reference
 
 
 @dataclasses.dataclass(frozen=True)
 class Force:
     """A disturbance d(t): integral(n, t) is its n-th repeated integral, n = 0 .. 3, with any constants."""
 
-    integral: Callable[[int, float], float]
+    integral: Callable[[int, Any], Any]  # t and the result are numbers or arrays
 
-    def __call__(self, t: float) -> float:
+    def __call__(self, t: Any) -> Any:
         return self.integral(0, t)
 
     def __add__(self, other: "Force") -> "Force":
@@ -44,10 +46,10 @@ def ramp(rate: float) -> Force:
 
 
 def sine(size: float, omega: float = 1.0) -> Force:
-    return Force(lambda n, t: size * omega**-n * math.sin(omega * t - n * math.pi / 2))
+    return Force(lambda n, t: size * omega**-n * np.sin(omega * t - n * math.pi / 2))
 
 
-T, X, V, E, DE, A, SURFACED, S = map(Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s"))
+T, X, V, E, DE, A, HAS_SURFACE, S = map(Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s"))
 
 rest = constant(0.0)
 wave = sine(1.0) + constant(0.5)  # |d| <= 1.5, |d'| <= 1
@@ -107,7 +109,22 @@ class Sampled(NamedTuple):
         return float(np.abs(np.diff(self.u[-len(self.u) // 5 :])).sum())
 
 
-def chain(law, d, x, h, duration, sign=1.0, noise=None, f=0.0, g=1.0, model=0.0, limit=math.inf, dt=None):
+def chain(
+    law,
+    d,
+    x,
+    h,
+    duration,
+    sign=1.0,
+    noise=None,
+    f=0.0,
+    g=1.0,
+    model=0.0,
+    limit=math.inf,
+    dt=None,
+    rates=None,
+    memory=(),
+):
     """A chain of len(x) = 1, 2 or 3 integrators under a law.
 
     Args:
@@ -118,52 +135,67 @@ def chain(law, d, x, h, duration, sign=1.0, noise=None, f=0.0, g=1.0, model=0.0,
       noise: (K,) or (K, n), added to the state that the law sees.
       f, g: constants of the plant; model: 1 where the law may use them.
       limit: bound on |u|.
+      rates: of the last state by each state, (n,): with them a linear plant, without d.
+      memory: the first cells of the law's memory at the start.
     """
     count, n = round(duration / h), len(x)
-    function, gains, memory = rebuild(law.function, lambda f: f), reference.gains_of(law), [0.0] * law.memory
-    errors = None if noise is None else np.broadcast_to(np.reshape(noise, (count, -1)), (count, n)).tolist()
-    taylor = [h**j / math.factorial(j) for j in range(n + 1)]
-    # plain lists and one tuple a sample: this loop is most of what the tests of laws take
-    y = list(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit, model=model))
-    y[SURFACED] = float(n == 1)
-    x, states, log, memories = [float(value) for value in x], [], [], []
-    for k, kick in enumerate(kicked(d, n, h, count).tolist()):
-        seen = x if errors is None else [value + error for value, error in zip(x, errors[k], strict=True)]
-        y[T] = k * h
+    function = native.component(law)  # as the callback calls it
+    y = np.array(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit, model=model))
+    y[HAS_SURFACE] = float(n == 1)
+    gains, out, cells = np.array([*law.gains.values(), 0.0]), np.zeros(2), np.zeros(law.memory + 1)
+    cells[: len(memory)] = memory
+    shift = np.diag(np.ones(n), 1)  # of the states and the push, which is held
+    if rates is not None:
+        shift[n - 1, :n] = rates
+    step, x = expm(h * shift)[:n].copy(), np.array(x, dtype=float)
+    kicks, errors = kicked(d, n, h, count), np.zeros((count, n))
+    errors += 0.0 if noise is None else np.reshape(noise, (count, -1))
+    states, log, memories = np.empty((count, n)), np.empty((count, 2)), np.empty((count, law.memory))
+    arrays = [y, gains, cells, out, x, step, kicks, errors, states, log, memories]
+    numbers = h, f, sign * g, limit
+    raised = _chain(function.address, *(a.ctypes.data for a in arrays), count, n, law.memory, *numbers)
+    assert not raised, f"{law.name} raised"
+    return Sampled(np.arange(count) * h, states, *log.T.copy(), memories)
+
+
+@njit
+def _chain(law, y, gains, cells, out, x, step, kicks, errors, states, log, memories, count, n, size, h, f, g, limit):
+    """Fill states, log (u, s) and memories of a chain, all by address, sample by sample. Return 1 if the law raised."""
+    at, memory, answer, state, moved = pointer(y), pointer(cells), pointer(out), pointer(x), pointer(step)
+    kick, noise, kept = pointer(kicks), pointer(errors), pointer(states)
+    logged, remembered = pointer(log), pointer(memories)
+    for k in range(count):
+        at[T], row = k * h, k * n
+        first = state[0] + noise[row]
         if n == 1:
-            y[V] = y[DE] = y[S] = seen[0]
+            at[V] = at[DE] = at[S] = first
         else:
-            y[X] = y[E] = seen[0]
-            y[V] = y[DE] = seen[1]
-            y[A] = seen[2] if n == 3 else 0.0
-        states.append(x)
-        memories.append(memory.copy())
-        u, s = function(Measurement._make(y), gains, memory)
-        u = min(max(u, -limit), limit)
-        log.append((u, s))
-        x = moved(x, taylor, f + sign * g * u, kick)
-    kept = np.array(memories, dtype=float).reshape(count, law.memory)
-    return Sampled(np.arange(count) * h, np.array(states), *np.array(log, dtype=float).T.copy(), kept)
-
-
-def moved(x, taylor, push, kick):
-    """The states a period later, each by its Taylor series: written out, as a sum over j takes thrice the time."""
-    if len(x) == 1:
-        return [x[0] + taylor[1] * push + kick[0]]
-    last = x[-1] + taylor[1] * push + kick[-1]
-    if len(x) == 2:
-        return [x[0] + taylor[1] * x[1] + taylor[2] * push + kick[0], last]
-    first = x[0] + taylor[1] * x[1] + taylor[2] * x[2] + taylor[3] * push + kick[0]
-    return [first, x[1] + taylor[1] * x[2] + taylor[2] * push + kick[1], last]
+            at[X] = at[E] = first
+            at[V] = at[DE] = state[1] + noise[row + 1]
+            at[A] = state[2] + noise[row + 2] if n == 3 else 0.0
+        for i in range(n):
+            kept[row + i] = state[i]
+        for i in range(size):
+            remembered[k * size + i] = memory[i]
+        if call(law, y, gains, cells, out) != 0:
+            return 1
+        u = min(max(answer[0], -limit), limit)
+        logged[2 * k], logged[2 * k + 1] = u, answer[1]
+        for i in range(n):
+            after = kick[row + i] + moved[i * (n + 1) + n] * (f + g * u)
+            for j in range(n):
+                after += moved[i * (n + 1) + j] * kept[row + j]
+            state[i] = after
+    return 0
 
 
 def kicked(d, n, h, count):
     """What d adds to each state over each period, (K, n): Taylor's remainder of its repeated integrals."""
-    whole = np.array([[d.integral(m, k * h) for m in range(1, n + 1)] for k in range(count + 1)])  # integral m + 1
+    whole = [d.integral(m, np.arange(count + 1) * h) for m in range(1, n + 1)]  # integral m + 1
     kicks = np.empty((count, n))
     for i in range(n):
         m = n - i
-        kicks[:, i] = whole[1:, m - 1] - sum(h**j / math.factorial(j) * whole[:-1, m - j - 1] for j in range(m))
+        kicks[:, i] = whole[m - 1][1:] - sum(h**j / math.factorial(j) * whole[m - j - 1][:-1] for j in range(m))
     return kicks
 
 

@@ -44,10 +44,13 @@ def shortened(s, duration):
 @STUDY
 @pytest.mark.parametrize("condition", smc.paper.CONDITIONS)
 def test_callback_equals_plain_loop_in_every_condition_of_the_study(plant, condition):
-    scenarios = [shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.2) for law in STUDIED]
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        assert trace.failure is None
-        assert_same(trace, reference.run(scenario))
+    """A Latin square: every law in every condition, on one plant; every plant in every condition, under one law."""
+    square = list(smc.paper.CONDITIONS).index(condition) + list(smc.paper.GAINS).index(plant)
+    law = STUDIED[square % len(STUDIED)]
+    scenario = shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.2)
+    trace = smc.run(scenario)
+    assert trace.failure is None
+    assert_same(trace, reference.run(scenario))
 
 
 @pytest.mark.parametrize("model", ["none", "nominal"])
