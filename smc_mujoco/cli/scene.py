@@ -27,10 +27,11 @@ def perform(
     terminal: Terminal,
     export: Sequence[str] = (),
     question: str = "",
+    speed: float | None = None,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
 
-    Each trace is written as .npz, and also in the formats of `export`.
+    Each trace is written as .npz, and also in the formats of `export`. `speed` is the film's.
     """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
@@ -63,7 +64,7 @@ def perform(
         written += figures(scene, traces, out)
     if video:
         with clock("film"):
-            written += film(scene, traces, out, terminal)
+            written += film(scene, traces, out, terminal, speed)
     terminal.print("wrote", style="dim")
     for file in written:
         terminal.note(f"  {printable(str(file))}")
@@ -119,7 +120,7 @@ def _labels(runs: Mapping[str, Trace]) -> list[str]:
     return [label(name) for name in runs]
 
 
-def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal) -> list[Path]:
+def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None = None) -> list[Path]:
     """Film the scene's filmed condition; where nothing can render, print why and return no file."""
     from smc_mujoco.draw.film import film as video
 
@@ -129,5 +130,6 @@ def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal) -> list[Pa
         return []
     runs = list(traces[scene.film].values())
     path = out / f"{slug(scene.film)}.mp4"
-    with bar("film", len(video.clock(runs, video.FPS))) as drawn:
-        return [video.film(runs, path, _labels(traces[scene.film]), _title(scene, scene.film), report=drawn.advance)]
+    names, title = _labels(traces[scene.film]), _title(scene, scene.film)
+    with bar("film", len(video.clock(runs, video.FPS, speed).times)) as drawn:
+        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed)]

@@ -7,6 +7,7 @@ forces are in the reaction too, it is the sign of the actuator's force, which do
 """
 
 import itertools
+import weakref
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ from smc_mujoco.simulation.trace import Trace
 
 HOLD = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
 CALM, STUCK, STRUCK = range(3)  # moods
+_TOUCHES: "weakref.WeakKeyDictionary[Trace, np.ndarray]" = weakref.WeakKeyDictionary()
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
@@ -113,22 +115,31 @@ def backlash_gap(scenario: Scenario) -> float:
 
 
 def in_contact(trace: Trace) -> np.ndarray:
-    """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
+    """Return where each channel touches an obstacle or another channel, (K + 1, n); kept as long as the trace."""
+    if trace not in _TOUCHES:
+        _TOUCHES[trace] = _in_contact(trace)
+    return _TOUCHES[trace]
+
+
+def _in_contact(trace: Trace) -> np.ndarray:
     contact = np.zeros(trace.x.shape, bool)
     if trace.scenario.contact.kind == "none":
         return contact
     parts = shapes(trace.scenario)
     data = [mujoco.MjData(shape.model) for shape in parts]
+    places = parts[0].model.jnt_qposadr[joint_ids(parts[0].model)]
     tables = [_channels(shape.model) for shape in parts]
-    for k in np.flatnonzero((trace.reaction != 0.0).any(axis=1)):
+    reacting = (trace.reaction != 0.0).any(axis=1) if any(hits for hits, _ in tables) else np.zeros(len(trace.t), bool)
+    for k in np.flatnonzero(reacting):
         now = sum(float(trace.t[k]) >= shape.time for shape in parts) - 1
         model, posed, (hits, owner) = parts[now].model, data[now], tables[now]
-        posed.qpos[model.jnt_qposadr[joint_ids(model)]] = trace.x[k]
+        posed.qpos[places] = trace.x[k]
         mujoco.mj_kinematics(model, posed)
         mujoco.mj_collision(model, posed)
-        for touch in posed.contact:
-            if touch.dist <= 0.0 and frozenset(touch.geom.tolist()) in hits:
-                channels = owner[model.geom_bodyid[touch.geom]]
+        touches = posed.contact
+        for geoms in touches.geom[touches.dist <= 0.0].tolist():
+            if frozenset(geoms) in hits:
+                channels = owner[model.geom_bodyid[geoms]]
                 contact[k, channels[channels >= 0]] = True
     return contact
 

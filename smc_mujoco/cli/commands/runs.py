@@ -21,6 +21,15 @@ def run(
     name: options.SceneName,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,
     video: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            max=100.0,
+            help="Playback speed of the film, 1 for real time; default: slow motion where things move fast, and faster"
+            " where they rest.",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
     threads: options.Threads = None,
     export: Annotated[

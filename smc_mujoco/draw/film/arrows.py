@@ -78,9 +78,8 @@ class Loads(NamedTuple):
     reaction: Envelope
 
 
-def loads(trace: Trace, times: np.ndarray, gap: float) -> Loads:
-    """Return ranges and means over the `gap` seconds before each time."""
-    edges = np.concatenate([[times[0] - gap], times])
+def loads(trace: Trace, edges: np.ndarray) -> Loads:
+    """Return ranges and means between consecutive edges, s."""
     return Loads(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction)))
 
 

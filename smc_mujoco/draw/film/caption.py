@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from smc_mujoco.draw import style
+from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.arrows import Scale
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
@@ -41,7 +42,8 @@ class Caption:
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
         self.jumps = style.jumps(traces, names)
         inside = size[0] - 2 * EDGE * scale
-        clock = style.width("00.00 s", TITLE * scale, bold=True) + EDGE * scale
+        clock = style.width("00.000 s", TITLE * scale, bold=True) + EDGE * scale
+        clock += style.width("8× slower", KEY * scale, bold=True) + 2 * KEY * scale
         self.title = style.cropped(
             title or style.plant_name(traces[0].scenario.plant), inside - clock, TITLE * scale, bold=True
         )
@@ -63,7 +65,7 @@ class Caption:
             below += self.badge[:, 1].max()
         top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
         self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
-        self.sheet = functools.lru_cache(maxsize=1)(self._sheet)
+        self.sheet = functools.lru_cache(maxsize=16)(self._sheet)
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """Return the labels, with the time of failure of machines that have failed; default: of all that will fail."""
@@ -104,16 +106,35 @@ class Caption:
         self.badges = np.stack([across - wide / 2, down - high / 2, across + wide / 2, down + high / 2], axis=1)
 
     def over(
-        self, picture: np.ndarray, time: float, failed: tuple[bool, ...], states: tuple[State | None, ...] = ()
+        self,
+        picture: np.ndarray,
+        time: float,
+        failed: tuple[bool, ...],
+        states: tuple[State | None, ...] = (),
+        speed: float = 1.0,
     ) -> np.ndarray:
-        """Return the picture with the text on it, for machines that have failed or not, and their states."""
+        """Return the picture with the text on it: machines that have failed, their states, and the playback speed."""
         past = max((start for start in self.jumps if start <= time), default=None)
         image = Image.fromarray(picture)
-        sheet, s = self.sheet(failed, states, past, past is not None and time < past + NEWS), self.scale
+        sheet = self.sheet(failed, states, past, past is not None and time < past + NEWS)
         image.paste(sheet, mask=sheet)
-        place = self.size[0] - EDGE * s, 16 * s
-        ImageDraw.Draw(image).text(place, f"{time:.2f} s", style.INK, style.font(TITLE * s, bold=True), anchor="ra")
+        self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace.words(speed))
         return np.asarray(image)
+
+    def _clock(self, draw: ImageDraw.ImageDraw, time: str, speed: str) -> None:
+        """Draw the time, and at its left the playback speed."""
+        s, font = self.scale, style.font(TITLE * self.scale, bold=True)
+        right = self.size[0] - EDGE * s
+        draw.text((right, 16 * s), time, style.INK, font, anchor="ra")
+        if not speed:
+            return
+        right -= style.width("00.000 s", TITLE * s, bold=True) + KEY * s
+        left, middle = right - style.width(speed, KEY * s, bold=True) - KEY * s, 28 * s
+        box = left, middle - 0.85 * KEY * s, right, middle + 0.85 * KEY * s
+        fill, rim = (style.INK, style.INK) if speed.endswith("slower") else (style.PAPER, style.MUTED)
+        draw.rounded_rectangle(box, radius=0.85 * KEY * s, fill=fill, outline=rim, width=max(1, round(s)))
+        at, letters = ((left + right) / 2, middle), style.font(KEY * s, bold=True)
+        draw.text(at, speed, style.letters_on(fill), letters, anchor="mm")
 
     def _sheet(
         self, failed: tuple[bool, ...], states: tuple[State | None, ...], change: float | None, news: bool

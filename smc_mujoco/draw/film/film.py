@@ -1,8 +1,8 @@
-"""Films: the machines of all traces side by side in MuJoCo, in real time, above charts that grow with the clock.
+"""Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
 
-scene.py composes the model, stage.py poses it, canvas.py renders it, arrows.py shows forces, caption.py has the text,
-charts.py the charts, encoder.py writes. Frames are made and written one by one, so that memory does not grow with a
-film's length.
+pace.py sets the speed, scene.py composes the model, stage.py poses it, canvas.py renders it, arrows.py shows forces,
+caption.py has the text, charts.py the charts, encoder.py writes. Frames are made and written one by one, so that memory
+does not grow with a film's length.
 """
 
 import contextlib
@@ -17,11 +17,12 @@ from smc_mujoco.common import extras, gl
 from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.decimate import end, finite, windows
-from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.decimate import finite, windows
+from smc_mujoco.draw.film import arrows, pace
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder
+from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
@@ -42,8 +43,11 @@ def film(
     size: tuple[int, int] = (1280, 720),
     fps: float = FPS,
     report: Report = lambda frames: None,
+    speed: float | None = None,
 ) -> Path:
     """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
+
+    Fast motion and blows are shown in slow motion, and rest is shown faster than it was: the clock says so.
 
     Args:
       traces: several, or a single one.
@@ -51,6 +55,7 @@ def film(
       title: default: the plant's name.
       size: width and height in px, even.
       report: called with the number of frames written since its last call.
+      speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
 
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
@@ -58,8 +63,7 @@ def film(
     path = Path(path)
     if path.suffix != ".mp4":
         raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
-    times = clock(traces, fps)
-    pictures = frames(traces, times, labels, title, size)
+    pictures = frames(traces, clock(traces, fps, speed), labels, title, size)
     with replacing(path) as part, contextlib.closing(pictures):
         first = next(pictures)
         with encoder(part, first.shape[:2], fps) as write:
@@ -85,22 +89,21 @@ def clip(
     size: tuple[int, int] = (800, 450),
     fps: float = 20.0,
     report: Report = lambda frames: None,
+    speed: float | None = None,
 ) -> Path:
     """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
     path = Path(path)
     if path.suffix != ".webp":
         raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
-    times = clock(traces, fps)
-    times = times[(times >= span[0]) & (times <= span[1])]
-    if not 0 < len(times) <= 600:
-        raise ScenarioError(
-            f"a clip of {span[0]:g} .. {span[1]:g} s has {len(times)} frames: give a span with 1 to 600"
-        )
+    shown = clock(traces, fps, speed).part(*span)
+    count = len(shown.times)
+    if not 0 < count <= 600:
+        raise ScenarioError(f"a clip of {span[0]:g} .. {span[1]:g} s has {count} frames: give a span with 1 to 600")
     pictures = []
-    for picture in frames(traces, times, labels, title, size):
+    for picture in frames(traces, shown, labels, title, size):
         pictures.append(Image.fromarray(picture))
         report(1)
-    ends = [round(1000 / fps)] * (len(times) - 1) + [PAUSE]
+    ends = [round(1000 / fps)] * (count - 1) + [PAUSE]
     with replacing(path) as part:
         pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
     return path
@@ -118,29 +121,25 @@ def still(
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
-    times = np.array([number("time", time, least=0.0)])
-    with contextlib.closing(frames(traces, times, labels, title, size)) as pictures, replacing(path) as part:
+    now = Clock(np.array([number("time", time, least=0.0)]), np.ones(1))
+    with contextlib.closing(frames(traces, now, labels, title, size)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path
 
 
-def clock(traces: Trace | Sequence[Trace], fps: float) -> np.ndarray:
-    """Return the times of a film's frames, s: 0, 1/fps, ... until the longest trace ends."""
-    traces = style.same_plant(traces)
-    fps = number("fps", fps)
-    if not 1.0 <= fps <= 120.0:
-        raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
-    return np.arange(int(end(traces) * fps + 1e-6) + 1) / fps
+def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
+    """Return the times of a film's frames and the speed of playback at each, see pace.clock."""
+    return pace.clock(style.same_plant(traces), fps, speed)
 
 
 def frames(
     traces: Trace | Sequence[Trace],
-    times: np.ndarray,
+    shown: Clock,
     labels: Sequence[str] | None,
     title: str | None,
     size: tuple[int, int],
 ) -> Generator[np.ndarray]:
-    """Yield the film's pictures at the given times, each (height, width, 3) uint8."""
+    """Yield the film's pictures at the times of a clock, each (height, width, 3) uint8."""
     traces = style.same_plant(traces)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
@@ -152,18 +151,20 @@ def frames(
     scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
     below = 2 * round(CHARTS * size[1] / 2)
     above = size[0], size[1] - below
-    gap = times[1] - times[0] if len(times) > 1 else 1 / 30
+    times = shown.times
+    edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
+    hold = max(states.HOLD, float(np.diff(edges).max()))
     traces = [finite(trace) for trace in traces]
     scales = arrows.scales(traces)
     by_channel = [arrows.by_channel(trace, scales) for trace in traces]
-    loads = [arrows.loads(trace, times, gap) for trace in traces]
-    timelines = [states.timeline(trace, times, max(states.HOLD, gap)) for trace in traces]
+    loads = [arrows.loads(trace, edges) for trace in traces]
+    timelines = [states.timeline(trace, times, hold) for trace in traces]
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines)
     charts = Charts(traces, names, colours, (size[0], below), scale)
     with Stage(traces, colours, above, caption.room) as stage:
         caption.place(stage.boxes)
         places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        ahead = [rotors(trace, times, gap)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
             drawn = []
@@ -175,7 +176,8 @@ def frames(
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
             picture = stage.render(drawn)
             words = tuple(each[frame] for each in timelines)
-            yield np.concatenate([caption.over(picture, time, failed, words), charts.at(time)])
+            over = caption.over(picture, time, failed, words, float(shown.speeds[frame]))
+            yield np.concatenate([over, charts.at(time)])
 
 
 def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
@@ -183,7 +185,6 @@ def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)
 
 
-def rotors(trace: Trace, times: np.ndarray, gap: float) -> np.ndarray:
-    """Return the lead of the rotors over their joints, (times, n): on the flank that pushes, in the mean of a frame."""
-    edges = np.concatenate([[times[0] - gap], times])
+def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:
+    """Return the lead of the rotors over their joints, (edges - 1, n): on the flank that pushes, in the mean."""
     return 0.5 * states.backlash_gap(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean

@@ -102,7 +102,8 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
 
     if why := gl.missing():
         raise ScenarioError(why)
-    times, poster = video.clock(traces, FPS), io.BytesIO()
+    shown, poster = video.clock(traces, FPS), io.BytesIO()
+    count = len(shown.times)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "film.webm")
         writer = imageio_ffmpeg.write_frames(
@@ -111,11 +112,11 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
         try:
             with sigint_blocked():
                 writer.send(None)
-            for k, picture in enumerate(video.frames(traces, times, None, title, SIZE)):
-                if k == min(round(POSTER * FPS), len(times) - 1):
+            for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE)):
+                if k == min(int(np.searchsorted(shown.times, POSTER)), count - 1):
                     Image.fromarray(picture).save(poster, "JPEG", quality=80, optimize=True)
                 writer.send(np.ascontiguousarray(picture))
-                report(k + 1, len(times))
+                report(k + 1, count)
         except OSError as error:
             raise ScenarioError(f"cannot write a film: {' '.join(str(error).split())}; make room") from error
         finally:

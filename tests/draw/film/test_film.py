@@ -18,6 +18,7 @@ from smc_mujoco.draw import states, style
 from smc_mujoco.draw.film import camera, film, scene
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
+from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.plant import Variant
@@ -48,7 +49,16 @@ def broken(trace: smc.Trace, at: int) -> smc.Trace:
 
 
 def pictures(traces, times, **options) -> list[np.ndarray]:
-    return list(film.frames(traces, np.array(times), options.get("labels"), None, options.get("size", SIZE)))
+    return list(
+        film.frames(
+            traces, Clock(np.array(times), np.ones(len(times))), options.get("labels"), None, options.get("size", SIZE)
+        )
+    )
+
+
+def seconds(trace: smc.Trace, fps: float = 30.0) -> np.ndarray:
+    """Times of a film's frames in real time."""
+    return film.clock([trace], fps, 1.0).times
 
 
 def machines(picture: np.ndarray) -> np.ndarray:
@@ -68,7 +78,7 @@ def share(picture: np.ndarray, colour: str) -> float:
 @renders
 def test_film_has_a_frame_every_thirtieth_of_a_second(tmp_path):
     written = []
-    path = film.film(runs(), tmp_path / "new" / "a.mp4", size=SIZE, report=written.append)
+    path = film.film(runs(), tmp_path / "new" / "a.mp4", size=SIZE, report=written.append, speed=1.0)
     read = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     done = subprocess.run(read, capture_output=True, check=True)
     assert len(done.stdout) == 10 * 270 * 480 * 3
@@ -108,7 +118,7 @@ def test_a_large_control_draws_an_arrow():
 def test_arrows_are_to_scale_and_a_bar_shows_switching():
     (trace,) = runs("van_der_pol", "sine", LAWS[:1])
     u = np.where(np.arange(301) % 2, 6.0, -3.0)[:, None]
-    acting = loads(dataclasses.replace(trace, applied=u), np.array([0.1, 0.2]), gap=0.1)
+    acting = loads(dataclasses.replace(trace, applied=u), np.array([0.0, 0.1, 0.2]))
     arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
@@ -225,7 +235,7 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
     still = film.still(traces, 0.1, tmp_path / "a.png", size=SIZE)
     with Image.open(still) as image:
         assert image.size == SIZE
-    with Image.open(film.clip(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE)) as clip:
+    with Image.open(film.clip(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE, speed=1.0)) as clip:
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
@@ -295,7 +305,7 @@ def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> sm
 
 def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
     """What a film tells of a trace, and for how many frames."""
-    told = states.timeline(trace, film.clock([trace], fps))
+    told = states.timeline(trace, seconds(trace, fps))
     return [(now.words if now else None, len(list(run))) for now, run in itertools.groupby(told)]
 
 
@@ -366,7 +376,7 @@ def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
     (before, _), (blow, frames), (after, _) = moods(hit)
     assert (before, blow, after) == (None, "contact", None)
     assert frames / 30 >= states.HOLD
-    words = [now.words if now else None for now in states.timeline(hit, film.clock([hit], 30.0))]
+    words = [now.words if now else None for now in states.timeline(hit, seconds(hit))]
     assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
 
 
@@ -451,7 +461,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
             shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
-    ahead = film.rotors(slack, slack.t, 1e-3)
+    ahead = film.rotors(slack, np.append(-1e-3, slack.t))
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)
@@ -486,7 +496,7 @@ def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
 def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
     traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
-    told = [states.timeline(trace, film.clock(traces, 30.0)) for trace in traces]
+    told = [states.timeline(trace, seconds(trace)) for trace in traces]
     names = style.labels(traces, None)
     caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told)
     with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:

@@ -1,0 +1,125 @@
+"""Playback speed of a film, from its traces: slow motion where things move fast, and faster where they rest.
+
+The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
+should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around blows; and FAST
+where nothing has moved for a while. The same traces give the same film.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.draw import states
+from smc_mujoco.draw.decimate import end, finite
+from smc_mujoco.simulation.trace import Trace
+
+TRAVEL = 0.02  # of its range that a thing moves a frame at most, if the speeds suffice; chosen
+SLOWEST = 3  # powers of two
+STILL = 5e-4  # of its range that a thing at rest moves a frame at most; chosen: less than a pixel in 3 frames
+FAST = 4.0  # times real time, where everything rests
+AROUND = 0.1  # s before and after fast motion that are shown as slowly
+BLOW = 0.04  # s around the start of a contact
+REST = 0.3  # s after motion, and before it, that are not shown faster
+LONGEST = 2.0, 6.0  # duration of a film: in durations of the run, or in s if that is more
+SPEEDS = 0.01, 100.0
+
+
+class Clock(NamedTuple):
+    """Times of a film's frames.
+
+    Attributes:
+      times: of the run, (frames,) s, ascending.
+      speeds: of playback, (frames,), 1 for real time.
+    """
+
+    times: np.ndarray
+    speeds: np.ndarray
+
+    def part(self, start: float, stop: float) -> "Clock":
+        """Return the frames from `start` to `stop` of the run, s."""
+        inside = (self.times >= start - 1e-9) & (self.times <= stop + 1e-9)
+        return Clock(self.times[inside], self.speeds[inside])
+
+
+def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
+    """Return the times of a film's frames from t = 0 to the end of the longest trace.
+
+    Args:
+      speed: of playback, 1 for real time; None for the rule above.
+
+    Raises:
+      ScenarioError: fps or speed out of range.
+    """
+    fps = number("fps", fps)
+    if not 1.0 <= fps <= 120.0:
+        raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
+    whole = end(traces)
+    if speed is not None:
+        speed = number("speed", speed, least=SPEEDS[0], most=SPEEDS[1])
+        times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
+        return Clock(times, np.full(len(times), speed))
+    grid, wanted = speeds(traces, fps)
+    times = [0.0]
+    while times[-1] < whole - 1e-9:
+        now = wanted[np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1]
+        times.append(min(times[-1] + now / fps, whole))
+    found = np.array(times)
+    return Clock(found, wanted[np.searchsorted(grid, found + 1e-9, side="right") - 1])
+
+
+def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the playback speed from each time on: times in s, (m,), the first is 0, and speeds, (m,)."""
+    whole = end(traces)
+    grid = np.arange(max(1, round(whole * fps))) / fps
+    runs = [finite(trace) for trace in traces]
+    travel = motion(runs, np.append(grid, whole))
+    powers = np.ceil(np.log2(np.maximum(travel / TRAVEL, 1.0)) - 1e-9)
+    powers = spread(powers, round(AROUND * fps))
+    for start in blows(runs):
+        powers[np.abs(grid + 0.5 / fps - start) <= BLOW] = SLOWEST
+    moving = spread((travel > STILL).astype(float), round(REST * fps)) > 0.0
+    longest, most = max(LONGEST[0] * whole, LONGEST[1]), SLOWEST
+
+    def bounded() -> np.ndarray:
+        return np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
+
+    while most and (1.0 / bounded()).sum() / fps > longest:
+        most -= 1
+    return grid, bounded()
+
+
+def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
+    """Return how far the machines move between times, (edges - 1,): the largest share of a channel's range."""
+    lasting = [trace for trace in runs if trace.diverged_at is None] or runs
+    low, high = (f([f(trace.x, axis=0) for trace in lasting], axis=0) for f in (np.min, np.max))
+    size = np.where(high > low, high - low, np.inf)
+    travel = np.zeros(len(edges) - 1)
+    for trace in runs:
+        x = np.clip(trace.x, low, high)  # what has left the world does not count
+        seen = np.stack([np.interp(edges, trace.t, each) for each in x.T], axis=1)
+        travel = np.maximum(travel, (np.abs(np.diff(seen, axis=0)) / size).max(axis=1))
+    return travel
+
+
+def blows(runs: Sequence[Trace]) -> list[float]:
+    """Return when contacts begin that were none for a while before, s."""
+    starts = []
+    for trace in runs:
+        touch = states.held(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.HOLD)
+        starts += trace.t[np.flatnonzero(np.diff(touch.astype(int), prepend=1) > 0)].tolist()
+    return starts
+
+
+def spread(y: np.ndarray, reach: int) -> np.ndarray:
+    """Return the largest of y (m,) within `reach` places before and after each."""
+    padded = np.pad(y, reach, mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+
+
+def words(speed: float) -> str:
+    """Return a playback speed in words, as "4× slower"; "" for real time."""
+    if abs(speed - 1.0) < 1e-9:
+        return ""
+    return f"{1.0 / speed:.3g}× slower" if speed < 1.0 else f"{speed:.3g}× faster"

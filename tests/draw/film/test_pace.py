@@ -1,0 +1,120 @@
+"""Playback speed: slow where things move fast and at blows, faster where they rest, real time where asked."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.draw import states
+from smc_mujoco.draw.film import pace
+from smc_mujoco.simulation.trace import ARRAYS
+
+FPS = 30.0
+
+
+@pytest.fixture(scope="module")
+def base() -> smc.Trace:
+    return smc.run(smc.Scenario(plant="duffing", law="none", duration=4.0))
+
+
+def moving(base: smc.Trace, x) -> smc.Trace:
+    """The trace with another motion, a function of time."""
+    return dataclasses.replace(base, x=np.asarray(x(base.t))[:, None])
+
+
+def at(trace_s, times) -> list[float]:
+    """The playback speeds at times."""
+    traces = trace_s if isinstance(trace_s, list) else [trace_s]
+    found = pace.clock(traces, FPS)
+    return [float(found.speeds[np.searchsorted(found.times, t + 1e-9, side="right") - 1]) for t in times]
+
+
+def test_a_number_is_the_speed_of_the_whole_film(base):
+    real = pace.clock([base], FPS, 1.0)
+    np.testing.assert_allclose(real.times, np.arange(121) / 30)
+    half = pace.clock([base], FPS, 0.5)
+    assert len(half.times) == 241
+    assert np.diff(half.times) == pytest.approx(1 / 60)
+    assert (half.speeds == 0.5).all()
+
+
+def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
+    """1 m in 0.1 s is a third of the range a frame; 2 s of rest are shown four times as fast, but for its ends."""
+    trace = moving(base, lambda t: np.clip((t - 2.0) / 0.1, 0.0, 1.0))
+    assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
+
+
+@pytest.mark.parametrize(("seconds", "speed"), [(3.0, 1.0), (1.2, 0.5), (0.5, 0.25), (0.3, 0.125)])
+def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, speed):
+    trace = moving(base, lambda t: np.clip(t / seconds, 0.0, 1.0))
+    assert at(trace, (0.1,)) == [speed]
+    assert speed / (seconds * FPS) <= pace.TRAVEL < 2 * speed / (seconds * FPS) or speed == 1.0
+
+
+def test_the_fastest_machine_and_its_own_channel_s_range_count(base):
+    slow, quick = moving(base, lambda t: 5.0 * t / 4.0), moving(base, lambda t: 1e-3 * np.clip(t / 0.1, 0.0, 1.0))
+    assert at([slow], (0.05,)) == [1.0]
+    assert at([slow, quick], (0.05,)) == [1.0]  # a thousandth of what is in view
+    assert at([quick], (0.05,)) == [0.125]
+
+
+def test_films_are_at_most_twice_as_long_as_runs(base):
+    trace = moving(base, lambda t: np.sin(20.0 * t))  # more than a fifth of its range a frame, all the time
+    found = pace.clock([trace], FPS)
+    assert 4.0 < len(found.times) / FPS <= 8.1
+    assert set(found.speeds) == {0.5}
+
+
+def test_frames_ascend_from_start_to_end_and_tell_their_speed(base):
+    found = pace.clock([base], FPS)
+    assert (found.times[0], found.times[-1]) == (0.0, pytest.approx(4.0))
+    steps = np.diff(found.times)
+    assert (steps > 0.0).all()
+    np.testing.assert_allclose(steps[:-1] * FPS, found.speeds[:-2], rtol=1e-6)
+
+
+def test_blows_are_slowest(monkeypatch):
+    trace = smc.run(smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0))
+    touch = trace.t[states.in_contact(trace)[:, 0]]
+    first = float(touch[0])
+    assert pace.blows([trace])[0] == pytest.approx(first)
+    assert at(trace, (first,)) == [0.125]
+    monkeypatch.setattr(states, "in_contact", lambda trace: np.zeros(trace.x.shape, bool))
+    assert at(trace, (first,)) == [0.25]
+
+
+def test_what_leaves_the_world_does_not_make_the_others_rest(base):
+    good = moving(base, lambda t: np.clip(t / 0.3, 0.0, 1.0))
+    arrays = {name: getattr(base, name).copy() for name in ARRAYS if name != "t"}
+    arrays["x"][:, 0] = np.exp(40.0 * base.t)
+    for array in arrays.values():
+        array[2000:] = np.nan
+    bad = dataclasses.replace(base, **arrays, diverged_at=2.0, failure="it left the finite world")
+    assert at([good, bad], (0.1,)) == [0.125]
+    assert len(pace.clock([bad], FPS).times) > 10
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"), [(1.0, ""), (0.125, "8× slower"), (4.0, "4× faster"), (0.3, "3.33× slower")]
+)
+def test_speeds_in_words(speed, words):
+    assert pace.words(speed) == words
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, 1e3, float("nan"), "fast"])
+def test_speeds_that_are_none_are_refused(base, speed):
+    with pytest.raises(smc.ScenarioError, match="speed is"):
+        pace.clock([base], FPS, speed)
+
+
+def test_most_frames_of_a_settling_run_show_motion():
+    traces = smc.run(
+        list(smc.paper.comparison("van_der_pol", laws=("observer_free", "classical"), duration=10.0).values())
+    )
+    shares = []
+    for speed in (1.0, None):
+        found = pace.clock(traces, FPS, speed)
+        shares.append((pace.motion(traces, found.times) > pace.STILL * found.speeds[:-1]).mean())
+    assert shares[0] < 0.3
+    assert shares[1] > 0.6
