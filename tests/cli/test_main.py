@@ -180,7 +180,7 @@ scene = smc.Scene(title="Asked", conditions={"calm": {"only": run}}, answer=lamb
 ''')
     code, out, _ = call("run", "asks.py", "--no-video", "--out", "out")
     assert code == 0
-    assert [line for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked"]
+    assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked"]
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
 
 
