@@ -14,7 +14,7 @@ from rich.text import Text
 
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
@@ -26,7 +26,7 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
-from smc_mujoco.studies.paper.claims.verdict import Check, Claim
+from smc_mujoco.studies.paper.claims.verdict import Claim
 
 # Columns of a table of scores: heading -> metric.
 SHOWN = {
@@ -321,12 +321,9 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
 def tuning(tuned: Tuned) -> Table:
     """Return a line for each tuned gain: its value, the bounds of its search, and whether it is at one of them."""
     title = f"{tuned.law.name} on {tuned.plant.name}"
-    heads = ("gain", "tuned", "searched from", "to", "")
-    table = Table(*heads, title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for name, (low, high) in tuned.searched.items():
-        notes = [f"at its {tuned.at_bound[name]} bound"] if name in tuned.at_bound else []
-        notes += ["bound widened by a decade"] if name in tuned.widened else []
-        table.add_row(name, f"{tuned.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes))
+    table = Table(*HEADINGS, title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for line in tuned.lines():
+        table.add_row(*line)
     return table
 
 
@@ -366,7 +363,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
         one = claim.decisive(sets[-1])
         marks = [MARKS[claim.verdicts[name]] for name in shown]
         words = Text(f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict])
-        decided = check_sentence(one) if one else claim.note
+        decided = str(one) if one else claim.note
         table.add_row(claim.id, Text(claim.text), MARKS[claim.verdict] + words, *marks, Text(decided))
     return table
 
@@ -392,20 +389,8 @@ def _print_claim(claim: Claim, console: Console) -> None:
         table = plain(*columns, title=title, title_justify="left")
         for one in claim.checks(name):
             mark = Text("✓", COLOURS[verdicts.SUPPORTED]) if one.holds else Text("✗", COLOURS[verdicts.REFUTED])
-            limit = f"{one.relation} {_measured(one.limit, one.what)}"
-            table.add_row(mark, Text(one.what), _measured(one.value, one.what), limit)
+            limit = f"{one.relation} {verdicts.measured(one.limit, one.what)}"
+            table.add_row(mark, Text(one.what), verdicts.measured(one.value, one.what), limit)
         for what, value in claim.beside[name].items():
-            table.add_row("", Text(what, style="dim"), Text(_measured(value, what), style="dim"), "")
+            table.add_row("", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), "")
         console.print(Padding(table, (0, 0, 1, 2)))
-
-
-def check_sentence(one: Check) -> str:
-    """Return a check in one line: the measured value, and the limit of the claim."""
-    return f"{one.what} = {_measured(one.value, one.what)} (asked: {one.relation} {_measured(one.limit, one.what)})"
-
-
-def _measured(value: float, what: str) -> str:
-    """Return three significant digits; "none" for NaN, and "never" for an infinite time."""
-    if math.isnan(value):
-        return "none"
-    return "never" if value == math.inf and "time" in what else f"{value:.3g}"

@@ -31,6 +31,23 @@ def extra(name: str, what: str) -> Iterator[None]:
         raise MissingPackageError(f"{what} needs an optional package ({error}): {cure(name)}") from error
 
 
+@contextlib.contextmanager
+def package(name: str, what: str) -> Iterator[None]:
+    """Import a package that belongs to no extra, in a with block.
+
+    Args:
+      name: as pip knows it.
+      what: what needs it; begins the sentence.
+
+    Raises:
+      MissingPackageError: an import in the block failed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise MissingPackageError(f"{what} needs {name} ({error}): pip install {name}") from error
+
+
 def missing(name: str, what: str, *packages: str) -> str | None:
     """Return None if packages of an extra are installed, else a sentence that says which are not.
 

@@ -1,6 +1,8 @@
-"""Progress bars on stderr, for work that may take more than two seconds."""
+"""Progress bars for work that may take more than two seconds: on stderr, and in a notebook's cell."""
 
 import contextlib
+import html
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -43,16 +45,66 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         TimeRemainingColumn,
     )
 
+    console = Console(stderr=True)
+    if console.is_jupyter:
+        with contextlib.closing(NotebookBar(what, whole, counted)) as cell:
+            yield cell
+        return
     share = MofNCompleteColumn() if counted else TaskProgressColumn()
     columns = TextColumn("{task.description}"), BarColumn(), share, TimeRemainingColumn()
-    console = Console(stderr=True)
-    hidden = not (console.is_terminal or console.is_jupyter)  # a log file gets no empty lines
+    hidden = not console.is_terminal  # a log file gets no empty lines
     with Progress(*columns, transient=True, console=console, speed_estimate_period=120, disable=hidden) as progress:
         task, drawn = progress.add_task(what, total=whole), Bar()
         drawn.advance = lambda work: progress.advance(task, work)
         drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
         drawn.says = lambda text: progress.update(task, description=text)
         yield drawn
+
+
+class NotebookBar(Bar):
+    """A bar in a notebook's cell, which vanishes in the end. It is HTML: rich would need ipywidgets, and warn."""
+
+    def __init__(self, what: str, whole: float | None, counted: bool):
+        from IPython.display import HTML, display
+
+        self.what, self.whole, self.counted, self.html = what, whole, counted, HTML
+        self.done, self.start, self.drawn = 0.0, time.monotonic(), -math.inf
+        self.cell = display(HTML(""), display_id=True)
+
+    def advance(self, work: float) -> None:
+        """Add work that is done."""
+        self.reached(self.done + work, self.whole or 0.0)
+
+    def reached(self, done: float, whole: float) -> None:
+        """Set the work done and the whole."""
+        self.done, self.whole = done, whole
+        self._draw()
+
+    def says(self, text: str) -> None:
+        """Change the text beside the bar."""
+        self.what = text
+        self._draw()
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self.cell is not None:
+            self.cell.update(self.html(""))
+
+    def _draw(self) -> None:
+        """Draw the bar as it is, at most five times a second."""
+        now = time.monotonic()
+        if self.cell is not None and now - self.drawn >= 0.2:
+            self.drawn = now
+            self.cell.update(self.html(str(self)))
+
+    def __str__(self) -> str:
+        if not self.whole:
+            return f"<progress></progress> {html.escape(self.what)}"
+        share = min(1.0, self.done / self.whole)
+        size = f"{self.done:g}/{self.whole:g}" if self.counted else f"{100 * share:.0f} %"
+        left = (time.monotonic() - self.start) * (1.0 / share - 1.0) if share else math.inf
+        rest = f", {left:.0f} s left" if left < math.inf else ""
+        return f'<progress value="{share:.3f}" max="1"></progress> {html.escape(self.what)} {size}{rest}'
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:

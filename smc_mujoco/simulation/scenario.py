@@ -203,6 +203,11 @@ class Scenario:
         vars(made).update(self.__getstate__() | _defaults(self))
         return made
 
+    def _repr_html_(self) -> str:
+        from smc_mujoco.simulation import notebook
+
+        return notebook.scenario(self)
+
     def named(self, condition: str | None) -> "Scenario":
         """Return this scenario with a name for its condition. Tables show it; the run is the same."""
         made = copy.copy(self)

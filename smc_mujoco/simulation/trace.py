@@ -5,16 +5,22 @@ import math
 import os
 import zipfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib import format as npy
 
 from smc_mujoco.common.errors import ScenarioError, find, one_line
+from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.state import LOGGED
+
+if TYPE_CHECKING:
+    import pandas  # pyright: ignore[reportMissingImports]
+    import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
 LONGEST_FAILURE = 500  # characters; chosen
@@ -70,6 +76,11 @@ class Trace:
         end = "" if self.diverged_at is None else f", {self.failure}"
         return f"Trace({self.scenario.plant.name}, {self.scenario.law}, {len(self.t)} samples{end})"
 
+    def _repr_html_(self) -> str:
+        from smc_mujoco.simulation import notebook
+
+        return notebook.trace(self)
+
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .npz file that `smc.load` reads back. Make folders. Replace an old file whole or not at all."""
         path = Path(path)
@@ -104,6 +115,48 @@ class Trace:
             x = self.scenario.plant.units[int(column[len(name) :] or 0)]
             found[column] = {"t": "s", "x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
         return found
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return the `columns` as a pandas DataFrame, indexed by t. Its `attrs` have the "units" and the "scenario".
+
+        Raises:
+          MissingPackageError: pandas is not installed.
+        """
+        with package("pandas", "Trace.to_pandas"):
+            import pandas  # pyright: ignore[reportMissingImports]
+
+        columns = self.columns()
+        frame = pandas.DataFrame(columns, index=pandas.Index(columns.pop("t"), name="t"))
+        frame.attrs = {"units": self.units(), "scenario": to_json(serialise.describe(self.scenario))}
+        return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the arrays as an xarray Dataset: a variable for each, with dimensions t and channel.
+
+        Each variable has its unit in `attrs["units"]`. Where channels have different units, the coordinate "unit" has
+        that of x for each channel, and x, v, u, ... have "by channel". The coordinate "channel" counts from 0. The
+        Dataset's `attrs` have the "scenario", and of a run that failed the "failure".
+
+        Raises:
+          MissingPackageError: xarray is not installed.
+        """
+        with package("xarray", "Trace.to_xarray"):
+            import xarray  # pyright: ignore[reportMissingImports]
+
+        units: dict[str, list[str]] = {}
+        for column, unit in self.units().items():
+            units.setdefault(column.rstrip("0123456789"), []).append(unit)
+        attrs = {name: {"units": own[0] if len(set(own)) == 1 else "by channel"} for name, own in units.items()}
+        about = {"scenario": to_json(serialise.describe(self.scenario))}
+        return xarray.Dataset(
+            {name: (("t", "channel"), getattr(self, name), attrs[name]) for name in ARRAYS[1:]},
+            coords={
+                "t": ("t", self.t, attrs["t"]),
+                "channel": np.arange(self.x.shape[1]),
+                "unit": ("channel", list(self.scenario.plant.units)),
+            },
+            attrs=about | ({"failure": self.failure} if self.failure else {}),
+        )
 
     def export(self, path: str | os.PathLike) -> Path:
         """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), without losing a bit of any number.

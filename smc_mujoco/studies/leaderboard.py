@@ -13,6 +13,7 @@ others.
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -21,9 +22,15 @@ from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Friedman, Rank, compare, friedman, ranks
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.text import number
+from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
+TEX = {c: f"\\{c}" for c in "&%$#_{}"}  # a character -> as LaTeX writes it
+TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}"} | {c: f"${c}$" for c in "<>|"}
+TEX |= {"–": "--", "·": r"$\cdot$"}
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 
@@ -110,6 +117,25 @@ class Board:
         winners = {block.winner for block in self.blocks}
         return winners.pop() if len(winners) == 1 else None
 
+    def _repr_html_(self) -> str:
+        rows = []
+        for entry in self.entries:
+            middle, interval = _sizes(entry, self.metric)
+            law = html.strong(entry.law) if entry.rank.best else entry.law
+            rows.append((law, middle, interval, f"{entry.rank.place:g}"))
+        heads = ("law", "median", f"{100 * self.level:g} % interval", "place")
+        return html.table(heads, rows, self.title, f"{self.verdict}. Bold: no law is better.", range(1, 4), most=40)
+
+    def to_latex(self) -> str:
+        """Return the board as a LaTeX tabular, which needs the package booktabs. Bold: no law is better."""
+        return Boards([self]).to_latex()
+
+    @property
+    def title(self) -> str:
+        """What the runs share, the metric and its unit, such as "duffing: settling time (s)"."""
+        where = ", ".join(self.group.values()) or "all runs"
+        return f"{where}: {_heading(self)}"
+
     def wins(self, law: str) -> list[str]:
         """Return the names of the blocks in which a law wins, see `name`."""
         return [self.name(block) for block in self.blocks if block.winner == law]
@@ -170,6 +196,66 @@ def _distinct(runs: int) -> str:
     return f"{runs} distinct run{'s' * (runs > 1)}"
 
 
+class Boards(list[Board]):
+    """Boards, a list that notebooks show as tables."""
+
+    def _repr_html_(self) -> str:
+        return "<br>".join(board._repr_html_() for board in self) or html.table((), [("no boards: no metric applies",)])
+
+    def to_latex(self) -> str:
+        """Return a LaTeX tabular for each group: a line for each law, a column for each metric.
+
+        They need the package booktabs. A cell is a median with its interval below it; bold: no law is better in any
+        block. A comment above each says what it is of.
+        """
+        groups: dict[tuple[str, ...], list[Board]] = {}
+        for board in self:
+            groups.setdefault(tuple(board.group.values()), []).append(board)
+        return "\n".join(_tabular(", ".join(name) or "all runs", boards) for name, boards in groups.items())
+
+
+def _tabular(name: str, boards: Sequence[Board]) -> str:
+    """Return the boards of one group as a LaTeX tabular."""
+    cells: dict[str, list[str]] = {}
+    for i, board in enumerate(boards):
+        for entry in board.entries:
+            middle, interval = _sizes(entry, board.metric)
+            bold = entry.rank.best and bool(middle)
+            sizes = [f"\\textbf{{{_tex(middle)}}}" if bold else _tex(middle)]
+            sizes += [f"[{_tex(interval)}]"] if interval else []
+            cells.setdefault(entry.law, [""] * len(boards))[i] = " ".join(sizes)
+    heads = " & ".join(["law", *(_tex(_heading(board)) for board in boards)])
+    lines = [f"{_tex(law)} & {' & '.join(row)} \\\\" for law, row in cells.items()]
+    about = f"% {name}: medians [{100 * boards[0].level:g} % intervals]; bold: no law is better. Needs booktabs."
+    begin = f"\\begin{{tabular}}{{l{'r' * len(boards)}}}"
+    rules = ["\\toprule", f"{heads} \\\\", "\\midrule", *lines, "\\bottomrule", "\\end{tabular}"]
+    return "\n".join([about, begin, *rules]) + "\n"
+
+
+def _heading(board: Board) -> str:
+    """Return a metric's label with its unit, if that is known."""
+    if board.metric == SETTLES:
+        return "settles (%)"
+    metric = CATALOGUE[board.metric]
+    units = {plant.unit for block in board.blocks if (plant := catalogue().get(block.plant))}
+    unit = metric.unit_for(units.pop()) if len(units) == 1 else "" if "{" in metric.unit else metric.unit
+    return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
+
+
+def _sizes(entry: Entry, metric: str) -> tuple[str, str]:
+    """Return a law's median and interval as text, shares in percent; "" for what is not known."""
+    factor = 100.0 if metric == SETTLES else 1.0
+    texts = ["" if math.isnan(v) else number(factor * v, 3) for v in entry.interval[:3]]
+    return texts[0], "–".join(texts[1:]) if all(texts[1:]) else ""
+
+
+def _tex(text: str) -> str:
+    """Return text with LaTeX's own characters escaped, and powers and dashes as LaTeX writes them."""
+    text = re.sub(r"(\d)e(-?\d+)\b", r"\1·10^\2", text)
+    text = "".join(TEX.get(c, c) for c in text)
+    return re.sub(r"\^(-?\d+)", r"$^{\1}$", text)
+
+
 def _listed(names: Sequence[str]) -> str:
     """Join names by commas, or by semicolons if a name has a comma in it."""
     return ("; " if any("," in name for name in names) else ", ").join(names)
@@ -182,7 +268,7 @@ def leaderboard(
     level: float = 0.95,
     resamples: int = RESAMPLES,
     seed: int = 0,
-) -> list[Board]:
+) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run is inf in all
@@ -203,7 +289,7 @@ def leaderboard(
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
     units = {name: find("metric", name, known) for name in metrics}
-    boards, seed = [], whole("seed", seed, 0, 2**53 - 1)
+    boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
         ran = cells.scenarios(table, group)

@@ -21,6 +21,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.common.html import table
+from smc_mujoco.common.text import number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
 BEFORE |= {"seed": "int64", "duration": "float64"}
 AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
+SHOWN = ("plant", "law", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
+MOST_ROWS = 8  # of a table in a notebook
 DIGEST = b"digest"  # in a file's metadata
 
 
@@ -137,8 +141,22 @@ class Table:
         return self.data.num_rows
 
     def __repr__(self) -> str:
-        counts = [f"{len(set(self.column(name).tolist()))} {name}s" for name in ("plant", "law", "condition")]
+        sizes = {name: len(set(self.column(name).tolist())) for name in ("plant", "law", "condition")}
+        counts = [f"{size} {name}{'s' * (size != 1)}" for name, size in sizes.items()]
         return f"Table({len(self)} runs: {', '.join(counts)})"
+
+    def _repr_html_(self) -> str:
+        names = [name for name in SHOWN if name in self.data.column_names]
+        rows = [list(row.values()) for row in self.data.select(names).slice(0, MOST_ROWS).to_pylist()]
+        cells = [["" if v is None else number(v) if isinstance(v, float) else v for v in row] for row in rows]
+        rest = len(self) - len(rows)
+        return table(
+            names, cells, repr(self), f"and {rest} more: Table.rows, Table.column" if rest else "", range(3, 8)
+        )
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """Return the rows as a stream of Arrow's C interface: what polars.from_dataframe, duckdb and pandas take."""
+        return self.data.__arrow_c_stream__(requested_schema)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return every row as column -> value."""

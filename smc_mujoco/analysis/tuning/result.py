@@ -14,6 +14,7 @@ from smc_mujoco.analysis.tuning.objective import FAILED, Objective, restore
 from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.html import table
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.component import Component
@@ -21,6 +22,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
 ALIKE = ("rule", "plant", "definition", "budget", "seed", "versions")  # what two tunings must share to be compared
+HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of Tuned.lines
 WRITTEN = ("objective", "before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 
 
@@ -76,6 +78,21 @@ class Tuned:
 
     def __repr__(self) -> str:
         return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, budget={self.budget})"
+
+    def _repr_html_(self) -> str:
+        note = (
+            f"objective {self.objective:.4g} s², of the law's own gains {self.before:.4g} s²; {self.budget} evaluations"
+        )
+        return table(HEADINGS, self.lines(), f"{self.law.name} on {self.plant.name}", note, range(1, 4))
+
+    def lines(self) -> list[tuple[str, ...]]:
+        """Return a line of text for each gain: its value, the bounds of its search, whether it is at one."""
+        lines = []
+        for name, (low, high) in self.searched.items():
+            notes = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
+            notes += ["bound widened by a decade"] if name in self.widened else []
+            lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
+        return lines
 
     @property
     def gains(self) -> dict[str, float]:

@@ -23,7 +23,7 @@ from smc_mujoco.common.files import to_json
 from smc_mujoco.common.registry import modules
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.gain_sets import SETS
-from smc_mujoco.studies.paper.claims.verdict import Claim, Evidence, Statement, judged
+from smc_mujoco.studies.paper.claims.verdict import Claim, Claims, Evidence, Statement, judged
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.paper.claims.runs import Result, Runs, Substitute
@@ -86,7 +86,7 @@ def claims(
     substitute: Substitute | None = None,
     threads: int | None = None,
     report: Callable[[int], None] = lambda done: None,
-) -> list[Claim]:
+) -> Claims:
     """Return the verdicts on the paper's claims, with the numbers behind them, in the order of the list.
 
     Args:
@@ -116,7 +116,7 @@ def claims(
     if quick:
         instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
         entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
-    return [judged(entry, evidence[entry.id]) for entry in entries]
+    return Claims(judged(entry, evidence[entry.id]) for entry in entries)
 
 
 def wanted(only: Iterable[str | int] | None) -> list[Entry]:

@@ -15,7 +15,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from smc_mujoco.common import files
+from smc_mujoco.common import files, html
 from smc_mujoco.common.errors import ScenarioError, find
 
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
@@ -40,6 +40,11 @@ class Check(NamedTuple):
     limit: float
     holds: bool
     sentence: str = ""
+
+    def __str__(self) -> str:
+        """Return the check in a line: what was measured, and what the claim asks for."""
+        limit = f"{self.relation} {measured(self.limit, self.what)}"
+        return f"{self.what} = {measured(self.value, self.what)} (asked: {limit})"
 
     @property
     def slack(self) -> float:
@@ -69,6 +74,13 @@ def check(what: str, value: float, relation: str, limit: float, sentence: str = 
     value, limit = float(value), float(limit)
     undecided = math.isinf(value) and value == limit
     return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence)
+
+
+def measured(value: float, what: str) -> str:
+    """Return three significant digits; "none" for NaN, and "never" for an infinite time."""
+    if math.isnan(value):
+        return "none"
+    return "never" if value == math.inf and "time" in what else f"{value:.3g}"
 
 
 def ratio(value: float, reference: float) -> float:
@@ -130,9 +142,33 @@ class Claim(Statement):
         """Return the check that fails by most, else the one nearest to its limit; None without checks."""
         return min(self.checks(gains), key=lambda one: (one.holds, one.slack), default=None)
 
+    def _repr_html_(self) -> str:
+        lines = []
+        for name in self.verdicts:
+            for one in self.checks(name):
+                value, limit = (measured(size, one.what) for size in (one.value, one.limit))
+                lines.append((name, "✓" if one.holds else "✗", one.what, value, f"{one.relation} {limit}"))
+        about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
+        note = ". ".join(filter(None, (self.measured, f"It holds if: {self.holds_if}", self.note)))
+        return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), most=24)
+
     def plain(self) -> dict[str, Any]:
         """Return the claim as JSON data; numbers that JSON lacks become "Infinity", "-Infinity" and "NaN"."""
         return files.plain(dataclasses.asdict(self))
+
+
+class Claims(list[Claim]):
+    """Claims with their verdicts, a list that notebooks show as a table."""
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for claim in self:
+            decided = claim.decisive(list(claim.verdicts)[-1]) if claim.verdicts else None
+            words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
+            rows.append((claim.id, claim.text, html.strong(words), decided or claim.note))
+        counts = {kind: sum(claim.verdict == kind for claim in self) for kind in VERDICTS}
+        note = ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items() if count)
+        return html.table(("id", "claim", "verdict", "decided by"), rows, note=note, most=99)
 
 
 def verdict(evidence: Evidence, quantifier: str = NAMED) -> str:

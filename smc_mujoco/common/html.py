@@ -1,0 +1,130 @@
+"""Short tables and curves as HTML, which notebooks show.
+
+They have no colours of their own: text and lines take the colour of the page, light or dark. All text is escaped, but
+for `Html`.
+"""
+
+import html
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+MOST = 12  # lines of a table: chosen, so that a cell's output stays short
+POINTS = 150  # of a curve, each as a pair of its lowest and highest value there
+WIDTH, HEIGHT = 300, 96  # px of a panel
+_CELL = "padding:2px 10px;vertical-align:top;text-align:"
+_ROOM = 44, 6, 16, 18  # px at the left, right, top and bottom of a panel
+
+
+class Html(str):
+    """Text that is HTML already."""
+
+
+def text(value: object) -> Html:
+    """Return a value as HTML."""
+    return value if isinstance(value, Html) else Html(html.escape(str(value)))
+
+
+def strong(value: object) -> Html:
+    """Return a value in bold letters."""
+    return Html(f"<b>{text(value)}</b>")
+
+
+def table(
+    headings: Sequence[object],
+    rows: Sequence[Sequence[object]],
+    caption: object = "",
+    note: object = "",
+    numbers: range = range(0),
+    most: int = MOST,
+) -> Html:
+    """Return a table.
+
+    Args:
+      headings: one a column; none for a table without.
+      caption: above the table.
+      note: below it.
+      numbers: the columns that are aligned to the right.
+      most: lines shown; how many are left out is said in a last one.
+    """
+    width = len(headings or rows[0]) if headings or rows else 1
+    sides = ["right" if i in numbers else "left" for i in range(width)]
+    parts = [
+        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">',
+        f'<caption style="caption-side:top;text-align:left;color:inherit;padding:2px 10px">{strong(caption)}</caption>'
+        if caption
+        else "",
+    ]
+    if headings:
+        cells = _cells("th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;")
+        parts.append(f"<thead><tr>{cells}</tr></thead>")
+    lines = [f"<tr>{_cells('td', row, sides, '')}</tr>" for row in rows[:most]]
+    wide = f'<tr><td colspan="{width}" style="{_CELL}left;opacity:0.75">'
+    if len(rows) > most:
+        lines.append(f"{wide}and {len(rows) - most} more</td></tr>")
+    if note:
+        lines.append(f"{wide}{text(note)}</td></tr>")
+    return Html("".join([*parts, f"<tbody>{''.join(lines)}</tbody></table>"]))
+
+
+def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str) -> str:
+    """Return the cells of a line."""
+    return "".join(
+        f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>' for value, side in zip(values, sides, strict=True)
+    )
+
+
+def fields(values: Mapping[str, object], caption: object = "", note: object = "") -> Html:
+    """Return a table of names with their values."""
+    return table((), [(Html(f"<i>{text(name)}</i>"), value) for name, value in values.items()], caption, note, most=99)
+
+
+def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:
+    """Return a panel of curves over time as SVG, with its range at the axes.
+
+    Args:
+      t: times, (K,), s.
+      curves: (K,) each; values that are not finite are left out.
+      heading: the quantity with its unit.
+      reference: (K,), drawn dashed; None for none.
+    """
+    every = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
+    if not every or len(t) < 2:
+        return Html("")
+    low, high = min(float(np.nanmin(c)) for c in every), max(float(np.nanmax(c)) for c in every)
+    span = (high - low) or abs(high) or 1.0
+    left, right, top, bottom = _ROOM
+    x = left + (t - t[0]) / (t[-1] - t[0]) * (WIDTH - left - right)
+    lines = []
+    for curve in curves:
+        lines += _lines(x, top + (high - curve) / span * (HEIGHT - top - bottom), 'stroke-width="1.2"')
+    if reference is not None:
+        y = top + (high - reference) / span * (HEIGHT - top - bottom)
+        lines += _lines(x, y, 'stroke-width="1" stroke-dasharray="4 3" opacity="0.6"')
+    end = HEIGHT - bottom
+    letters = 'fill="currentColor" font-size="10" font-family="sans-serif"'
+    words = [
+        f'<text x="{left}" y="11" {letters} font-weight="bold">{text(heading)}</text>',
+        f'<text x="{left - 4}" y="{top + 8}" {letters} text-anchor="end">{high:.3g}</text>',
+        f'<text x="{left - 4}" y="{end}" {letters} text-anchor="end">{low:.3g}</text>' if high > low else "",
+        f'<text x="{left}" y="{HEIGHT - 5}" {letters}>{t[0]:.3g}</text>',
+        f'<text x="{WIDTH - right}" y="{HEIGHT - 5}" {letters} text-anchor="end">{t[-1]:.3g} s</text>',
+    ]
+    axes = f'<path d="M{left} {top}V{end}H{WIDTH - right}" fill="none" stroke="currentColor" opacity="0.4"/>'
+    return Html(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
+        f'role="img"><title>{text(heading)}</title>{axes}{"".join(lines)}{"".join(words)}</svg>'
+    )
+
+
+def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
+    """Return a curve as a polyline through the lowest and highest values of each piece of it."""
+    known = np.isfinite(y)
+    x, y = x[known], y[known]
+    if len(x) > 2 * POINTS:
+        pieces = np.array_split(np.arange(len(x)), POINTS)
+        ends = [sorted({int(p[0] + np.argmin(y[p])), int(p[0] + np.argmax(y[p]))}) for p in pieces]
+        kept = np.array(sorted({0, len(x) - 1, *(k for pair in ends for k in pair)}))
+        x, y = x[kept], y[kept]
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
+    return [f'<polyline points="{points}" fill="none" stroke="currentColor" {style}/>'] if len(x) else []

@@ -1,0 +1,98 @@
+"""Scenarios and traces as notebooks show them."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.common.html import Html, fields, panel
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.scenario import Scenario
+    from smc_mujoco.simulation.trace import Trace
+
+SECONDS = ("duration", "control_period", "physics_step", "input_delay")
+MOST_CHANNELS = 8  # of one unit in a panel
+LONGEST = 200  # characters of a value
+
+
+def scenario(s: "Scenario") -> Html:
+    """Return the fields that a scenario was given, and below them the defaults that it resolves to."""
+    defaults = {one.name: one.default for one in dataclasses.fields(s)}
+    given = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
+    blank = (None, (), {})
+    plain = {"noise": _nothing(s.noise), "contact": s.contact.kind == "none"}
+    shown = {
+        name: value
+        for name, value in given.items()
+        if value not in blank and value != defaults[name] and not plain.get(name, False)
+    }
+    rows = {"plant": s.plant, "law": s.law, "duration": s.duration} | shown
+    resolved = {name: getattr(s.resolved, name) for name, value in given.items() if value is None}
+    kept = {name: value for name, value in resolved.items() if value is not None}
+    note = ", ".join(f"{name.replace('_', ' ')} {_words(name, value, s.plant)}" for name, value in kept.items())
+    words = {name.replace("_", " "): _words(name, value, s.plant) for name, value in rows.items()}
+    return fields(words, "Scenario", f"by default: {note}" if note else "")
+
+
+def trace(found: "Trace") -> Html:
+    """Return what was run, how it ended, and small figures of x with its reference, and of u."""
+    s = found.scenario
+    about = {
+        "plant": _words("plant", s.plant, s.plant),
+        "law": str(s.law),
+        "samples": f"{len(found.t)}, every {s.control_period:g} s",
+    }
+    last = np.flatnonzero(np.isfinite(found.x).all(axis=1))
+    if found.failure:
+        about["failed"] = found.failure
+    elif len(last) and s.plant.n <= MOST_CHANNELS:
+        ends = (f"{x:.3g} {unit}" for x, unit in zip(found.x[last[-1]], s.plant.units, strict=True))
+        about["ends at x"] = ", ".join(ends)
+    return Html(f"{fields(about, 'Trace')}<div>{''.join(_panels(found))}</div>")
+
+
+def _panels(found: "Trace") -> list[Html]:
+    """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
+    plant, panels = found.scenario.plant, []
+    for unit in dict.fromkeys(plant.units):
+        channels = [i for i, own in enumerate(plant.units) if own == unit][:MOST_CHANNELS]
+        reference = found.r[:, channels[0]] if found.r[:, channels].any() else None
+        panels.append(panel(found.t, list(found.x[:, channels].T), f"x ({unit})", reference))
+    for unit in dict.fromkeys(plant.units[: plant.driven]):
+        channels = [i for i, own in enumerate(plant.units[: plant.driven]) if own == unit][:MOST_CHANNELS]
+        panels.append(panel(found.t, list(found.u[:, channels].T), f"u ({EFFORT[unit]})"))
+    return panels
+
+
+def _nothing(noise: object) -> bool:
+    """Return whether all numbers of a field are 0."""
+    return dataclasses.is_dataclass(noise) and not any(vars(noise).values())
+
+
+def _words(name: str, value: object, plant: Plant) -> str:
+    """Return a field's value in words."""
+    if isinstance(value, Plant):
+        parameters = ", ".join(f"{key} = {number:g}" for key, number in value.parameters.items())
+        return f"{value.name}{f', n = {value.n}' if value.n > 1 else ''} ({parameters})" if parameters else value.name
+    if name in ("x0", "v0") and isinstance(value, tuple):
+        text = _state(value, plant.units, "/s" * (name == "v0"))
+    elif isinstance(value, Mapping):
+        text = ", ".join(f"{key} × {factor:g}" for key, factor in value.items())
+    elif isinstance(value, tuple):
+        text = ", ".join(map(str, value))
+    elif isinstance(value, float):
+        efforts = dict.fromkeys(EFFORT[unit] for unit in plant.units[: plant.driven])
+        unit = " or ".join(efforts) if name == "u_max" else "s" if name in SECONDS else ""
+        text = f"{value:g} {unit}".rstrip()
+    else:
+        text = str(value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def _state(values: tuple[float, ...], units: tuple[str, ...], rate: str) -> str:
+    """Return positions or velocities with their units, and one number where all are equal."""
+    each = [f"{value:g} {unit}{rate}" for value, unit in zip(values, units, strict=True)]
+    return each[0] if len(set(each)) == 1 else ", ".join(each)

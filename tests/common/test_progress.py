@@ -1,0 +1,75 @@
+"""Progress in a notebook: a bar in the cell, without a warning, and nothing left of it."""
+
+import re
+import sys
+import types
+import warnings
+
+import pytest
+
+from smc_mujoco.common import progress
+
+
+class ZMQInteractiveShell:
+    """What get_ipython returns in a notebook, by the name that rich looks at."""
+
+
+@pytest.fixture
+def cell(monkeypatch) -> list[str]:
+    """A notebook's cell: what it showed, in order."""
+    shown: list[str] = []
+    handle = types.SimpleNamespace(update=shown.append)
+    ipython, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
+    display.HTML = str
+    display.display = lambda text, display_id: shown.append(text) or handle
+    ipython.display = display
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    monkeypatch.setattr("builtins.get_ipython", ZMQInteractiveShell, raising=False)
+    return shown
+
+
+def test_a_notebook_gets_a_bar_that_moves_and_vanishes_without_a_warning(cell, monkeypatch, capsys):
+    clock = iter(range(100))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with progress.bar("runs <b>", 8.0) as bar:
+            bar.advance(2.0)
+            bar.reached(4.0, 8.0)
+            bar.says("nearly & done")
+    shares = [re.findall(r'value="([^"]+)"', text) for text in cell[1:4]]
+    assert shares == [["0.250"], ["0.500"], ["0.500"]]
+    assert "runs &lt;b&gt; 25 %" in cell[1]
+    assert "nearly &amp; done 50 %" in cell[3]
+    assert cell[-1] == ""
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_bar_of_unknown_length_and_one_that_counts(cell):
+    with progress.bar("looking") as bar:
+        bar.says("looking")
+    assert "<progress></progress> looking" in cell[1]
+    del cell[:]
+    with progress.bar("claims", 4, counted=True) as bar:
+        bar.advance(1)
+    assert "claims 1/4" in cell[1]
+
+
+def test_the_bar_vanishes_when_the_work_fails(cell):
+    with pytest.raises(ZeroDivisionError), progress.bar("runs", 2.0) as bar:
+        bar.advance(1 / 0)
+    assert cell[-1] == ""
+
+
+def test_nothing_is_drawn_more_than_five_times_a_second(cell):
+    with progress.bar("runs", 1e4) as bar:
+        for _ in range(1000):
+            bar.advance(1.0)
+    assert len(cell) < 10
+
+
+def test_a_terminal_gets_no_html(capsys):
+    with progress.bar("runs", 2.0) as bar:
+        bar.advance(1.0)
+    assert "<progress" not in "".join(capsys.readouterr())
