@@ -470,8 +470,8 @@ def test_an_overview_has_a_line_a_claim(only, capsys):
 
 
 def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
-    late = tables.check_sentence(check("settling time, s", math.inf, "<", 10.0))
-    far = tables.check_sentence(check("deviation", math.inf, "<", 0.01))
+    late = str(check("settling time, s", math.inf, "<", 10.0))
+    far = str(check("deviation", math.inf, "<", 0.01))
     assert (late, far) == ("settling time, s = never (asked: < 10)", "deviation = inf (asked: < 0.01)")
 
 

@@ -1,0 +1,132 @@
+"""Scenarios and traces in notebooks: what was given, what came of it, and as pandas and xarray with units."""
+
+import json
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.extras import MissingPackageError
+from smc_mujoco.simulation.trace import ARRAYS
+
+GIVEN = smc.Scenario(
+    plant="inverted_pendulum",
+    law=smc.law("classical", k=2.0, c=3.0),
+    duration=0.2,
+    x0=0.3,
+    noise=smc.Noise(0.01, 0.05),
+    mismatch={"mass": 1.3},
+)
+
+
+@pytest.fixture(scope="module")
+def trace() -> smc.Trace:
+    return smc.run(GIVEN)
+
+
+@pytest.fixture(scope="module")
+def cart() -> smc.Trace:
+    return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.1))
+
+
+def cells(shown: object) -> dict[str, str]:
+    """The fields of a table: name -> value. The HTML must be well-formed."""
+    root = ElementTree.fromstring(f"<div>{shown._repr_html_()}</div>")
+    rows = [["".join(cell.itertext()) for cell in row if cell.tag == "td"] for row in root.iter("tr")]
+    return {row[0]: row[-1] for row in rows if row}
+
+
+def test_a_scenario_shows_what_it_was_given_and_names_its_defaults():
+    shown = cells(GIVEN)
+    note = next(text for text in shown if text.startswith("by default: "))
+    assert shown == {
+        "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)",
+        "law": "classical(k=2, c=3)",
+        "duration": "0.2 s",
+        "x0": "0.3 rad",
+        "noise": "Noise(position=0.01, velocity=0.05)",
+        "mismatch": "mass × 1.3",
+        note: note,
+    }
+    assert "physics step 0.001 s" in note
+    assert "u max 6 N m" in note
+    assert "x0" not in note
+    bare = cells(smc.Scenario(plant="duffing", law="classical"))
+    assert list(bare)[:-1] == ["plant", "law", "duration"]
+    assert "x0 1.5 m" in list(bare)[-1]
+
+
+def test_channels_in_two_units_have_each_its_own(cart):
+    shown = cells(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", x0=(0.1, 0.2)))
+    assert shown["x0"] == "0.1 m, 0.2 rad"
+    assert re.findall(r"<title>(.*?)</title>", cart._repr_html_()) == ["x (m)", "x (rad)", "u (N)"]
+
+
+def test_a_trace_shows_where_it_ends_and_its_curves(trace):
+    shown = cells(trace)
+    assert shown["ends at x"] == f"{trace.x[-1, 0]:.3g} rad"
+    assert shown["samples"] == "201, every 0.001 s"
+    assert trace._repr_html_().count("<polyline") == 2
+    moving = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.05, reference=smc.Sine(0.5, 3.0)))
+    assert moving._repr_html_().count("stroke-dasharray") == 1
+    assert len(trace._repr_html_()) < 20_000
+
+
+def test_a_trace_that_failed_says_how():
+    @smc.law_function
+    def sour(y, gains, memory):
+        if y.t > 0.01:
+            raise ValueError("<sour>")
+        return 0.0, 0.0
+
+    failed = smc.run(smc.Scenario(plant="duffing", law=sour(), duration=0.05))
+    assert cells(failed)["failed"] == failed.failure
+    assert "&lt;sour&gt;" in failed._repr_html_()
+
+
+def test_of_many_channels_eight_are_drawn():
+    network = smc.plant("pendulum_network", n=20)
+    shown = smc.run(smc.Scenario(plant=network, law="none", duration=0.01, x0=0.1))._repr_html_()
+    assert shown.count("<polyline") == 16
+    assert "ends at x" not in shown
+
+
+# tables of other packages
+
+
+@pytest.mark.parametrize(("method", "name"), [("to_pandas", "pandas"), ("to_xarray", "xarray")])
+def test_a_package_that_is_missing_is_named_with_its_cure(trace, monkeypatch, method, name):
+    monkeypatch.setitem(__import__("sys").modules, name, None)
+    with pytest.raises(MissingPackageError, match=rf"Trace\.{method} needs {name} .*: pip install {name}$"):
+        getattr(trace, method)()
+
+
+def test_pandas_has_every_column_bit_for_bit_with_units(trace, cart):
+    pandas = pytest.importorskip("pandas")
+    for one in (trace, cart):
+        frame = one.to_pandas()
+        columns = one.columns()
+        assert isinstance(frame, pandas.DataFrame)
+        assert frame.index.name == "t"
+        assert np.array_equal(frame.index, one.t)
+        assert list(frame.columns) == [name for name in columns if name != "t"]
+        assert all(np.array_equal(frame[name], columns[name]) for name in frame.columns)
+        assert frame.attrs["units"] == one.units()
+        assert json.loads(frame.attrs["scenario"])["plant"]["name"] == one.scenario.plant.name
+
+
+def test_xarray_has_every_array_bit_for_bit_with_units(trace, cart):
+    pytest.importorskip("xarray")
+    data = trace.to_xarray()
+    assert set(data.data_vars) == set(ARRAYS) - {"t"}
+    assert all(np.array_equal(data[name].values, getattr(trace, name)) for name in data.data_vars)
+    assert np.array_equal(data["t"].values, trace.t)
+    units = {name: data[name].attrs["units"] for name in ("t", "x", "v", "u", "s")}
+    assert units == {"t": "s", "x": "rad", "v": "rad/s", "u": "N m", "s": ""}
+    both = cart.to_xarray()
+    assert both["x"].dims == ("t", "channel")
+    assert both["unit"].values.tolist() == ["m", "rad"]
+    assert both["x"].attrs["units"] == "by channel"
+    assert float(both["x"].sel(t=0.05, method="nearest", channel=1)) == cart.x[50, 1]
