@@ -64,7 +64,7 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     }
 
 
-@metric("s")
+@metric("s", need="fast")
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
@@ -92,7 +92,7 @@ def rise_time(trace: Trace) -> float:
     return max(times)
 
 
-@metric("%")
+@metric("%", need="no-overshoot")
 def overshoot(trace: Trace) -> float:
     """How far a channel goes beyond its reference, in percent of the scale.
 
@@ -120,7 +120,7 @@ def steady_error(trace: Trace) -> float:
     return np.abs(error(trace)[last(trace)].mean(axis=0)).max()
 
 
-@metric("{x}")
+@metric("{x}", need="accurate")
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
     return np.abs(error(trace)[last(trace)]).max()
@@ -144,7 +144,7 @@ def iae(trace: Trace) -> float:
     return np.trapezoid(np.abs(error(trace)).sum(axis=1), trace.t)
 
 
-@metric("{x} s^2", label="ITAE")
+@metric("{x} s^2", label="ITAE", need="on-track")
 def itae(trace: Trace) -> float:
     """Integral of (t - t0) |e| dt, summed over the channels (trapezoid)."""
     since = trace.t - trace.t[0]
@@ -163,7 +163,7 @@ def reaching_time(trace: Trace) -> float:
     return last_exit(trace.t, size, BAND * (size[0] or size.max()))
 
 
-@metric("{u}", label="max |u|", command=True)
+@metric("{u}", label="max |u|", command=True, need="gentle")
 def max_u(trace: Trace) -> float:
     """Largest |u|, worst channel."""
     return np.abs(trace.u).max()
@@ -181,7 +181,7 @@ def tv(trace: Trace) -> float:
     return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
 
 
-@metric("{u}/s", label="TV rate", command=True)
+@metric("{u}/s", label="TV rate", command=True, need="calm")
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
@@ -195,7 +195,7 @@ def tv_rate(trace: Trace) -> float:
     return np.abs(np.diff(u, axis=0)).sum(axis=0).max() / (t[-1] - t[0])
 
 
-@metric("({u})^2 s", command=True)
+@metric("({u})^2 s", command=True, need="frugal")
 def energy(trace: Trace) -> float:
     """Integral of u^2 dt, summed over the channels.
 

@@ -61,6 +61,7 @@ class Metric:
       summary: first line of the docstring.
       formula: Trace of one group's channels -> float, without the checks.
       label: its name in tables and figures.
+      need: the word of somebody who wants this number small, such as "fast"; "" if there is none.
       network: whether it compares channels, and so needs several of a kind.
       realistic: whether it is meaningful only for mechanisms with friction, contacts or other parts.
       command: whether it is computed from u or s, which free joints do not have.
@@ -71,6 +72,7 @@ class Metric:
     summary: str
     formula: Callable[[Trace], float]
     label: str
+    need: str = ""
     network: bool = False
     realistic: bool = False
     command: bool = False
@@ -107,7 +109,7 @@ class Metric:
 
 
 def metric(
-    unit: str, *, label: str = "", **flags: bool
+    unit: str, *, label: str = "", need: str = "", **flags: bool
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
 
@@ -117,9 +119,8 @@ def metric(
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, doc = formula.__name__, inspect.getdoc(formula) or ""
         summary = doc.partition("\n")[0]
-        entry = Metric(
-            name=name, unit=unit, summary=summary, formula=formula, label=label or name.replace("_", " "), **flags
-        )
+        words = {"label": label or name.replace("_", " "), "need": need, "summary": summary}
+        entry = Metric(name=name, unit=unit, formula=formula, **words, **flags)
         CATALOGUE[name] = entry
 
         @functools.wraps(formula)

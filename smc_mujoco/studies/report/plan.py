@@ -1,20 +1,14 @@
-"""How much a report computes, its progress, and the cache of its results.
-
-Every result has a file in the report's folder, so a report that was killed and is started again computes nothing twice.
-"""
+"""How much a report computes, and its progress."""
 
 import contextlib
 import dataclasses
-import hashlib
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.analysis.ranking import SEEDS
-from smc_mujoco.analysis.tuning import result
-from smc_mujoco.common import fingerprint, progress
+from smc_mujoco.common import progress
 from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
@@ -94,30 +88,6 @@ class Bars:
         self.spent[name] = time.monotonic() - start
         if self.shown:
             print(f"{name:11} {what:16} {self.spent[name]:6.0f} s", flush=True)
-
-
-def cached(
-    path: Path, depends: object, make: Callable[[], T], save: Callable[[T, Path], object], load: Callable[[Path], T]
-) -> T:
-    """Return what `make` returns, from its file if there is one.
-
-    The file's name ends in a hash of what the result depends on: `depends`, the package's code, models and gains, and
-    the versions of the packages below. Files with other hashes are removed when a new one is written.
-
-    Args:
-      path: of the file, without the hash.
-      depends: what the result depends on besides the code, as JSON data.
-    """
-    text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
-    file = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
-    if file.exists():
-        with contextlib.suppress(Exception):  # damaged bytes raise any exception there is; compute it again
-            return load(file)
-    made = make()
-    for old in path.parent.glob(f"{path.stem}-{'?' * 12}.*"):
-        old.unlink()
-    save(made, file)
-    return load(file)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

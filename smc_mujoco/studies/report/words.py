@@ -20,16 +20,10 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.paper.claims.verdict import MARKS
 
 PAPER = "observer_free"  # the law that the suite was built to test
-# What the overview compares, and what each asks for; the tables' columns.
+# What the overview compares; the tables' columns.
 HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
 COLUMNS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
 RANKED = ("settles", *HEADLINE)  # columns of the ranking by plant
-ASKS = {
-    "settling_time": "fast",
-    "itae": "accurate on the way",
-    "ultimate_bound": "accurate in the end",
-    "tv_rate": "calm",
-}
 # Mathematical signs and proper names for the audit's ASCII.
 SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′", "alpha": "α", "lambda": "λ", "eps": "ε"}
 SIGNS |= {"Vdot": "V′", "xdot": "x′"}
@@ -74,6 +68,11 @@ def kind(name: str) -> str:
 def metric(name: str) -> str:
     """Return a metric's name in words."""
     return CATALOGUE[name].label if name in CATALOGUE else name.replace("_", " ")
+
+
+def asks(metric: str) -> str:
+    """Return what somebody asks for who wants little of a metric, such as "fast"."""
+    return CATALOGUE[metric].need.replace("-", " ")
 
 
 def unit(metric: str, plant: str | None = None) -> str:

@@ -24,10 +24,11 @@ from smc_mujoco.analysis.tuning.result import Evaluation
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.paper import scenarios
 from smc_mujoco.studies.report import answer, charts, films, maps, page, panels, report, stages, words
 from smc_mujoco.studies.report import scores as scores_of
-from smc_mujoco.studies.report.plan import QUICK, Bars, cached
+from smc_mujoco.studies.report.plan import QUICK, Bars
 from smc_mujoco.studies.report.scores import Place, Score
 
 TINY = dataclasses.replace(
