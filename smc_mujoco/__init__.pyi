@@ -69,6 +69,8 @@ from smc_mujoco.simulation.signals import Step as Step
 from smc_mujoco.simulation.time_series import TimeSeries as TimeSeries
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
+from smc_mujoco.studies.advice import Advice as Advice
+from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.outcome import Outcome as Outcome
 from smc_mujoco.studies.paper import scenarios

@@ -24,6 +24,7 @@ COMMANDS = {
     "laws": catalogue.laws,
     "run": runs.run,
     "show": runs.show,
+    "which": studies.which,
     "tune": analysis.tune,
     "bench": studies.bench,
     "margins": analysis.margins,

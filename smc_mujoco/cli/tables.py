@@ -1,4 +1,4 @@
-"""Tables of the command line: scores, answers, traces, leaderboards, margins, tunings, claims."""
+"""Tables of the command line: scores, answers, traces, leaderboards, advice, margins, tunings, claims."""
 
 import math
 import textwrap
@@ -24,6 +24,7 @@ from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
 from smc_mujoco.studies.paper.claims.verdict import Claim
@@ -297,6 +298,21 @@ def _winner_cell(board: Board | None) -> Text:
             text.append(f"{_folded(law, 12)}\n", style.law_colour(law)).append(f"{won} won {lost} lost\n")
     text.right_crop(1)
     return text
+
+
+# advice
+
+
+def advice(found: Advice) -> Table:
+    """Return a line for each finalist: its place, how often it settles, its median on each need."""
+    law, *others = found.heads
+    columns = [Column(head.replace(": ", "\n").replace(", ", "\n"), justify="right") for head in others]
+    table = titled(found.title, law, *columns)
+    for name, *cells in found.rows:
+        label = Text(_folded(name, 22), style=style.law_colour(name))
+        table.add_row(label, *(cell.replace(" (", "\n(").replace(") *", ")*") for cell in cells))
+    table.caption, table.caption_justify = found.key, "left"
+    return table
 
 
 # margins and tunings

@@ -1,4 +1,4 @@
-"""smc-mujoco bench, claims, report: many questions, answered by a study."""
+"""smc-mujoco which, bench, claims, report: many questions, answered by a study."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +9,77 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def which(
+    plant: options.PlantName,
+    needs: Annotated[
+        str | None,
+        typer.Option(
+            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot; default "
+            "fast,accurate,calm. And what the law must have: no-velocity, continuous, two-gains, finite-time, ..., "
+            "as of `laws --needs`."
+        ),
+    ] = None,
+    condition: options.Conditions = None,
+    conditions: Annotated[
+        str | None, typer.Option(help="Conditions that `list` shows, as a,b; default nominal,noise,sine.")
+    ] = None,
+    laws: Annotated[str | None, typer.Option(help=f"Laws, as a,b; default all that suit. {options.OWN_GAINS}")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer starts and finalists, shorter runs, a third of each tuning.")
+    ] = False,
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=1, help="Starts and noises of the finals; default 24, or 16. With fewer no law is better."),
+    ] = None,
+    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, or 3.")] = None,
+    x0: options.X0 = None,
+    spread: options.Spread = None,
+    out: Annotated[Path, typer.Option(help="Folder for gains and runs, which another call takes from there.")] = Path(
+        "which"
+    ),
+    threads: options.Threads = None,
+) -> None:
+    """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
+
+    All laws that suit are compared, with gains that were tuned for the plant by one rule: those of the package, or else
+    found now, which takes some seconds for each law. A first round with few starts selects the finalists. They run from
+    new starts and noises, and are compared by the rules of `bench`: a law is better only if its median is lower by more
+    than 3 % and a test over the starts, corrected for all comparisons, confirms it. Where no law is better than
+    another, the answer says so. Stopped and started again, the command goes on.
+
+    Example: smc-mujoco which duffing --conditions noise,coulomb --needs calm,fast
+
+    Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.studies.adviser import which as advise
+
+    terminal = Terminal()
+    asked = options.conditions(options.names(conditions), condition) if conditions or condition else None
+    advice = advise(
+        options.plant(plant),
+        asked,
+        options.names(needs),
+        None if laws is None else [options.law(text) for text in options.names(laws)],
+        seeds,
+        duration,
+        options.starts(x0, spread),
+        out,
+        quick,
+        threads,
+        progress=True,
+    )
+    terminal.print(tables.advice(advice))
+    for sentence in advice.answer:
+        terminal.print()
+        terminal.note(sentence, wrap=True)
+    runs = f"{len(advice.table)} runs of the finalists are in {printable(str(out / 'finals' / 'results.parquet'))}"
+    terminal.print()
+    terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
 
 
 @errors_as_sentences()

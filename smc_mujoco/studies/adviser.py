@@ -1,0 +1,327 @@
+"""An adviser: which law suits a plant, its conditions and what is asked, with which gains, and how sure that is.
+
+    advice = smc.which("duffing", ["noise", "coulomb"], needs=["fast", "calm"])
+    print(advice)                                  # a table, and "Use ... because ... Second choice ... How sure ..."
+    smc.Scenario(plant="duffing", law=advice.law)
+
+What is asked is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous,
+two-gains ...). With "no-velocity", laws that read a velocity get one that is differentiated from the position.
+
+1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`.
+2. Screening: each law runs in each condition from a few seeds. Those with the best mean ranks are the finalists.
+3. The finalists run from further seeds, which the screening has not seen, so that a law which was lucky there has no
+   advantage. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the
+   same in every condition, and the tests are corrected for all pairs of finalists in all blocks.
+
+A law is not fit if it settles in less than half as many runs of a condition as the law that settles in the most: to do
+nothing would be calmest. Laws that are not fit rank behind all others. The first in mean rank is advised.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis import paired_runs
+from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.ranking import Comparison, Rank, compare, ranks
+from smc_mujoco.analysis.tuning import result, search
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.progress import bar
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.properties import PROPERTIES, suitable
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.simulation import coerce, serialise
+from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
+from smc_mujoco.simulation.grid import case, grid, listed
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.studies.advice import NEEDS, Advice, Choice
+from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.study import study
+from smc_mujoco.studies.table import Table
+
+USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
+CONDITIONS = ("nominal", "noise", "sine")  # where none is given
+NO_VELOCITY = "no-velocity"
+LEAST_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
+
+
+class Extent(NamedTuple):
+    """How much is run: seeds of screening and finals, number of finalists, s of a run, sets of gains a tuning tries."""
+
+    screening: int
+    seeds: int
+    finalists: int
+    duration: float
+    budget: int
+
+
+FULL = Extent(screening=8, seeds=24, finalists=6, duration=5.0, budget=96)
+QUICK = Extent(screening=4, seeds=16, finalists=4, duration=3.0, budget=32)
+
+
+class Candidate(NamedTuple):
+    """A law with its gains for the plant, and where these are from, in words."""
+
+    law: Component
+    source: str
+
+
+def which(
+    plant: str | Plant,
+    conditions: str | Condition | Sequence[str | Condition] | None = None,
+    needs: str | Sequence[str] = (),
+    laws: str | Component | Template | Sequence[str | Component | Template] | None = None,
+    seeds: int | None = None,
+    duration: float | None = None,
+    starts: Starts | None = None,
+    out: str | Path = "which",
+    quick: bool = False,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Advice:
+    """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
+
+    Args:
+      plant: a name, or a Plant, such as one from your own MJCF.
+      conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
+      needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm", "gentle", "frugal",
+        "no-overshoot"; by default fast, accurate and calm. And what every law must have: "no-velocity", "continuous"
+        and the other names in `smc_mujoco.control.properties.PROPERTIES`.
+      laws: the laws to compare, by name or with your own gains. Default: all that suit.
+      seeds: of the finals. With fewer than 16 no law is called better than another. Default: 24, or 16 if quick.
+      duration: of a run, s. Default: 5, or 3 if quick.
+      starts: where runs begin, see `starts`.
+      out: folder for gains and runs. Another call takes from there what it needs again.
+      quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
+      threads: simulations at once; None for one per available core.
+      progress: whether to show progress bars.
+
+    Raises:
+      ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
+    """
+    extent, machine, folder = QUICK if quick else FULL, coerce.plant(plant), Path(out)
+    seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
+    duration = extent.duration if duration is None else number("duration", duration, above=0.0)
+    compared, properties = _needs(needs, machine)
+    asked = [find_condition(one) for one in _conditions(conditions, machine, duration)]
+    if NO_VELOCITY in properties:
+        asked = [_without_velocity(one) for one in asked]
+    for one in asked:  # refuses what the plant cannot have before gains are searched
+        case(machine, "none", one, duration, starts=starts)
+    chosen = _suited(machine, [name for name in properties if name != NO_VELOCITY], laws)
+    found = _with_gains(machine, chosen, extent.budget, starts, folder / "gains", threads, progress)
+    candidates = {candidate.law.name: candidate for candidate in found}
+    if len(candidates) < len(found):
+        raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
+
+    def ran(names: Sequence[str], numbers: range, part: str) -> Table:
+        runs = grid(machine, [candidates[name].law for name in names], asked, numbers, "default", duration, starts)
+        return study(runs, folder / part, threads=threads, progress=progress)
+
+    names, others = list(candidates), []
+    if len(names) > extent.finalists:
+        names = [rank.law for rank in _order(ran(names, range(extent.screening), "screening"), machine, compared)[0]]
+        names, others = names[: extent.finalists], names[extent.finalists :]
+    table = ran(names, range(extent.screening, extent.screening + seeds), "finals")
+    order, comparison = _order(table, machine, compared)
+    return Advice(
+        plant=machine,
+        conditions=tuple(one.name for one in asked),
+        needs=compared,
+        wanted=tuple(PROPERTIES[name].words for name in properties if name != NO_VELOCITY),
+        choices=_choices(order, comparison, table, candidates, compared),
+        others=tuple(others),
+        comparison=comparison,
+        table=table,
+    )
+
+
+# the question
+
+
+def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the needs to compare, and the properties to have.
+
+    Raises:
+      ScenarioError: an unknown need, or one that has no number on this plant.
+    """
+    if isinstance(needs, str):
+        needs = [name.strip() for name in needs.split(",") if name.strip()]
+    names = list(dict.fromkeys(listed("needs", needs))) if needs else []
+    for name in names:
+        if name not in NEEDS and name not in PROPERTIES:
+            raise unknown("need", name, [*NEEDS, *PROPERTIES])
+    compared = [name for name in names if name in NEEDS]
+    for name in compared:
+        if why := NEEDS[name].refusal(plant):
+            raise ScenarioError(f"need {name!r} cannot be compared on {plant.name}: {why}")
+    compared = compared or [name for name in USUAL if not NEEDS[name].refusal(plant)]
+    return tuple(compared), tuple(name for name in names if name in PROPERTIES)
+
+
+def _conditions(conditions: Any, plant: Plant, duration: float) -> Sequence[str | Condition]:
+    """Return the conditions that were given, or the usual ones that have numbers for the plant."""
+    return applicable(CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
+
+
+def _without_velocity(asked: Condition) -> Condition:
+    """Return a condition without a velocity sensor, where it says nothing of velocity itself."""
+
+    def fields(plant: Plant, duration: float) -> dict[str, Any]:
+        own = asked.on(plant, duration)
+        return own if own.keys() & {"velocity", "sensor"} else own | {"velocity": DIFFERENCED}
+
+    return Condition(f"{asked.name} (no velocity sensor)", fields)
+
+
+def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Component | Template]:
+    """Return the laws to compare; those without gains of their own as templates.
+
+    Raises:
+      ScenarioError: an unknown law, or none that has the properties.
+    """
+    if laws is None:
+        left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
+        return _some([law for law in suitable(properties, plant=plant) if law.name not in left_out], plant, properties)
+    found, wanted = [], [PROPERTIES[name] for name in properties]
+    for one in listed("laws", laws):
+        law = find("law", one, catalogue()) if isinstance(one, str) else one
+        template = law if isinstance(law, Template) else coerce.law(law).template
+        if template is None or all(each.holds(template) for each in wanted):
+            found.append(law)
+    return _some(found, plant, properties)
+
+
+def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
+    """Return the laws that were found, or raise ScenarioError if there is none."""
+    if not found:
+        said = " and ".join(PROPERTIES[name].words for name in properties) or "suit"
+        raise ScenarioError(f"no law for {plant.name} is among those that {said}: ask for less")
+    return found
+
+
+# gains
+
+
+def _with_gains(
+    plant: Plant,
+    laws: Sequence[Component | Template],
+    budget: int,
+    starts: Starts | None,
+    folder: Path,
+    threads: int | None,
+    progress: bool,
+) -> list[Candidate]:
+    """Return the laws with gains for the plant: given, shipped, tuned or default ones, in this order of preference."""
+    found = [_known(plant, law) for law in laws]
+    missing = [k for k, candidate in enumerate(found) if candidate is None]
+    with bar("gains", len(missing), shown=progress and bool(missing), counted=True) as drawn:
+        for k in missing:
+            drawn.says(f"gains of {laws[k].name}")
+            found[k] = _tuned(plant, laws[k], budget, starts, folder, threads)
+            drawn.advance(1)
+    return [candidate for candidate in found if candidate is not None]
+
+
+def _known(plant: Plant, law: Component | Template) -> Candidate | None:
+    """Return a law whose gains need no search; None for one that must be tuned."""
+    if isinstance(law, Component):
+        return Candidate(law, "gains as given")
+    if plant.unscaled:
+        return Candidate(
+            law.bind({}), f"default gains, as tuning is not possible here: {plant.unscaled.partition(':')[0]}"
+        )
+    own = plants_known().get(plant.name)
+    if own is None or own.parameters != plant.parameters or catalogue().get(law.name) is not law:
+        return None
+    if not gain_sets.file(plant.name, law.name, gain_sets.OBJECTIVES["tuned"]).is_file():
+        return None
+    return Candidate(gain_sets.law(plant, law.name, "tuned"), "tuned gains of the package")
+
+
+def _tuned(
+    plant: Plant, law: Component | Template, budget: int, starts: Starts | None, folder: Path, threads: int | None
+) -> Candidate:
+    """Return a law with gains from `tune`, or from the file of an earlier call."""
+    usual = Objective()
+    conditions = tuple(one for one in usual.conditions if applicable([one.name], [plant], usual.duration))
+    goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+    (first, *_) = goal.scenarios(plant, coerce.law(law), 0)
+    depends = [serialise.describe(first), goal.describe(), fingerprint.of(coerce.law(law).function)]
+    tuned = cached(
+        folder / f"{plant.name}-{law.name}-{budget}.json",
+        depends,
+        lambda: search.tune(plant, law, budget, objective=goal, threads=threads),
+        lambda made, path: made.save(path),
+        result.load,
+    )
+    return Candidate(
+        dataclasses.replace(coerce.law(law), gains=tuned.law.gains), f"tuned here, {budget} sets of gains tried"
+    )
+
+
+# the comparison
+
+
+def _order(table: Table, plant: Plant, needs: Sequence[str]) -> tuple[list[Rank], Comparison]:
+    """Return the laws' ranks, those that are fit first, and their comparison over all needs and conditions."""
+    (group,) = paired_runs.groups(table, by=("plant",))
+    ran = paired_runs.scenarios(table, group)
+    parts, floors = [], []
+    for need in needs:
+        there, scores, outcomes = group.scores(paired_runs.values(table, NEEDS[need].name))
+        if not scores:
+            raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
+        parts.append((scores, outcomes))
+        floors += [paired_runs.floor(ran[k], NEEDS[need].unit) for k in there]
+    scores, outcomes = ({law: np.concatenate([part[i][law] for part in parts]) for law in group.laws} for i in (0, 1))
+    comparison, fit = compare(scores, floors, outcomes=outcomes), _fit(group, table)
+    return sorted(ranks(comparison), key=lambda rank: (rank.law not in fit, rank.mean)), comparison
+
+
+def _settled(group: paired_runs.Group, table: Table) -> np.ndarray:
+    """Return the share of runs that settle, (laws, conditions)."""
+    return 1.0 - np.nanmean(np.where(group.rows >= 0, paired_runs.values(table, SETTLES)[group.rows], np.nan), axis=2)
+
+
+def _fit(group: paired_runs.Group, table: Table) -> set[str]:
+    """Return the laws that settle in enough runs of every condition."""
+    share = _settled(group, table)
+    enough = np.all(share >= LEAST_SETTLED * share.max(axis=0), axis=1)
+    return {law for law, one in zip(group.laws, enough.tolist(), strict=True) if one}
+
+
+def _choices(
+    order: Sequence[Rank],
+    comparison: Comparison,
+    table: Table,
+    candidates: Mapping[str, Candidate],
+    needs: Sequence[str],
+) -> tuple[Choice, ...]:
+    """Return the finalists with all that is said of them, in this order."""
+    (group,) = paired_runs.groups(table, by=("plant",))
+    settled, fit, choices = _settled(group, table).mean(axis=1), _fit(group, table), []
+    for rank in order:
+        at = comparison.laws.index(rank.law)
+        cells = np.split(comparison.cells[at], len(needs))
+        beaten = np.split(comparison.better[:, :, at].any(axis=1), len(needs))
+        choice = Choice(
+            law=candidates[rank.law].law,
+            source=candidates[rank.law].source,
+            rank=rank,
+            settles=float(settled[group.laws.index(rank.law)]),
+            fit=rank.law in fit,
+            medians={need: median_of(own) for need, own in zip(needs, cells, strict=True)},
+            unbeaten={need: int((~lost).sum()) for need, lost in zip(needs, beaten, strict=True)},
+        )
+        choices.append(choice)
+    return tuple(choices)
