@@ -119,8 +119,8 @@ def metric(
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, doc = formula.__name__, inspect.getdoc(formula) or ""
         summary = doc.partition("\n")[0]
-        words = {"label": label or name.replace("_", " "), "need": need, "summary": summary}
-        entry = Metric(name=name, unit=unit, formula=formula, **words, **flags)
+        label_or_name = label or name.replace("_", " ")
+        entry = Metric(name=name, unit=unit, summary=summary, formula=formula, label=label_or_name, need=need, **flags)
         CATALOGUE[name] = entry
 
         @functools.wraps(formula)

@@ -117,7 +117,8 @@ class Advice:
             if choice.fit and not math.isnan(choice.rank.low):
                 place += f" ({_range(choice.rank.low, choice.rank.high)})"
             cells = [
-                _interval(choice.medians[need]) + " *" * (choice.unbeaten[need] == len(self.conditions))
+                _interval(choice.medians[need])
+                + " *" * (len(self.choices) > 1 and choice.unbeaten[need] == len(self.conditions))
                 for need in self.needs
             ]
             rows.append([choice.law.name, place, f"{100 * choice.settles:.0f} %", *cells])
