@@ -215,10 +215,10 @@ def floor(scenario: Scenario | None, unit: str) -> float:
     """
     if scenario is None:
         return 0.0
-    driven = [group for group in channel_groups(scenario.plant) if group.driven]
+    driven = [group for group in channel_groups(scenario) if group.driven]
     x0 = max(abs(scenario.resolved.x0[i]) for group in driven for i in group.channels)
     limit = max(scenario.limits)
-    scale = {"{x}": x0, "{u}": limit, "{u}/s": limit, "%": 100.0}.get(unit, 0.0)
+    scale = {"{x}": x0, "{u}": limit, "{u}/s": limit, "{force}": limit * scenario.drive.gain, "%": 100.0}.get(unit, 0.0)
     counts = [scenario.sensor.quantum(group.unit == "rad") for group in driven] if scenario.sensor else []
     half = max(counts) / 2 if counts and unit == "{x}" else 0.0
     return max(OF_SCALE * scale if math.isfinite(scale) else 0.0, half)

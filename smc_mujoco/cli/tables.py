@@ -18,11 +18,11 @@ from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
-from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.leaderboard import Block, Board
@@ -79,11 +79,11 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     Where there are several groups, the titles name them.
     """
     style.same_plant(list(traces.values()))
-    plant = next(iter(traces.values())).scenario.plant
+    scenario = next(iter(traces.values())).scenario
     values = {label: metric_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
     tables = []
-    for group, heading in headings(plant).items():
-        units = {m.name: m.unit_for(group.unit) for m in metrics() if m.fits(group)}
+    for group, heading in headings(scenario).items():
+        units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SHOWN.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         table = _by_label(", ".join(filter(None, (title, heading))), heads)
@@ -96,12 +96,12 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     return tables
 
 
-def headings(plant: Plant) -> dict[Group, str]:
+def headings(scenario: Scenario) -> dict[Group, str]:
     """Return the plant's groups of channels, each with a heading that names its joints; a single group has none."""
-    each = groups(plant)
+    each = groups(scenario)
     if len(each) == 1:
         return {each[0]: ""}
-    names = [joint.name for joint in joints(plant.spec())]
+    names = [joint.name for joint in joints(scenario.plant.spec())]
     titles = {}
     for group in each:
         n = len(group.channels)
@@ -116,11 +116,12 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
     There is a table for each metric, with a line for each label and a column for each condition. A single condition
     has one table, with a column for each metric. Metrics that no plant has a value of are left out.
     """
-    plants = {trace.scenario.plant: None for runs in traces.values() for trace in runs.values()}
-    known = {m.name: m for m in metrics() if not all(map(m.refusal, plants))}
+    every = (trace.scenario for runs in traces.values() for trace in runs.values())
+    plants = {(scenario.plant, scenario.efforts[0]): None for scenario in every}
+    known = {m.name: m for m in metrics() if not all(m.refusal(plant) for plant, _ in plants)}
     shown = {}
     for name in filter(known.__contains__, names):
-        units = dict.fromkeys(known[name].unit_for(plant.unit) for plant in plants)
+        units = dict.fromkeys(known[name].unit_for(plant.unit, effort) for plant, effort in plants)
         shown[f"{name} ({' or '.join(units)})"] = known[name]
     if len(traces) == 1:
         (runs,) = traces.values()
@@ -162,12 +163,14 @@ def trace_summary(trace: Trace) -> list[Table]:
     Metrics of realistic parts appear only if the scenario has such parts.
     """
     values, tables = metric_scores(trace), []
-    for group, heading in headings(trace.scenario.plant).items():
+    for group, heading in headings(trace.scenario).items():
         value = Column("value", justify="right")
         table = titled(heading, "metric", value, "unit", "", box=None, padding=(0, 2, 0, 0))
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
-                table.add_row(m.name, number(values[group.name][m.name]), m.unit_for(group.unit), Text(m.summary))
+                table.add_row(
+                    m.name, number(values[group.name][m.name]), m.unit_for(group.unit, group.effort), Text(m.summary)
+                )
         tables.append(table)
     return tables
 

@@ -68,7 +68,7 @@ class Panel(NamedTuple):
         """The label of the vertical axis, with its unit."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
         mean = "mean " * (len(group.channels) > 1)
-        alike = {"spread": "x", "e": "x", "force": "u", "reaction": "u", "d": "u", "applied": "u"}
+        alike = {"spread": "x", "e": "x", "reaction": "force", "d": "force", "applied": "u"}
         unit = f" ({style.units(group)[alike.get(name, name)]})"
         if self.channel is not None:
             return f"{name}{self.channel}{unit}"
@@ -234,7 +234,7 @@ def clip_blows(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = Tru
             look = {"marker": mark, "ls": "", "color": colour, "ms": style.points(5), "mew": style.points(1.2)}
             ax.plot(starts, np.full(len(starts), side * top), clip_on=False, in_layout=False, **look)
     if label:
-        words = f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['u']}"
+        words = f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}"
         note(ax, words)
 
 

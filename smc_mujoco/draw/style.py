@@ -315,23 +315,26 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     plants = sorted({trace.scenario.plant.name for trace in traces})
     if len(plants) > 1:
         raise ScenarioError(f"traces of {' and '.join(plants)} share no axes: draw one plant at a time")
-    if len({tuple((g.name, g.unit) for g in groups(trace.scenario.plant)) for trace in traces}) > 1:
+    if len({tuple((g.name, g.unit) for g in groups(trace.scenario)) for trace in traces}) > 1:
         raise ScenarioError(
             f"traces of {plants[0]} differ in their kinds of channels: draw those with the same ones at a time"
         )
+    if len(units := sorted({trace.scenario.efforts[0] for trace in traces})) > 1:
+        raise ScenarioError(f"traces of {plants[0]} have u in {' and '.join(units)}: draw those of one unit at a time")
     return traces
 
 
 def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
     """Return the traces of each group of channels, which share a pair of axes. All traces are of one plant."""
-    kinds = zip(*(groups(trace.scenario.plant) for trace in traces), strict=True)
+    kinds = zip(*(groups(trace.scenario) for trace in traces), strict=True)
     return {kind[0]: [cut(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
 
 
 def units(group: Group) -> dict[str, str]:
-    """Return the units of x, v, u and s of a group's channels."""
+    """Return the units of x, v, u and s of a group's channels, and of a force on them."""
     x = group.unit
-    return {"x": x, "v": f"{x}/s", "u": EFFORT[x].replace(" ", "·"), "s": f"{x}/s"}
+    u, force = (unit.replace(" ", "·") for unit in (group.effort, EFFORT[x]))
+    return {"x": x, "v": f"{x}/s", "u": u, "s": f"{x}/s", "force": force}
 
 
 def plant_name(plant: Plant) -> str:

@@ -24,7 +24,7 @@ from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.registry import modules
 
 DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
-EFFORT = {"rad": "N m", "m": "N"}  # unit of u, from that of x
+EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
 LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
@@ -159,6 +159,11 @@ class Plant:
     def units(self) -> tuple[str, ...]:
         """Unit of x of each channel, (n,)."""
         return self.mixed or (self.unit,) * self.n
+
+    @property
+    def efforts(self) -> tuple[str, ...]:
+        """Unit of the force on each channel, (n,)."""
+        return tuple(EFFORT[unit] for unit in self.units)
 
     @property
     def network(self) -> bool:

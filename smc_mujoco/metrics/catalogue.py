@@ -229,7 +229,7 @@ def stick_time(trace: Trace) -> float:
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
 
 
-@metric("{u}", realistic=True)
+@metric("{force}", realistic=True)
 def peak_reaction(trace: Trace) -> float:
     """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the samples."""
     return np.abs(trace.reaction).max()

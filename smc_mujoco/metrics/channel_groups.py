@@ -9,10 +9,11 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.state import LOGGED
 
 if TYPE_CHECKING:
-    from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
 
 
@@ -23,18 +24,24 @@ class Group:
     Attributes:
       name: "driven" or "free"; "driven rad" if several groups are driven.
       unit: of their x, "rad" or "m".
+      effort: unit of their u; that of a force on them, or "V".
       driven: whether they have actuators.
       channels: their indices, ascending.
     """
 
     name: str
     unit: str
+    effort: str
     driven: bool
     channels: tuple[int, ...]
 
 
-def groups(plant: Plant) -> tuple[Group, ...]:
-    """Return the plant's groups: driven ones first, each kind in the order of its channels."""
+def groups(of: Plant | Scenario) -> tuple[Group, ...]:
+    """Return the groups of a plant, or of a scenario's plant, whose u may be a voltage.
+
+    Driven ones are first, each kind in the order of its channels.
+    """
+    plant = of if isinstance(of, Plant) else of.plant
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -43,6 +50,7 @@ def groups(plant: Plant) -> tuple[Group, ...]:
         Group(
             name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
             unit=unit,
+            effort=of.efforts[channels[0]],
             driven=driven,
             channels=tuple(channels),
         )

@@ -57,7 +57,7 @@ class Metric:
 
     Attributes:
       name: the function's name.
-      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u, see `unit_for`.
+      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force, see `unit_for`.
       summary: first line of the docstring.
       formula: Trace of one group's channels -> float, without the checks.
       label: its name in tables and figures.
@@ -102,10 +102,11 @@ class Metric:
         """Return whether the metric applies to a group by itself."""
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
-    def unit_for(self, x: str) -> str:
-        """Return the unit for positions in x, "rad" or "m" (as `plant.unit`)."""
-        u = EFFORT[x]
-        return self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u).format(x=x, u=u)
+    def unit_for(self, x: str, u: str = "") -> str:
+        """Return the unit for positions in x, "rad" or "m" (as `plant.unit`), and commands in u; "": of a force."""
+        u = u or EFFORT[x]
+        text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
+        return text.format(x=x, u=u, force=EFFORT[x])
 
 
 def metric(
@@ -163,7 +164,7 @@ def error(trace: Trace) -> np.ndarray:
 
 def parts(trace: Trace) -> dict[Group, Trace]:
     """Return the trace of each group's channels, as the functions below take it."""
-    return {group: cut(trace, group) for group in groups(trace.scenario.plant)}
+    return {group: cut(trace, group) for group in groups(trace.scenario)}
 
 
 def scale(trace: Trace) -> float:

@@ -158,6 +158,7 @@ class Chunk:
             state.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
             state.ESTIMATOR_RAISED: f"{estimator} raised an exception",
             state.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
+            state.FEEDFORWARD_RAISED: f"feedforward {type(scenario.feedforward).__name__} raised an exception",
             state.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
             state.LAW_RAISED: f"{law} raised an exception",
             state.DISTURBANCE_RAISED: "a disturbance raised an exception",
@@ -197,6 +198,8 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
                     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
             case state.REFERENCE_RAISED:
                 reference.evaluate(s.reference, t)
+            case state.FEEDFORWARD_RAISED if s.feedforward is not None:
+                reference.evaluate(s.feedforward, t)
             case state.NOMINAL_RAISED:
                 x, v, _, u = joints[2:].reshape(4, n).copy()
                 reference.nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)

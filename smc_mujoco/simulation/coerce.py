@@ -150,6 +150,11 @@ def reference(value: Signal | Sequence[Signal]) -> Signal:
     return items[0]
 
 
+def feedforward(value: Signal | None) -> Signal | None:
+    """Return one signal, or None."""
+    return instance("feedforward", value, Signal, "one signal, such as smc.TimeSeries(times, values)")
+
+
 def disturbance(value: Signal | Sequence[Signal] | None) -> tuple[Signal, ...]:
     """Return signals, from one, several or None."""
     items = several(value)

@@ -150,17 +150,19 @@ def _evaluate_model(at, sim, i):
 def _inform(at, sim, y, i, partner):
     """Write into y what the law of channel i reads. Return a failure code.
 
-    Channel `partner` moves with channel i and has no actuator; 0 for none.
+    Channel `partner` moves with channel i and has no actuator; 0 for none. The nominal model has the force of channel
+    i's drive, gain u - drag v, in place of u.
     """
     x, v, a = pointer(sim.x), pointer(sim.v), pointer(sim.a)
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     if partner > 0:
         if _evaluate_model(at, sim, partner) != 0:
             return record.NOMINAL_RAISED
-        y.q, y.dq, y.fq, y.gq = x[partner], v[partner], sim.model.f, sim.model.g
+        y.q, y.dq = x[partner], v[partner]
+        y.fq, y.gq = sim.model.f - sim.drive_drag * v[i] * sim.model.g, sim.drive_gain * sim.model.g
     if _evaluate_model(at, sim, i) != 0:
         return record.NOMINAL_RAISED
-    y.f, y.g = sim.model.f, sim.model.g
+    y.f, y.g = sim.model.f - sim.drive_drag * v[i] * sim.model.g, sim.drive_gain * sim.model.g
     y.x, y.v = x[i], v[i]
     y.e, y.de = y.x - y.r, y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
@@ -185,6 +187,11 @@ def _decide(at, sim, k):
         return record.REFERENCE_RAISED
     y.t, y.dt = sim.instant.t, sim.period
     y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
+    added = 0.0
+    if sim.feedforward.address != 0:
+        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            return record.FEEDFORWARD_RAISED
+        added = sim.motion.value
     n, driven, last = sim.n, sim.driven, pointer(sim.u)
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     for i in range(n):
@@ -198,8 +205,9 @@ def _decide(at, sim, k):
         if _call(sim.law, i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT) != 0:
             return record.LAW_RAISED
         limit = pointer(sim.limits)[i]
-        u = min(max(asked.u, -limit), limit)
-        if not (math.isfinite(asked.u) and math.isfinite(asked.s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+        wanted = asked.u + added
+        u = min(max(wanted, -limit), limit)
+        if not (math.isfinite(wanted) and math.isfinite(asked.s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
             return record.NOT_FINITE
         buffer[i], sample.u, sample.s, sample.r = u, u, asked.s, y.r
         last[i] = u

@@ -34,6 +34,7 @@ class Compiled:
     estimator: Function | AtAddress
     nominal: Function | None
     reference: Function
+    feedforward: Function | None
     disturbances: tuple[Function, ...]
 
 
@@ -75,10 +76,11 @@ def prepare(scenario: object) -> Prepared:
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
     resolved = scenario.resolved
+    known = (scenario.reference,) if scenario.feedforward is None else (scenario.reference, scenario.feedforward)
     for part in (scenario.law, scenario.surface, resolved.velocity):
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
-    for signal in (scenario.reference, *scenario.disturbance):
+    for signal in (*known, *scenario.disturbance):
         if isinstance(signal, Recorded):
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
     key = (
@@ -94,7 +96,7 @@ def prepare(scenario: object) -> Prepared:
 def _compile(s: Resolved) -> Compiled:
     """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
     plant = s.plant
-    for signal in (s.reference, *s.disturbance):
+    for signal in (s.reference, *s.disturbance, *([] if s.feedforward is None else [s.feedforward])):
         native.values_of(signal)  # refuses data that compiled code would misread
     return Compiled(
         law=native.component(s.law),
@@ -102,6 +104,7 @@ def _compile(s: Resolved) -> Compiled:
         estimator=native.component(s.velocity),
         nominal=None if isinstance(plant.nominal, Coupled) else native.nominal(plant.nominal, tuple(plant.parameters)),
         reference=native.of_signal(s.reference),
+        feedforward=s.feedforward and native.of_signal(s.feedforward),
         disturbances=tuple(map(native.of_signal, s.disturbance)),
     )
 
@@ -146,6 +149,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "nominal": function(own or compiled.nominal, own.values if own else s.plant.parameters.values()),
         "reference": function(compiled.reference, native.values_of(s.reference)),
     }
+    if s.feedforward is not None:
+        functions["feedforward"] = function(compiled.feedforward, native.values_of(s.feedforward))
     if s.surface is not None:
         functions["surface"] = function(compiled.surface, s.surface.gains.values(), s.surface.memory)
     disturbances = [
@@ -201,6 +206,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "read_period": sensor.period or 0.0,
         "read_delay": sensor.delay,
         "uses_model": s.model == "nominal",
+        "drive_gain": s.drive.gain,
+        "drive_drag": s.drive.drag,
         "joints": at,
         "x": at + 16,
         "v": at + 16 + 8 * n,

@@ -183,22 +183,24 @@ class Loop:
         limits = scenario.limits
         r, dr, ddr = evaluate(scenario.reference, t)
         self.r[:] = r
+        added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
         for i in range(len(x)):
             if self.channels["ctrl"][i] < 0:  # only measured
                 u[i] = s[i] = self.r[i] = 0.0
                 continue
-            xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i)
+            xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
             y = Measurement(
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
                 float(ddr if math.isnan(self.a[i]) else self.a[i]), limits[i], float(scenario.model == "nominal"),
             )  # fmt: skip
             if (j := i + int(np.sum(self.channels["ctrl"] >= 0))) < len(x):  # moves with it, without an actuator
-                fq, gq = self.model_at(x, v, j)
+                fq, gq = self.model_at(x, v, j, i)
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
             if self.surface:
                 sliding, v_eq = self.surface(i, y)
                 y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
             u[i], s[i] = self.law(i, y)
+            u[i] += added
             self.latest[i] = np.clip(u[i], -limits[i], limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < MAX_CONTROL):
@@ -206,9 +208,11 @@ class Loop:
             u[i] = self.latest[i]
         return u, s
 
-    def model_at(self, x: np.ndarray, v: np.ndarray, i: int) -> tuple[float, float]:
-        """Return nominal f and g of channel i."""
-        return nominal(self.scenario.plant, x, v, i, self.nominal, self.latest)
+    def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
+        """Return nominal f and g of channel i, for the u of a driven channel."""
+        f, g = nominal(self.scenario.plant, x, v, i, self.nominal, self.latest)
+        gain, drag = self.scenario.drive
+        return f - drag * v[driven] * g, gain * g
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""

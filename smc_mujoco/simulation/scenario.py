@@ -27,8 +27,8 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
-from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
@@ -80,9 +80,11 @@ class Scenario:
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
         equation, up to 0.25 ms with friction, contact, a mechanism or an actuator.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
-        A motor's own limit holds too: see `limits`.
+        A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
       reference: r(t), the same for every channel.
+      feedforward: a known signal that is added to the law's u before its bound, the same for every driven channel: an
+        excitation, or the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
@@ -125,6 +127,7 @@ class Scenario:
     x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
     v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
     reference: Signal = field(converter=coerce.reference, default=REST)
+    feedforward: Signal | None = field(converter=coerce.feedforward, default=None)
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
     input_delay: float = 0.0
@@ -221,9 +224,21 @@ class Scenario:
         return bool(parts or not self.plant.smooth)
 
     @property
+    def amplifier(self) -> DCMotor | None:
+        """The motor whose voltage u is; None if u is a force."""
+        return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
+
+    @property
+    def efforts(self) -> tuple[str, ...]:
+        """Unit of u in each channel, (n,): that of the joint's force, or "V"."""
+        return self.plant.efforts if self.amplifier is None else (self.amplifier.unit,) * self.plant.n
+
+    @property
     def limits(self) -> tuple[float, ...]:
-        """The bound on |u| of each driven channel, N or N m: the lesser of u_max and its motor's own limit."""
+        """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's own limit."""
         u_max = self.resolved.u_max
+        if self.amplifier is not None:
+            return (min(u_max, self.amplifier.voltage),) * self.plant.driven
         return tuple(min(u_max, limit) for limit in self.plant.limits) or (u_max,) * self.plant.driven
 
     @property
@@ -275,6 +290,11 @@ class Scenario:
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 
+    @property
+    def drive(self) -> Nominal:
+        """Force of the actuator per unit of u and per velocity, as the law's model knows it."""
+        return Nominal() if self.amplifier is None else self.amplifier.nominal
+
     def factors(self, step: int) -> dict[str, float]:
         """Return the true plant's parameter factors at a physics step: the mismatch, and from its time on the jump."""
         factors = dict(self.mismatch)
@@ -312,7 +332,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
         "physics_step": s.control_period / math.ceil(s.control_period / largest - 1e-9),
-        "u_max": default_u_max(s.plant),
+        "u_max": default_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
@@ -383,6 +403,9 @@ def check_signals(s: Resolved) -> None:
         raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
     if s.reference.random:
         raise ScenarioError(f"reference is {type(s.reference).__name__}, which is noise: give a smooth signal")
+    if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random):
+        kind = "noise" if s.feedforward.random else "a force on a body"
+        raise ScenarioError(f"feedforward is {type(s.feedforward).__name__}, which is {kind}: give a known signal of u")
 
 
 def check_law(s: Resolved) -> None:
@@ -505,9 +528,9 @@ def warn_of_weak_motors(s: Resolved) -> None:
             with np.errstate(all="ignore"):
                 f, g = s.plant.nominal(np.array(s.x0), still, i, p)
             need = abs(f) / abs(g) if g else 0.0
-            if motor.stall < need <= limit:
+            if motor.stall < need and (need <= limit or motor.unit):
                 warnings.warn(
-                    f"DCMotor gives at most {motor.stall:.3g} {EFFORT[s.plant.units[i]]} at rest, and channel {i} of "
+                    f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
                     f"{s.plant.name} needs {need:.3g} to stand where it starts: give it more gear, voltage or current",
                     ScenarioWarning,
                     users_frame(),

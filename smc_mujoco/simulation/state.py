@@ -63,7 +63,9 @@ SIMULATION = np.dtype(
         ("read_period", "f8"), ("read_delay", "f8"),
         # functions, and whether the law may use the nominal model
         ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
-        ("reference", FUNCTION), ("uses_model", "f8"),
+        ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
+        # the drive as the nominal model knows it: force = gain u - drag v
+        ("drive_gain", "f8"), ("drive_drag", "f8"),
         # what the nominal model gets: i, n, then x, v, a and u of all channels, (n,) each, by their addresses too
         ("joints", "i8"), ("x", "i8"), ("v", "i8"), ("a", "i8"), ("u", "i8"),
         # what functions get and give
@@ -86,8 +88,8 @@ MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOT
 # Values of `failure`.
 (
     FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE, ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED,
-    DISTURBANCE_RAISED, SURFACE_RAISED, INTERRUPTED,
-) = range(11)  # fmt: skip
+    DISTURBANCE_RAISED, SURFACE_RAISED, FEEDFORWARD_RAISED, INTERRUPTED,
+) = range(12)  # fmt: skip
 
 
 def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:

@@ -36,7 +36,8 @@ class Trace:
     Attributes:
       t: times, (K + 1,), s.
       x, v: true positions and velocities, (K + 1, n), each channel in its own of `plant.units`, and per second.
-      u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m.
+      u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m, or V if the motor's
+        command is a voltage.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
       d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
@@ -112,8 +113,10 @@ class Trace:
         found = {}
         for column in self.columns():
             name = column.rstrip("0123456789")
-            x = self.scenario.plant.units[int(column[len(name) :] or 0)]
-            found[column] = {"t": "s", "x": x, "r": x, "v": f"{x}/s", "s": ""}.get(name, EFFORT[x])
+            i = int(column[len(name) :] or 0)
+            x, u = self.scenario.plant.units[i], self.scenario.efforts[i]
+            known = {"t": "s", "x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
+            found[column] = known.get(name, EFFORT[x])
         return found
 
     def to_pandas(self) -> "pandas.DataFrame":

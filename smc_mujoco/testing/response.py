@@ -98,8 +98,9 @@ class StepResponse:
     def value(self, name: str) -> tuple[float, str]:
         """Return one of the `values`, and its unit."""
         group, _, metric = name.rpartition(" ")
-        units = {each.name: each.unit for each in groups(self.scenario.plant)}
-        return self.values[name], CATALOGUE[metric].unit_for(units.get(group, self.scenario.plant.unit))
+        driven = groups(self.scenario)[0]
+        of = next((each for each in groups(self.scenario) if each.name == group), driven)
+        return self.values[name], CATALOGUE[metric].unit_for(of.unit, of.effort)
 
     def _unknown(self, name: str) -> ScenarioError:
         if name in CATALOGUE:

@@ -106,7 +106,7 @@ def _print_curves(trace: "Trace", terminal: Terminal) -> None:
     from smc_mujoco.cli import tables
 
     plant = trace.scenario.plant
-    for group, heading in tables.headings(plant).items():
+    for group, heading in tables.headings(trace.scenario).items():
         if heading:
             terminal.note(f"{heading}:")
         channels = list(group.channels if len(group.channels) <= tables.MAX_NAMED_JOINTS else group.channels[:1])

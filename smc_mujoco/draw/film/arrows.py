@@ -13,6 +13,7 @@ import numpy as np
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
+from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
@@ -84,7 +85,7 @@ def loads(trace: Trace, edges: np.ndarray) -> Loads:
 
 
 class Scale(NamedTuple):
-    """Values of the longest arrows, N or N m: the largest of the runs that lasted.
+    """Values of the longest arrows, in the units of u and of a force: the largest of the runs that lasted.
 
     Blows are far larger than what drives the machine, so the reaction's longest arrow is at most the control's.
     """
@@ -100,7 +101,8 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     found = {}
     for group, parts in style.split(traces).items():
         control, disturbance, reaction = (max(map(abs, panels.span(parts, y))) for y in ("applied", "d", "reaction"))
-        longest = min(reaction, control) if control else reaction
+        same = group.effort == EFFORT[group.unit]  # else the control is a voltage
+        longest = min(reaction, control) if control and same else reaction
         if group.driven:
             found[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest)
     return found
@@ -108,7 +110,7 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
 
 def by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
     """Return the scale of the arrows of each of a trace's driven channels."""
-    driven = [group for group in groups(trace.scenario.plant) if group.driven]
+    driven = [group for group in groups(trace.scenario) if group.driven]
     of_channel = {i: scale for group, scale in zip(driven, scales.values(), strict=True) for i in group.channels}
     return [of_channel[i] for i in sorted(of_channel)]
 

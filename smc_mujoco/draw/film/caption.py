@@ -187,7 +187,8 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
         sizes = [(getattr(scale, quantity), group, scale) for group, scale in scales.items()]
         more = {True: " or more", False: ""}
         return ", ".join(
-            f"{style.short(size)} {style.units(group)['u']}{more[quantity == 'reaction' and scale.blows]}"
+            f"{style.short(size)} {style.units(group)['u' if quantity == 'control' else 'force']}"
+            f"{more[quantity == 'reaction' and scale.blows]}"
             for size, group, scale in sizes
             if size
         )

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import Actuator, drive_ids, drives
+from smc_mujoco.common.errors import ScenarioError, unknown
+from smc_mujoco.mechanisms.hardware.part import Actuator, Nominal, drive_ids, drives
 from smc_mujoco.mechanisms.plant import LARGEST, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
@@ -29,6 +29,7 @@ LEAST_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in r
 LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this, as in MuJoCo
 LEAST_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
+COMMANDS = ("torque", "voltage")
 COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
 
@@ -108,7 +109,7 @@ class RateLimit(Drive):
 
 @dataclasses.dataclass(frozen=True)
 class DCMotor(Drive):
-    """Motor and gearbox on a voltage amplifier: V = scale u, the voltage whose stall torque is u.
+    """Motor and gearbox on a voltage amplifier: V = scale u, the voltage whose stall torque is u; or V = u.
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
         torque = gear k i + gear cogging sin(gear poles x)        |torque| <= gear k current
@@ -116,6 +117,10 @@ class DCMotor(Drive):
 
     The law does not know it: back-EMF takes (gear k)^2/R v, inductance delays by L/R. Without limits, the torque tends
     to u as gear k goes to 0. The current's limit cuts the torque, not i, which is back within a few L/R.
+
+    With command="voltage" u is the voltage itself, in V, as on a rig whose amplifier takes volts. |u| is then bounded
+    by `voltage`, too, and a law that has the nominal model has it per volt: gear k/R is part of its g, and the back-EMF
+    of its f. The law's model never has the inductance, the cogging, and the limit of the current.
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
@@ -135,6 +140,7 @@ class DCMotor(Drive):
       poles: periods of cogging per turn of the motor, 0 or more; the default is chosen.
       voltage: V, the supply; math.inf for no limit.
       current: A, the amplifier's limit; math.inf for none.
+      command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
 
     resistance: float = 0.299
@@ -146,13 +152,16 @@ class DCMotor(Drive):
     poles: float = 12.0
     voltage: float = 24.0
     current: float = 30.0
+    command: str = "torque"
 
     def __post_init__(self) -> None:
+        if self.command not in COMMANDS:
+            raise unknown("command of DCMotor", self.command, COMMANDS)
         self.check_numbers("resistance", above=0.0, least=LEAST_RESISTANCE)
         self.check_numbers("torque_constant", "gear", above=0.0)
         self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", least=0.0)
         self.check_numbers("voltage", "current", above=0.0, most=math.inf, infinite=True)
-        if not self.constant >= LEAST_CONSTANT or not self.scale <= LARGEST:
+        if not self.constant >= LEAST_CONSTANT or not self.resistance / self.constant <= LARGEST:
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
                 f"resistance of {self.resistance:g} ohm: give a stronger motor"
@@ -165,13 +174,24 @@ class DCMotor(Drive):
 
     @property
     def scale(self) -> float:
-        """V per N m (V/N) of stall torque."""
-        return self.resistance / self.constant
+        """V per unit of u: per N m (N) of stall torque, or 1 if u is the voltage."""
+        return 1.0 if self.command == "voltage" else self.resistance / self.constant
+
+    @property
+    def unit(self) -> str:
+        """Unit of u, "V" if it is the voltage; "" for that of the joint's force."""
+        return "V" if self.command == "voltage" else ""
+
+    @property
+    def nominal(self) -> Nominal:
+        """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is the torque."""
+        per_volt = self.constant / self.resistance
+        return Nominal(per_volt, per_volt * self.constant) if self.command == "voltage" else Nominal()
 
     @property
     def stall(self) -> float:
         """The most torque that voltage and current allow at rest, N m (N)."""
-        return min(self.voltage / self.scale, self.constant * self.current)
+        return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in drives(spec):

@@ -10,7 +10,7 @@ channel's actuator drives, if it is not the channel's joint itself.
 
 import dataclasses
 from collections.abc import Hashable, Iterator
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -66,9 +66,21 @@ class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
 
+class Nominal(NamedTuple):
+    """Force of an actuator as the law's model knows it: gain u - drag v.
+
+    Attributes:
+      gain: force per unit of u.
+      drag: force per unit of the joint's velocity.
+    """
+
+    gain: float = 1.0
+    drag: float = 0.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Actuator(Part):
-    """Base of actuators, which stand between the command u, the wanted force, and the joint."""
+    """Base of actuators, which stand between the command u, the wanted force or a voltage, and the joint."""
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
 
@@ -81,6 +93,16 @@ class Actuator(Part):
     def delay(self) -> float:
         """Time constant with which the force follows a held u, s; 0 for none."""
         return 0.0
+
+    @property
+    def unit(self) -> str:
+        """Unit of u; "" for that of the joint's force."""
+        return ""
+
+    @property
+    def nominal(self) -> "Nominal":
+        """What the law's model knows of it."""
+        return Nominal()
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
