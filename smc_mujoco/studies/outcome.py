@@ -281,8 +281,9 @@ def _unit(measure: Measure, run: Trace, group: str) -> str:
 
     if not isinstance(measure, str):
         return ""
-    named = [one.unit for one in groups(run.scenario.plant) if one.name == group]
-    unit = CATALOGUE[measure].unit_for(named[0] if named else run.scenario.plant.unit)
+    each = {one.name: one for one in groups(run.scenario)}
+    of = each.get(group, next(iter(each.values())))
+    unit = CATALOGUE[measure].unit_for(of.unit, of.effort)
     return "" if unit == "1" else unit
 
 

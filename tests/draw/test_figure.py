@@ -192,6 +192,22 @@ def test_refuses_what_shares_no_axes(pair, tmp_path):
         figure(pair, tmp_path / "file" / "a")
 
 
+def test_a_voltage_is_drawn_in_volts_beside_forces_in_newton_metres(tmp_path):
+    motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
+    volts = smc.Scenario(
+        plant=smc.plant("furuta", cf=1e-4), law="none", duration=0.1, feedforward=smc.Constant(0.03),
+        actuator=dataclasses.replace(motor, command="voltage"),
+    )  # fmt: skip
+    torque = dataclasses.replace(volts, actuator=motor)
+    one, other = smc.run([volts, torque])
+    text = words(figure([one], tmp_path / "a")[0])
+    assert all(label in text for label in ("u (V)", "reaction (N·m)"))
+    assert "u (N·m)" not in text
+    assert "u (N·m)" in words(figure([other], tmp_path / "b")[0])
+    with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
+        figure([one, other], tmp_path / "c")
+
+
 def test_laws_keep_their_colours_and_traces_never_share_one(pair):
     assert style.law_colours([trace.scenario.law for trace in pair]) == [style.law_colour(law) for law in LAWS]
     assert len(set(style.law_colours([trace.scenario.law for trace in pair * 4]))) == 8

@@ -51,7 +51,7 @@ def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=Fa
     zero = np.zeros((t.size, n))
     units = units or ("m",) * n
     mixed = dataclasses.replace(plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free)
-    scenario = SimpleNamespace(plant=mixed, law=SimpleNamespace(name="classical"))
+    scenario = SimpleNamespace(plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical"))
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, **more)
 

@@ -188,6 +188,56 @@ def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
     assert smc.run(scenario).d[:4, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
+@dataclasses.dataclass(frozen=True)
+class Raising(smc.Signal):
+    """A signal that has no value from 5 ms on."""
+
+    @staticmethod
+    def value(t, p):
+        if t > 0.0045:
+            raise ValueError("no value here")
+        return 0.0, 0.0, 0.0
+
+
+@smc.law_function(gains={"a": 20.0, "b": 5.0}, requires_model=True)
+def both(y, gains, memory):
+    """Reads the model of the driven channel and of the one that it moves."""
+    wanted = -gains.a * y.e - gains.b * y.de
+    return (wanted - y.f) / y.g + 0.01 * (gains.a * y.q + gains.b * y.dq - y.fq) / y.gq, y.e
+
+
+def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
+    """A law that computes with the model per volt, on the joint that the motor drives and the one that it moves."""
+    motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
+    scenario = smc.Scenario(
+        plant=smc.plant("furuta", b=1e-4, bq=1e-5), law=both(), x0=(0.0, 0.05), actuator=motor,
+        feedforward=smc.Sine(0.5, 20.0), sensor=smc.Encoder(2048), control_period=2e-3, input_delay=1e-3, duration=0.3,
+    )  # fmt: skip
+    trace, other = smc.run(scenario), reference.run(scenario)
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+    plain = smc.run(dataclasses.replace(scenario, feedforward=None))
+    np.testing.assert_allclose(trace.u[0, 0], plain.u[0, 0])
+    assert np.abs(trace.u[1:50] - plain.u[1:50]).max() > 0.01
+
+
+def test_a_feedforward_is_added_before_the_bound_and_read_at_the_sample():
+    scenario = smc.Scenario(
+        plant="duffing", law="none", feedforward=smc.Sine(8.0, 30.0), duration=0.2, control_period=5e-3
+    )
+    trace = smc.run(scenario)
+    expected = np.clip(8.0 * np.sin(30.0 * trace.t), -6.0, 6.0)
+    np.testing.assert_allclose(trace.u[:, 0], expected, atol=1e-12)
+    assert_same(trace, reference.run(scenario))
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+def test_a_feedforward_that_raises_says_so():
+    scenario = smc.Scenario(plant="duffing", law="none", feedforward=Raising(), duration=0.01)
+    for trace in (smc.run(scenario), reference.run(scenario)):
+        assert "feedforward Raising" in str(trace.failure) or "no value here" in str(trace.failure)
+
+
 def test_applied_is_the_command_of_the_delay_ago():
     delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
     common = {

@@ -587,3 +587,26 @@ def test_a_file_of_the_first_version_loads_with_what_its_actuator_gave(traces, t
     old = smc.load(tmp_path / "old.npz")
     np.testing.assert_array_equal(old.force, trace.applied)
     assert not old.reaction.any()
+
+
+def test_a_voltage_and_a_feedforward_come_back_and_have_their_unit(tmp_path):
+    motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
+    trace = smc.run(
+        smc.Scenario(plant="furuta", law="none", actuator=motor, feedforward=smc.Sine(1.0, 9.0), duration=0.01)
+    )
+    assert {name: trace.units()[f"{name}0"] for name in FORCES} == {
+        "u": "V", "applied": "V", "d": "N m", "force": "N m", "reaction": "N m",
+    }  # fmt: skip
+    again = smc.load(trace.save(tmp_path / "a.npz"))
+    assert again.scenario == trace.scenario
+    assert "u0 [V]" in trace.export(tmp_path / "a.csv").read_text().partition("\n")[0]
+
+
+def test_a_file_from_before_there_was_a_voltage_loads_as_the_same_scenario(tmp_path):
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", actuator=smc.DCMotor(), duration=0.01))
+    with np.load(trace.save(tmp_path / "a.npz")) as file:
+        held = {name: file[name] for name in file}
+    about = json.loads(str(held.pop("about")))
+    del about["feedforward"], about["actuator"][0]["values"]["command"]
+    np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
+    assert smc.load(tmp_path / "old.npz").scenario == trace.scenario

@@ -14,6 +14,7 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit
 from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import array, plant, plants, write
+from smc_mujoco.simulation import reference
 
 H = 2.5e-4  # s
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
@@ -351,3 +352,41 @@ def test_what_a_motor_is_asked_for_is_within_the_bound_to_the_last_bit(law):
     motor = smc.DCMotor(gear=0.32761186154670086)
     trace = smc.run(smc.Scenario(plant="duffing", law=law, duration=0.005, x0=0.8, actuator=motor))
     assert np.abs(trace.applied).max() == trace.scenario.resolved.u_max
+
+
+VOLTAGE = DCMotor(0.5, 0.0, 0.05, 2.0, 1e-5, voltage=10.0, command="voltage")
+
+
+def test_a_voltage_is_what_the_winding_gets():
+    torque = driven(locked(VOLTAGE), lambda t: VOLTAGE.scale * 3.0, 0.01)[:, 3]
+    assert torque == pytest.approx(3.0 / 0.5 * 0.05 * 2.0, rel=1e-9)
+    assert VOLTAGE.stall == pytest.approx(10.0 / 0.5 * 0.05 * 2.0)
+
+
+@pytest.mark.parametrize("name", ["duffing", "furuta"])
+def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
+    """x'' = f + g u for u in V, of the driven channel and of the one that it moves, without inductance."""
+    kind = plant(name)
+    motor = DCMotor(0.5, 0.0, 0.05, 2.0, 0.0, voltage=10.0, command="voltage")
+    scenario = smc.Scenario(plant=kind, law="none", actuator=motor)
+    model, rng = build(kind, motor), np.random.default_rng(1)
+    data = mujoco.MjData(model)
+    for _ in range(20):
+        x, v, u = rng.uniform(-1, 1, kind.n), rng.uniform(-3, 3, kind.n), rng.uniform(-9, 9)
+        data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
+        mujoco.mj_forward(model, data)
+        for i in range(kind.n):
+            f, g = reference.Loop(scenario).model_at(x, v, i, 0)
+            assert data.qacc[i] == pytest.approx(f + g * u, rel=1e-9, abs=1e-9)
+
+
+def test_a_voltage_is_bounded_by_the_supply_whatever_u_max_is():
+    s = smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, feedforward=smc.Constant(50.0), duration=0.01)
+    assert (s.resolved.u_max, s.limits, s.efforts) == (10.0, (10.0,), ("V", "V"))
+    assert smc.run(s).u[:, 0] == pytest.approx(10.0)
+    assert smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, u_max=4.0).limits == (4.0,)
+
+
+def test_a_command_is_torque_or_voltage():
+    with pytest.raises(ScenarioError, match="unknown command of DCMotor 'volts': did you mean 'voltage'"):
+        DCMotor(command="volts")
