@@ -132,16 +132,17 @@ def loader(kind: type) -> Callable:
     return load
 
 
-def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
+def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> CFunc:
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
     Args:
-      cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written.
+      cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written. A body
+        whose closure holds other functions needs a name and a hash of all that it reaches.
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
-            made._cache = Cache(body)
+            made._cache = Cache(body, *(() if cache is True else cache))
     with held_back():
         made.compile()
     return made
@@ -150,49 +151,60 @@ def compiled(signature: Any, body: Callable, cache: bool = False) -> CFunc:
 class Cache(FunctionCache):
     """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is no error."""
 
-    def __init__(self, body: Callable):
+    def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)
-        locator = self._impl.locator
-        self._cache_file = Sealed(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+        locator, base, self.content = self._impl.locator, self._impl.filename_base, content
+        stamp = content or locator.get_source_stamp()
+        self._cache_file = Sealed(locator.get_cache_path(), f"{name}-{base}" if name else base, stamp)
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple:
+        """Return what tells overloads apart: numba's own hash of a closure covers no functions in it."""
+        return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write it, unless the disk is full or the files belong to another user."""
+        """Write it, unless the code holds addresses, the disk is full or the files belong to another user."""
         with contextlib.suppress(OSError):
-            super().save_overload(sig, data)
+            if not data.library.has_dynamic_globals:
+                super().save_overload(sig, data)
 
 
 class Sealed(IndexDataCacheFile):
-    """Files of numba's cache, each with a hash at its end. A file whose hash does not fit counts as missing."""
+    """Files of numba's cache, each with a hash at its end, of it and of what was compiled.
+
+    A file whose hash does not fit counts as missing: it is damaged, or another function's of the same name.
+    """
 
     def _load_index(self) -> dict:
-        return super()._load_index() if _whole(self._index_path) else {}
+        return super()._load_index() if self._whole(self._index_path) else {}
 
     def _load_data(self, name: str) -> Any:
-        return super()._load_data(name) if _whole(self._data_path(name)) else None
+        return super()._load_data(name) if self._whole(self._data_path(name)) else None
 
     @contextlib.contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
         written = io.BytesIO()
         yield written
         with super()._open_for_write(filepath) as file:
-            file.write(written.getvalue() + hashlib.sha256(written.getvalue()).digest())
+            file.write(written.getvalue() + self._seal(written.getvalue()))
 
+    def _whole(self, path: str) -> bool:
+        """Return whether a file of the cache exists, is undamaged and of the same source."""
+        try:
+            content = Path(path).read_bytes()
+        except OSError:
+            return False
+        return self._seal(content[:-DIGEST]) == content[-DIGEST:]
 
-def _whole(path: str) -> bool:
-    """Return whether a file of the cache exists and is undamaged."""
-    try:
-        content = Path(path).read_bytes()
-    except OSError:
-        return False
-    return hashlib.sha256(content[:-DIGEST]).digest() == content[-DIGEST:]
+    def _seal(self, content: bytes) -> bytes:
+        return hashlib.sha256(repr(self._source_stamp).encode() + content).digest()
 
 
 class Function:
-    """A compiled C function, kept alive, and its `address`."""
+    """A compiled C function, kept alive, and its `address`. For `cache` see `compiled`."""
 
-    def __init__(self, body: Callable):
+    def __init__(self, body: Callable, cache: bool | tuple[str, str] = False):
         try:
-            self._cfunc = compiled(SIGNATURE, body)
+            self._cfunc = compiled(SIGNATURE, body, cache)
         except Exception as error:  # numba raises many types; each means that it cannot compile the function
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address

@@ -14,16 +14,19 @@ that reaches u or s, the run ends.
 # (an intrinsic is called without its typing context)
 import functools
 import math
+import re
 from collections.abc import Callable
 
 from numba import carray, types
 from numba.extending import intrinsic
 
+from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import AtAddress, Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
 
 
@@ -44,7 +47,7 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
             output[0], output[1] = first, second
         return not ok
 
-    return Function(native)
+    return Function(native, _cached(function, kind, gains, memory))
 
 
 @intrinsic
@@ -85,7 +88,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    return Function(native)
+    return Function(native, _cached(kind.value, names, random, series, memory))
 
 
 @functools.cache
@@ -104,7 +107,16 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
             output[0], output[1] = f, g
         return not ok
 
-    return Function(native)
+    return Function(native, _cached(function, names))
+
+
+def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
+    """Return the name and the hash under which a compiled function is kept on disk; False if it has no hash."""
+    name = re.sub(r"\W+", "-", f"{function.__module__}.{function.__qualname__}")
+    try:
+        return name, f"{magic()} {fingerprint.of(function)} {arguments}"
+    except ScenarioError:
+        return False
 
 
 def component(c: Component) -> Function | AtAddress:

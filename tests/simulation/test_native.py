@@ -1,0 +1,96 @@
+"""Compiled components on disk: what was compiled once is loaded, what differs in anything that it reaches is not."""
+
+import ctypes
+from pathlib import Path
+from types import FunctionType
+
+import numba
+import numpy as np
+import pytest
+from numba import njit
+
+import smc_mujoco as smc
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import native
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch) -> Path:
+    """An empty folder for what is compiled."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def compiled(function, kind="law", gains=("k",), memory=1):
+    """Compile a component as a new process would."""
+    return native._component.__wrapped__(function, kind, gains, memory)
+
+
+def hits(function, **options) -> int:
+    return compiled(function, **options)._cfunc.cache_hits
+
+
+def force(function) -> float:
+    """The u of a compiled law at 0, with a gain of 3."""
+    inputs, gains, memory, out = np.zeros(len(Measurement._fields)), np.array([3.0]), np.zeros(1), np.zeros(2)
+    done = compiled(function)
+    assert done._cfunc.ctypes(*(a.ctypes.data for a in (inputs, gains, memory, out))) == 0
+    return out[0]
+
+
+def mine(body="y.x + gains.k", **space) -> FunctionType:
+    """A user's law u = body, s = 0; its module holds these names."""
+    space = {"__name__": "users", **space}
+    exec(f"def mine(y, gains, memory):\n    return {body}, 0.0", space)
+    return space["mine"]
+
+
+def test_a_law_is_compiled_once_for_all_processes():
+    assert [hits(smc.law("classical").function, gains=("k", "c")) for _ in range(2)] == [0, 1]
+
+
+def test_another_kind_other_gains_or_another_memory_are_compiled_anew():
+    assert [hits(mine()), hits(mine())] == [0, 1]
+    assert hits(mine(), gains=("k", "c")) == 0
+    assert hits(mine(), memory=2) == 0
+    assert hits(mine("y.x"), kind="estimator") == 0
+
+
+def test_a_law_that_has_changed_is_not_taken_for_the_one_before():
+    """By its own text, by a number of its module, and by a helper's: the file has one name."""
+    scaled = "factor * gains.k"
+    helper = "@njit\ndef helper(x):\n    return {} * x"
+
+    def helped(number):
+        space = {"njit": njit, "__name__": "users"}
+        exec(helper.format(number), space)
+        return mine("helper(gains.k)", helper=space["helper"])
+
+    assert [force(mine("gains.k")), force(mine("2.0 * gains.k")), force(mine("gains.k"))] == [3.0, 6.0, 3.0]
+    assert [force(mine(scaled, factor=f)) for f in (4.0, 5.0)] == [12.0, 15.0]
+    assert [force(helped(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
+
+
+def test_code_of_another_law_under_the_index_of_this_one_is_not_run(cache):
+    """Two processes write files of one name at the same time: the one's index, the other's code."""
+    force(mine("gains.k"))
+    (index,) = cache.rglob("*.nbi")
+    first = index.read_bytes()
+    assert force(mine("2.0 * gains.k")) == 6.0
+    index.write_bytes(first)
+    assert hits(mine("gains.k")) == 0
+    assert force(mine("gains.k")) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("body", "thing"),
+    [
+        ("thing(gains.k)", ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: 2.0 * x)),
+        ("thing[0] * gains.k", np.full(1_000_000, 2.0)),  # too large to be copied into code
+    ],
+    ids=["function", "array"],
+)
+def test_code_that_holds_an_address_is_not_kept(cache, body, thing):
+    """It would be another one in the next process."""
+    assert force(mine(body, thing=thing)) == 6.0
+    assert list(cache.rglob("*.nb?")) == []
