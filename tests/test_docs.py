@@ -1,6 +1,7 @@
 """docs/ as a site: every page is in its contents, its reference names every public name, and its tutorial is true."""
 
 import contextlib
+import importlib
 import importlib.metadata
 import io
 import os
@@ -14,11 +15,13 @@ from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
+from smc_mujoco.cli import law_pages
 from smc_mujoco.metrics.catalogue import metrics
 
+TEMPLATES = [template for known in law_pages.CATALOGUES.values() for template in known().values()]
 DOCS, CONFIGURATION = ROOT / "docs", ROOT / "docs" / "site" / "mkdocs.yml"
 TUTORIAL = DOCS / "tutorial.md"
-NAV = re.findall(r"^ +- (?:\w+: )?(\w+\.md)$", CONFIGURATION.read_text(), re.MULTILINE)
+NAV = re.findall(r"^ +- (\w+\.md)$", CONFIGURATION.read_text(), re.MULTILINE)
 INSTALLED = bool(importlib.metadata.entry_points(group="pytest11", name="smc_mujoco"))
 PLUGIN = ("-p", "no:cacheprovider", *(() if INSTALLED else ("-p", "smc_mujoco.testing.plugin")))
 NUMBER = r"\d+(?:\.\d+)?"
@@ -102,6 +105,66 @@ def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
     assert (tmp_path / figure).is_file()
 
 
+@pytest.fixture
+def generator(monkeypatch):
+    """The modules that write the pages of laws and plants."""
+    monkeypatch.syspath_prepend(str(DOCS / "site"))
+    return importlib.import_module("catalogue")
+
+
+@pytest.mark.parametrize(
+    ("plain", "latex"),
+    [
+        ("u = -k1 [s]^(1/2) + w", r"u = - k_{1} {\lfloor s \rceil}^{1 / 2} + w"),
+        (
+            "w' = -k2 sgn(s), |w| <= w_max",
+            r"{w}' = - k_{2}\,\mathrm{sgn}(s)  ,\; \left| w \right| \le  w_{\mathrm{max}}",
+        ),
+        ("(a - f) / (g b)", r"\frac{a - f}{g b}"),
+        ("w+ = d^ + u_ + x_(i+1)", r"{w}^{+} = \hat{d} + u_{-} + x_{i + 1}"),
+        ("de for t < T", r"e' \;\text{for}\; t \lt  T"),
+    ],
+)
+def test_the_plain_notation_becomes_latex(generator, plain, latex):
+    assert generator.notation.formula(plain).split() == latex.split()
+
+
+def test_formulas_in_sentences_are_found_and_words_are_not(generator):
+    text = "With a gain k > 0, s = 0 lasts for |d| <= D; the author's law of 1993 needs 2 m, and dt^2."
+    expected = (
+        r"With a gain $k \gt  0$, $s = 0$ lasts for $\left| d \right| \le  D$; the author's law of 1993 needs 2 m, and "
+    )
+    assert generator.notation.sentence(text) == expected + r"${\Delta t}^{2}$."
+
+
+@pytest.mark.parametrize("template", TEMPLATES, ids=lambda template: f"{template.kind}-{template.name}")
+def test_a_page_says_what_each_gain_is_and_typesets_all_equations(generator, template):
+    assert {gain for gain, (meaning, unit) in generator.meanings(template).items() if not (meaning and unit)} == set()
+    for clause in generator.notation.clauses(law_pages.entry(template).formula):
+        latex = generator.notation.formula(clause, template.gains)
+        assert latex.count("{") == latex.count("}")
+        assert latex.count(r"\left") == latex.count(r"\right")
+        assert "^{}" not in latex
+    text = generator.body(template)
+    assert text.count("$") % 2 == 0
+    assert [
+        part for part in text.split("$")[::2] if re.search(r"[<>]=|\^|\bde\b|\blam\b", part.partition("`")[0])
+    ] == []
+
+
+@pytest.mark.parametrize("name", smc.plants())
+def test_a_page_has_the_equation_and_the_units_of_a_plant(generator, name):
+    plant = smc.plant(name)
+    module = sys.modules[plant.build.__module__]
+    assert len(generator.units(plant, module)) == len(plant.parameters)
+    title, equations, rest = generator.equation(module.__doc__)
+    assert title
+    assert "=" not in title
+    assert len(equations) == plant.n if plant.underactuated else 1
+    assert all(re.search(r"= .*\b(u|bq)", equation) and "(alpha" not in equation for equation in equations)
+    assert rest.strip(" .\n")
+
+
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: make docs does")
     pytest.importorskip("mkdocstrings_handlers.python")
@@ -109,7 +172,11 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
-    built = {path.name: path.read_text() for path in tmp_path.glob("*.html")}
-    assert set(built) == {"404.html", *(name.replace(".md", ".html") for name in NAV)}
+    built = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
+    pages = {f"{folder}/{name}" for folder, names in (("laws", smc.laws()), ("plants", smc.plants())) for name in names}
+    pages |= {name.removesuffix(".md") for name in NAV} | {"404", "surfaces", "estimators"}
+    assert set(built) == {f"{name}.html" for name in pages}
+    assert {name for name in pages if "/" in name and "<svg" not in built[f"{name}.html"]} == set()
+    assert {name for name, text in built.items() if "arithmatex" in text} == set()  # an equation that is not typeset
     loaded = r"<(?:script|img|link|iframe)\b[^>]*(?:src|href)=\"?((?:https?:)?//[^\s\">]+)"
     assert {name: found for name, text in built.items() if (found := re.findall(loaded, text))} == {}

@@ -41,9 +41,10 @@ def named(value: object) -> str:
     return value.name if isinstance(value, Path) else str(value)[:40]
 
 
-def rows(heading: str) -> set[str]:
-    """What stands in backquotes in the first column of README's table under a heading."""
-    table = re.search(rf"^\| {heading} \|.*?\n\n", README, re.MULTILINE | re.DOTALL)
+def rows(page: str, heading: str) -> set[str]:
+    """What stands in backquotes in the first column of a page's table under a heading."""
+    text = (ROOT / "docs" / page).read_text()
+    table = re.search(rf"^\| {heading} \|.*?\n\n", text, re.MULTILINE | re.DOTALL)
     assert table is not None
     cells = [line.split("|")[1] for line in table[0].splitlines()[2:] if line]
     return {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
@@ -137,16 +138,16 @@ def test_a_relative_link_or_picture_leads_somewhere(page, link):
     assert path.stat().st_size > 0
 
 
-def test_readme_s_tables_name_every_plant_law_and_scene():
-    assert rows("plants") == set(smc.plants())
-    assert rows("laws") == set(smc.laws())
-    assert rows("scene") == set(scene.scenes())
+def test_the_tables_name_every_plant_law_and_scene():
+    assert rows("catalogue.md", "plants") == set(smc.plants())
+    assert rows("catalogue.md", "laws") == set(smc.laws())
+    assert rows("scenes.md", "scene") == set(scene.scenes())
 
 
-def test_readme_lists_what_a_law_sees():
+def test_the_pages_list_what_a_law_measures():
     from smc_mujoco.control.law import Measurement
 
-    assert rows("field of `y`") == set(Measurement._fields)
+    assert rows("add_law.md", "field of `y`") == set(Measurement._fields)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)

@@ -1,5 +1,7 @@
-"""What the pages show from outside of docs/: README's first screen on the first page, and the gallery's pictures."""
+"""What the site adds to docs/: README's first screen, the gallery, pages of laws and plants, typeset equations."""
 
+import re
+import sys
 from pathlib import Path
 
 from mkdocs.structure.files import File
@@ -7,16 +9,66 @@ from mkdocs.structure.files import File
 ROOT = Path(__file__).parents[2]
 GALLERY = "videos/gallery"
 HERE = "<!-- README's first screen -->"
+CATALOGUE = "catalogue.md"  # its tables name all plants and laws
+GROUP = "Catalogue"  # where the contents show their pages
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import catalogue  # noqa: E402
+from mathml import font, typeset  # noqa: E402
+
+PAGES: list[catalogue.Page] = []  # of this build
+
+
+def on_config(config):
+    """Write the pages of laws and plants, and put them into the contents."""
+    place = next(entry[GROUP] for entry in config.nav if GROUP in entry)
+    PAGES.clear()
+    for section, groups in catalogue.pages().items():
+        entries = []
+        for group, pages in groups.items():
+            listed = [{page.title: f"{page.path}.md"} for page in pages]
+            entries += [{group: listed}] if group else listed
+            PAGES.extend(pages)
+        place.append({section: entries})
+    return config
 
 
 def on_files(files, config):
-    """Add the gallery to the site's files."""
+    """Add the gallery, the generated pages and their pictures to the site's files."""
     for path in sorted((ROOT / GALLERY).glob("*.webp")):
         files.append(File.generated(config, f"{GALLERY}/{path.name}", abs_src_path=str(path)))
+    for page in PAGES:
+        files.append(File.generated(config, f"{page.path}.md", content=page.text))
+    for name in ("site.css", "iframe-worker.js"):
+        files.append(File.generated(config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)))
+    files.append(File.generated(config, "assets/stix-two-math.ttf", content=font()))
+    for path, picture in catalogue.files(catalogue.stills()).items():
+        files.append(File.generated(config, path, content=picture))
     return files
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Put README's first screen where the page asks for it, and point its pictures at the site's."""
-    first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n[docs/](")
-    return markdown.replace(HERE, first).replace(f"](../{GALLERY}/", f"]({GALLERY}/")
+    """Put README's first screen where the page asks for it, and make the names of laws and plants in tables links."""
+    first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n<!-- end of the first screen -->")
+    markdown = markdown.replace(HERE, first.replace("](docs/", "](")).replace(f"](../{GALLERY}/", f"]({GALLERY}/")
+    return linked(markdown) if page.file.src_uri == CATALOGUE else markdown
+
+
+def linked(markdown: str) -> str:
+    """Return Markdown in which names of laws and plants in tables lead to their pages."""
+    paths = {page.path.partition("/")[2]: f"{page.path}.md" for page in PAGES if "/" in page.path}
+
+    def link(line: str) -> str:
+        if not line.startswith("|"):
+            return line
+        return re.sub(
+            r"`(\w+)`", lambda found: f"[{found[0]}]({paths[found[1]]})" if found[1] in paths else found[0], line
+        )
+
+    return "\n".join(map(link, markdown.split("\n")))
+
+
+def on_page_content(html, page, config, files):
+    """Typeset the equations."""
+    return typeset(html)

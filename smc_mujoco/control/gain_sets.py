@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
 # The laws on the report's first page: the four of the paper, two added by its first study, and the first law of each
-# other family in README's table. The table was older than all tunings.
+# other family in the table of docs/catalogue.md. The table was older than all tunings.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",

@@ -519,8 +519,8 @@ def test_blocked_it_is_not_missed(pytester):
     pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:smc_mujoco").assert_outcomes(passed=1)
 
 
-def test_what_the_readme_shows_passes(pytester, undrawn):
-    text = (ROOT / "README.md").read_text()
+def test_what_the_documentation_shows_passes(pytester, undrawn):
+    text = (ROOT / "docs" / "test_law.md").read_text()
     (block,) = [
         b for b in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL) if "step_response" in b
     ]

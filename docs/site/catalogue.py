@@ -1,0 +1,394 @@
+"""The pages of laws, plants, surfaces and estimators, each written from its own file when the site is built.
+
+A page of a law has its formula, its figure, its properties and gains, what is known of it, its source and its C form; a
+page of a plant its equation, picture, figure, parameters, obstacles, builds and MJCF.
+"""
+
+import dataclasses
+import inspect
+import re
+import sys
+from collections.abc import Iterator, Mapping
+
+import figures
+import notation
+
+from smc_mujoco.cli.law_pages import DEGREES, SOURCE, entry
+from smc_mujoco.control.c.export import law_to_c
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.law import Measurement, law
+from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.properties import PROPERTIES, families, reads, searched
+from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.plant import Plant, model_path
+from smc_mujoco.mechanisms.plant import catalogue as plants
+
+GAINS = re.compile(r"^Gains?: ", re.MULTILINE)
+POWER = re.compile(r"\^(-?[\w./]+|\([^)]*\))")
+UNIT = re.compile(r"\s*\[([^\]]*)\]")
+HEADER_END = "#endif\n\n"  # of smc_law.h, before the law
+KEY = "".join(
+    f'<span style="--key: {colour}">{words}</span>'
+    for words, colour in zip(
+        ("undisturbed", "with measurement noise and d = 0.2 sin 5t"), figures.CONDITIONS.values(), strict=True
+    )
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Page:
+    """A page of the site: its path without ending, its title in the contents, and its Markdown."""
+
+    path: str
+    title: str
+    text: str
+
+
+def pages() -> dict[str, dict[str, list[Page]]]:
+    """Return the pages by section and group; those of laws by family."""
+    wanted = [(figures.law_figure, (name, plant)) for name, t in laws().items() for plant in figures.shown_on(t)]
+    wanted += [(draw, (name,)) for draw in (figures.plant_figure, figures.still) for name in plants()]
+    drawn = figures.figures(wanted)
+    grouped = {
+        style.in_words(family): [_law_page(laws()[name], drawn) for name in names]
+        for family, names in families().items()
+    }
+    return {
+        "Plants": {"": [_plant_page(plant, drawn) for plant in plants().values()]},
+        "Laws": grouped,
+        "Surfaces and estimators": {
+            "": [
+                Page("surfaces", "Surfaces", _listing("Surfaces", SURFACES, surfaces())),
+                Page("estimators", "Velocity estimators", _listing("Velocity estimators", ESTIMATORS, estimators())),
+            ]
+        },
+    }
+
+
+SURFACES = """`smc.Scenario(surface=smc.surface("terminal"), ...)` replaces the sliding variable $e' + c e$ of a law of
+relative degree 1."""
+ESTIMATORS = """`smc.Scenario(velocity=smc.estimator("levant"), ...)` replaces the velocity sensor by an estimate from
+the position $x$."""
+
+
+def files(drawn_stills: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return path -> content of the pictures that pages show."""
+    return {f"plants/{name}.webp": picture for name, picture in drawn_stills.items() if picture}
+
+
+def stills() -> dict[str, bytes]:
+    """Return plant -> its picture, from the cache."""
+    return {key[1]: found for key, found in figures.figures([(figures.still, (name,)) for name in plants()]).items()}
+
+
+def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
+    parts, name = entry(template), template.name
+    shown = "".join(
+        _figure(drawn["law_figure", name, plant], f"{_link_up(plant)}") for plant in figures.shown_on(template)
+    )
+    text = [
+        f"# {parts.title}",
+        f"`{name}`" + f" · {template.family}",
+        _display(parts.formula, template.gains),
+        f'<div class="figures">{shown}</div>\n<p class="key">{KEY}</p>',
+        "With [tuned gains](../run_study.md#gains-by-the-same-rule), from the plant's own start. $u$ is held between "
+        "samples of 1 ms; where it chatters, the line is its mean and the band its range.",
+        f"## Use it\n\n```python\n{_call(template)}\n```",
+        _gain_table(template),
+        _properties(template),
+        f"## What is known\n\n{body(template)}",
+        f"## Source\n\n{_prose(parts.source, None)}" * bool(parts.source),
+        _c_form(name),
+    ]
+    return Page(f"laws/{name}", style.law_name(name), _front(parts.formula) + "\n\n".join(filter(None, text)) + "\n")
+
+
+def _front(description: str) -> str:
+    return f"---\ndescription: {description!r}\n---\n\n" if "'" not in description else ""
+
+
+def _link_up(plant: str) -> str:
+    return f'<a href="../plants/{plant}.html">{_label(plants()[plant])}</a>'
+
+
+def _figure(svg: bytes, caption: str) -> str:
+    return f"<figure>{svg.decode()}<figcaption>{caption}</figcaption></figure>"
+
+
+def _display(formula: str, names) -> str:
+    """Return a formula as displayed equations, one a clause."""
+    lines = "".join(
+        f"<div markdown>$\\displaystyle {notation.formula(c, names)}$</div>" for c in notation.clauses(formula)
+    )
+    return f'<div class="formula" markdown>{lines}</div>'
+
+
+def _call(template: Template) -> str:
+    gains = "".join(f", {name}={gain.default:g}" for name, gain in list(template.gains.items())[:2])
+    plant = template.plants[0] if template.plants else "duffing"
+    call = f'law = smc.law("{template.name}"{gains})'
+    return f'import smc_mujoco as smc\n\n{call}\ntrace = smc.run(smc.Scenario(plant="{plant}", law=law))'.replace(
+        "=inf", '=float("inf")'
+    )
+
+
+def _gain_table(template: Template) -> str:
+    """Return a table of the gains: meaning, unit, default, range, and whether tuning changes it."""
+    if not template.gains:
+        return ""
+    said, rows = meanings(template), []
+    for name, gain in template.gains.items():
+        meaning, unit = said[name]
+        allowed = "> 0" if gain.positive else "≥ 0" if gain.nonnegative else "any"
+        default = "∞" if gain.default == float("inf") else f"{gain.default:g}"
+        tuned = "no" if gain.held else "yes"
+        rows.append(
+            f"| ${notation.symbol(name)}$ `{name}` | {meaning} | {_unit(unit)} | {default} | {allowed} | {tuned} |"
+        )
+    head = "| gain | meaning | unit | default | range | tuned |\n|---|---|---|---|---|---|\n"
+    unit = "Units are those of a joint that slides; for a hinge read N m for N and rad for m."
+    return f"## Gains\n\n{head}" + "\n".join(rows) + f"\n\n{unit}"
+
+
+def meanings(template: Template) -> dict[str, tuple[str, str]]:
+    """Return gain -> what it is, and its unit, from the docstring's `Gains: ...`."""
+    parts = GAINS.split(SOURCE.split(template.doc)[0])
+    found: dict[str, tuple[str, str]] = dict.fromkeys(template.gains, ("", "1"))
+    if len(parts) < 2:
+        return found
+    for part in " ".join(parts[1].split()).rstrip(".").split("; "):
+        names = _names(part, template.gains)
+        rest, units = part, {}
+        for name in names:  # `a [unit] and b [unit], meaning`
+            rest = rest[re.match(rf"(?:,? and |, )?{re.escape(name)}", rest).end() :]  # pyright: ignore
+            if unit := UNIT.match(rest):
+                units[name], rest = unit[1], rest[unit.end() :]
+        common = UNIT.search(rest)
+        meaning = UNIT.sub("", rest).lstrip(", ").strip()
+        for name in names:
+            unit = units.get(name) or (common[1] if common else units.get(names[-1], "1"))
+            found[name] = notation.sentence(meaning, template.gains), unit
+    return found
+
+
+def _names(part: str, gains) -> list[str]:
+    """Return the gains that a part of `Gains: ...` begins with."""
+    names, rest = [], part
+    while word := re.match(r"(?:,? and |, )?(\w+)(?:\s*\[[^\]]*\])?", rest):
+        if word[1] not in gains or word[1] in names or (names and not word[0].startswith((",", " and"))):
+            break
+        names.append(word[1])
+        rest = rest[word.end() :]
+    return names
+
+
+def _unit(text: str) -> str:
+    """Return a unit with raised powers."""
+    return POWER.sub(lambda found: f"<sup>{found[1].strip('()')}</sup>", text)
+
+
+def _properties(template: Template) -> str:
+    arrives = {"s": "$s = 0$ after a finite time", "e": "$e = 0$ after a finite time", "": "not in finite time"}
+    measured = ", ".join(f"`y.{field}`" for field in Measurement._fields if field in reads(template))
+    conditions = "; ".join(notation.sentence(words, template.gains) for words in template.conditions)
+    degree = template.relative_degree
+    rows = {
+        "relative degree": f"{degree}: acts on {notation.sentence(DEGREES[degree])}",
+        "command": "$u$ is continuous" if template.continuous else "$u$ jumps",
+        "arrives": arrives[template.finite_time],
+        "conditions on the gains": conditions or "none",
+        "gains to choose": ", ".join(f"`{gain}`" for gain in searched(template)) or "none",
+        "measures": measured or "nothing",
+        "nominal model": "needed" if template.requires_model else 'optional, with `model="nominal"`',
+        "plants": ", ".join(f"`{plant}`" for plant in template.plants) or "all whose joints all have an actuator",
+        "found by": ", ".join(f"`--needs {need}`" for need, one in PROPERTIES.items() if one.holds(template))
+        or "its name",
+    }
+    lines = "\n".join(f"| {what} | {words} |" for what, words in rows.items())
+    return f"## Properties\n\n| | |\n|---|---|\n{lines}"
+
+
+def body(template: Template) -> str:
+    """Return what a docstring says between formula and gains, with its equations typeset."""
+    text = GAINS.split(SOURCE.split(template.doc)[0])[0]
+    formula = entry(template).formula
+    return "\n\n".join(_paragraphs(text, template.gains, formula)) or "Nothing more."
+
+
+def _paragraphs(text: str, names, formula: str) -> Iterator[str]:
+    """Yield the paragraphs of a docstring as Markdown, without its formula."""
+    first, *others = text.strip("\n").split("\n\n")
+    rest = _without_head(" ".join(first.split()), formula)
+    if rest:
+        yield _prose(rest, names)
+    for paragraph in others:
+        if not paragraph.startswith("    "):
+            yield _prose(" ".join(paragraph.split()), names)
+        elif " ".join(paragraph.split()).rstrip(".") != formula:
+            yield _block(paragraph, names)
+
+
+def _without_head(text: str, formula: str) -> str:
+    """Return a paragraph without `Name: formula.` at its beginning."""
+    found = text.find(formula)
+    return text[found + len(formula) :].lstrip(". ") if found >= 0 and formula else "" if text.endswith(":") else text
+
+
+def _block(paragraph: str, names) -> str:
+    """Return indented lines: equations, or a table as it stands."""
+    lines = inspect.cleandoc(paragraph).splitlines()
+    if all("=" in line for line in lines):
+        return _display("; ".join(line.strip().rstrip(",") for line in lines), names)
+    return "```text\n" + "\n".join(lines) + "\n```"
+
+
+def _prose(text: str, names) -> str:
+    """Return sentences as Markdown; laws and plants that they name in backquotes are links."""
+    text = notation.sentence(text, names) if names is not None else text.replace("+-", "±").replace("<", "&lt;")
+
+    def linked(found: re.Match) -> str:
+        name = found[1]
+        folder = "laws" if name in laws() else "plants" if name in plants() else ""
+        return f"[`{name}`](../{folder}/{name}.md)" if folder else found[0]
+
+    return re.sub(r"`(\w+)`", linked, text)
+
+
+def _c_form(name: str) -> str:
+    """Return the law in C99, without the header that all exported laws share."""
+    code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
+    made = f"`smc-mujoco export-c {name}` writes this law as one file, with [the header](../c.md) at its top."
+    return f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n' + _indented(
+        f"```c\n{code}\n```"
+    )
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"    {line}".rstrip() for line in text.splitlines())
+
+
+def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
+    """Return one page for all surfaces, or all estimators."""
+    parts = [f"# {title}", intro]
+    for name, template in templates.items():
+        parsed = entry(template)
+        words = re.search(r"[a-z]{4,}", parsed.formula) and "=" not in parsed.formula
+        formula = parsed.formula if words else _display(parsed.formula, template.gains)
+        parts += [f"## {parsed.title or style.in_words(name)}", f"`{name}`", formula]
+        parts += [_gain_table(template).removeprefix("## Gains\n\n").partition("\n\n")[0]]
+        parts += [body(template).replace("](../", "]("), _prose(parsed.source, None).replace("](../", "](")]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
+    name, module = plant.name, sys.modules[plant.build.__module__]
+    doc, *source = SOURCE.split(inspect.cleandoc(module.__doc__ or ""), maxsplit=1)
+    title, formula, known = equation(doc)
+    laws_shown = figures.plant_laws(name)
+    labels = style.law_colours(laws_shown)
+    key = "".join(
+        f'<span style="--key: {colour}">{style.law_name(each)}</span>'
+        for each, colour in zip(laws_shown, labels, strict=True)
+    )
+    picture = f'![{title}]({name}.webp){{ loading=lazy width="1280" height="720" }}' * bool(drawn["still", name])
+    numbers = f"## Numbers and source\n\n{_prose(' '.join(' '.join(source).split()), None)}" if source else ""
+    more = ""
+    if "\n\n" in "".join(source):  # paragraphs after the source
+        first, _, rest = "".join(source).partition("\n\n")
+        numbers = f"## Numbers and source\n\n{_prose(' '.join(first.split()), None)}"
+        more = "\n\n".join(_prose(" ".join(p.split()), plant.parameters) for p in rest.split("\n\n"))
+    text = [
+        f"# {title}",
+        f"`{name}`",
+        "\n\n".join(_display(line, [*plant.parameters]) for line in formula),
+        picture,
+        "\n\n".join(
+            _prose(_capital(" ".join(p.split()), plant), plant.parameters)
+            for p in known.split("\n\n")
+            if p.strip(" .\n")
+        ),
+        more,
+        f'<div class="figures">{_figure(drawn["plant_figure", name], "")}</div>\n<p class="key">{key}</p>',
+        "Without noise or disturbance, from the plant's own start.",
+        f'## Use it\n\n```python\nimport smc_mujoco as smc\n\nplant = smc.plant("{name}"{_change(plant)})\n'
+        f'trace = smc.run(smc.Scenario(plant=plant, law="{laws_shown[0]}"))\n```',
+        _parameters(plant, module),
+        _shape(plant),
+        numbers,
+        _mjcf(module),
+    ]
+    return Page(f"plants/{name}", _label(plant), "\n\n".join(filter(None, text)) + "\n")
+
+
+def _label(plant: Plant) -> str:
+    return plant.label or style.in_words(plant.name)
+
+
+def _change(plant: Plant) -> str:
+    name, value = next(iter(plant.parameters.items()))
+    return (f", n={2 * plant.n}" if plant.sizes[1] > 2 else "") + f", {name}={value:g}"
+
+
+def equation(doc: str) -> tuple[str, list[str], str]:
+    """Return a plant's title, its equations, and the rest of its docstring: `Title: equation. Sentences ...`."""
+    first, _, others = doc.strip().partition("\n\n")
+    title, _, rest = first.partition(": ")
+    if "=" not in rest:  # the equations are indented below
+        equations, _, others = others.partition("\n\n")
+        return title, [line.strip() for line in equations.splitlines()], f"{rest}\n\n{others}"
+    end = re.search(r"(?<=d)(?:\.\s|\.$|, |\s+\()", rest)
+    equation, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")")) if end else (rest, "")
+    return title, [" ".join(equation.split())], f"{more}.\n\n{others}"
+
+
+def _capital(text: str, plant: Plant) -> str:
+    """Return a text that begins with a capital letter, unless with a symbol."""
+    first = text.split(" ", maxsplit=1)[0]
+    return text if (len(first) == 1 and first != "a") or first in plant.parameters else text[:1].upper() + text[1:]
+
+
+def units(plant: Plant, module) -> list[str]:
+    """Return the unit of each parameter, from the comment beside or above them."""
+    lines = inspect.getsource(module).splitlines()
+    (at,) = [i for i, line in enumerate(lines) if line.strip().startswith("parameters=")]
+    comment = lines[at].partition("#")[2] or lines[at - 1].partition("#")[2]
+    return [unit.strip() for unit in comment.split(",")]
+
+
+def _parameters(plant: Plant, module) -> str:
+    rows = [
+        f"| `{name}` | ${notation.symbol(name)}$ | {value:g} | {_unit(unit)} |"
+        for (name, value), unit in zip(plant.parameters.items(), units(plant, module), strict=True)
+    ]
+    return "## Parameters\n\n| name | symbol | value | unit |\n|---|---|---|---|\n" + "\n".join(rows)
+
+
+def _shape(plant: Plant) -> str:
+    """Return a table of channels, start, obstacles and builds."""
+    start = ", ".join(f"{x:g} {unit}" for x, unit in zip(plant.x0, plant.units, strict=True))
+    rows = {
+        "joints": f"{plant.n}" + f", of which {plant.free} without an actuator" * bool(plant.free),
+        "size": f"`n` from {plant.sizes[0]} to {plant.sizes[1]}" if plant.sizes[1] > plant.n else "",
+        "start": start,
+        "obstacles, `contact=`": ", ".join(f'`"{name}"`' for name in plant.contacts),
+        "builds, `mechanism=`": ", ".join(f'`"{name}"`' for name in plant.mechanisms),
+        "jumps": "; ".join(
+            f"`jump_{size}`: {', '.join(f'{p} × {f:g}' for p, f in change.items())}"
+            for size, change in plant.jumps.items()
+        ),
+        "a mismatch of `mass` scales": f"`{plant.mass}`",
+    }
+    return "## Joints, obstacles, builds\n\n| | |\n|---|---|\n" + "\n".join(
+        f"| {what} | {words} |" for what, words in rows.items() if words
+    )
+
+
+def _mjcf(module) -> str:
+    (name,) = set(re.findall(r'"(\w+\.xml)"', inspect.getsource(module)))
+    words = "One pendulum; the network composes `n` of them." if "compose(" in inspect.getsource(module) else ""
+    code = model_path(name).read_text(encoding="utf-8").strip()
+    return f'## MJCF {{ data-search-exclude }}\n\n{words}\n\n??? note "models/{name}"\n\n' + _indented(
+        f"```xml\n{code}\n```"
+    )

@@ -1,0 +1,167 @@
+"""Figures of the catalogue's pages, kept from one build to the next in .cache/site.
+
+A figure is drawn again if anything changes that it may depend on: the package, the models, this file. SVGs are written
+into the pages, so that their ink is that of the page, light or dark.
+"""
+
+import hashlib
+import io
+import os
+import re
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CACHE = ROOT / ".cache" / "site"
+PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
+CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}  # condition -> colour, seen on white and on slate
+PAPER_LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
+DURATION = 4.0  # s, chosen: most laws settle in 2
+PAGE_COLOURS = {  # colour of smc_mujoco.draw.style -> that of the page, lighter or not
+    "INK": "", "DISTURBANCE": "", "MUTED": "--light", "RULE": "--lighter", "BAND": "--lightest", "GRID": "--lightest",
+}  # fmt: skip
+WIDTH, HEIGHT = 3.5, 3.5  # inches of a figure
+
+
+def shown_on(template) -> tuple[str, ...]:
+    """Return the plants of a law's figures."""
+    return tuple(template.plants) or PLANTS
+
+
+def law_figure(law: str, plant: str) -> bytes:
+    """Return x and u of a law on a plant, in each of CONDITIONS, as SVG."""
+    import smc_mujoco as smc
+
+    traces = smc.run([_case(plant, law, condition) for condition in CONDITIONS])
+    return _svg(traces, list(CONDITIONS.values()))
+
+
+def plant_figure(plant: str) -> bytes:
+    """Return x and u of the laws of `plant_laws` on a plant, as SVG."""
+    import smc_mujoco as smc
+    from smc_mujoco.draw import style
+
+    traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
+    return _svg(traces, style.law_colours([trace.scenario.law for trace in traces]))
+
+
+def still(plant: str) -> bytes:
+    """Return a picture of a plant under the laws of `plant_laws`, as WebP; nothing without OpenGL."""
+    import tempfile
+
+    from PIL import Image
+
+    import smc_mujoco as smc
+    from smc_mujoco.common import gl
+
+    if gl.missing():
+        return b""
+    traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
+    with tempfile.TemporaryDirectory() as folder:
+        picture = smc.still(traces, 0.25, Path(folder) / "still.png")
+        kept = io.BytesIO()
+        Image.open(picture).save(kept, "WEBP", quality=85)
+    return kept.getvalue()
+
+
+def plant_laws(plant: str) -> tuple[str, ...]:
+    """Return the paper's laws if they can drive every joint of the plant, else the laws for the plant."""
+    import smc_mujoco as smc
+
+    known = smc.laws(plant)
+    return PAPER_LAWS if set(PAPER_LAWS) <= set(known) else tuple(name for name in known if name != "none")
+
+
+def _case(plant: str, law: str, condition: str):
+    """Return the scenario of a figure: tuned gains if there are any; a pendulum that swings up begins at rest."""
+    import smc_mujoco as smc
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.simulation.grid import case
+
+    changes = {"x0": 3.1, "u_max": 1.2} if law == "swing_up" else {}
+    try:
+        return case(plant, law, condition, DURATION, changes=changes)
+    except ScenarioError:
+        return case(plant, smc.law(law), condition, 2.0 * DURATION, changes=changes)
+
+
+def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
+    """Return the panels of x and u, one below the other; ink and grid have the colours of the page."""
+    from matplotlib.figure import Figure
+
+    from smc_mujoco.draw import panels, style
+    from smc_mujoco.draw.decimate import end, finite
+
+    traces = [finite(trace) for trace in traces]
+    shown = [panel for panel in panels.overview(traces) if panel.quantity in ("x", "u")]
+    with style.page():
+        import matplotlib
+
+        matplotlib.rcParams["svg.fonttype"] = "none"  # letters of the page
+        figure = Figure(figsize=(WIDTH, HEIGHT * (0.5 + len(shown) / 4)), layout="constrained")
+        axes = figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0]
+        for ax, panel in zip(axes, shown, strict=True):
+            panels.over_time(ax, panel, colours)
+            ax.set(ylabel=panel.label, xlim=(0.0, end(traces)))
+            ax.locator_params(axis="y", nbins=5)
+        axes[-1].set_xlabel("time (s)")
+        figure.align_ylabels(axes)
+        file = io.BytesIO()
+        figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    text = file.getvalue().decode()
+    text = text[text.index("<svg") :]
+    for old, new in PAGE_COLOURS.items():
+        text = re.sub(rf"{getattr(style, old)}\b", f"var(--md-default-fg-color{new})", text, flags=re.IGNORECASE)
+    text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
+    text = re.sub(r' d="[^"]+"', _rounded, text)
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
+    return re.sub(r"\s*\n\s*", " ", text).encode()
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Return a path of an SVG to a tenth of a pixel."""
+    return re.sub(r"\d+\.\d{2,}", lambda number: f"{float(number[0]):.1f}", path[0])
+
+
+def _version() -> str:
+    """Return a hash of all that figures depend on."""
+    files = [*(ROOT / "smc_mujoco").rglob("*.py"), *(ROOT / "models").rglob("*.xml"), Path(__file__)]
+    files += (ROOT / "smc_mujoco" / "control" / "tuned_gains").rglob("*.json")
+    seen = hashlib.sha256()
+    for file in sorted(files):
+        seen.update(file.read_bytes())
+    return seen.hexdigest()[:16]
+
+
+def _draw(name: str, draw: Callable[..., bytes], arguments: tuple[str, ...]) -> tuple[str, bytes]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # figures show what a condition does, whatever a law asks for
+        return name, draw(*arguments)
+
+
+def figures(wanted: Iterable[tuple[Callable[..., bytes], tuple[str, ...]]]) -> dict[tuple[str, ...], bytes]:
+    """Return (function's name, its arguments ...) -> the figure; what is not in the cache is drawn on all cores."""
+    version, found, jobs = _version(), {}, []
+    CACHE.mkdir(parents=True, exist_ok=True)
+    for draw, arguments in wanted:
+        key = draw.__name__, *arguments
+        path = CACHE / f"{'-'.join(key)}-{version}"
+        if path.is_file():
+            found[key] = path.read_bytes()
+        else:
+            jobs.append((key, path, draw))
+    if jobs:
+        keep = {path.name for _, path, _ in jobs}
+        for old in CACHE.iterdir():
+            if not old.name.endswith(version) and old.name not in keep:
+                old.unlink()
+        with ProcessPoolExecutor(os.cpu_count()) as pool:
+            futures = [(key, path, pool.submit(_draw, path.name, draw, key[1:])) for key, path, draw in jobs]
+            for key, path, future in futures:
+                found[key] = future.result()[1]
+                part = path.with_suffix(f".{os.getpid()}")
+                part.write_bytes(found[key])
+                part.replace(path)
+    return found

@@ -1,0 +1,60 @@
+"""LaTeX as MathML, which browsers typeset by themselves: a page with equations asks for no script.
+
+Their font is STIX Two Math, as the package ziamath ships it: systems without a font for mathematics, such as most of
+Linux, would set them badly.
+"""
+
+import functools
+import html
+import importlib.util
+import io
+import re
+from pathlib import Path
+
+from fontTools import subset
+from fontTools.ttLib import TTFont
+from latex2mathml.converter import convert
+
+PRIMED = re.compile(r"<msup>(<mi>[^<]*</mi>|<mrow>(?:(?!<msup>).)*?</mrow>)<mi>(&#x0203[234];|&#x02057;)</mi></msup>")
+FUNCTION = re.compile(r"\\(sin|cos|tanh|cosh|max|min)(?![A-Za-z])((?:[_^](?:\w|\{\w+\}))*)\s*(?P<bracket>\(?)")
+MATH = re.compile(r'<(span|div) class="arithmatex">\s*\\([(\[])(.*?)\\[)\]]\s*</\1>', re.DOTALL)
+LETTERS = [  # Unicode ranges that equations use: Latin, Greek, punctuation, operators, arrows, brackets, italics
+    (0x20, 0x7E), (0xA0, 0xFF), (0x2C6, 0x2DC), (0x300, 0x308), (0x391, 0x3F5), (0x2010, 0x2057), (0x210E, 0x210F),
+    (0x2190, 0x21D4), (0x2200, 0x22EF), (0x2308, 0x230B), (0x23B0, 0x23E1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B),
+]  # fmt: skip
+LONG = 60  # letters of LaTeX: what is longer may be wider than a phone, and scrolls
+
+
+def font() -> bytes:
+    """Return the font of equations, without the letters that none has."""
+    spec = importlib.util.find_spec("ziamath")
+    assert spec is not None
+    assert spec.origin is not None
+    whole = TTFont(Path(spec.origin).parent / "fonts" / "STIXTwoMath-Regular.ttf")
+    cut = subset.Subsetter(subset.Options(layout_features=["ssty", "mark", "mkmk", "dtls"], notdef_outline=True))
+    cut.populate(unicodes=[code for first, last in LETTERS for code in range(first, last + 1)])
+    cut.subset(whole)
+    file = io.BytesIO()
+    whole.save(file)
+    return file.getvalue()
+
+
+@functools.cache
+def mathml(latex: str, block: bool = False) -> str:
+    """Return MathML. A prime stands beside its letter, as fonts raise it already; a slash has no space around
+    it, a function has."""
+    latex = latex.replace(r"\lvert", r"\left|").replace(
+        r"\rvert", r"\right|"
+    )  # else the second bar has space before it
+    latex = FUNCTION.sub(lambda f: rf"\,\mathrm{{{f[1]}}}{f[2]}" + (f["bracket"] or r"\,"), latex)
+    text = convert(latex, display="block" if block else "inline")
+    text = PRIMED.sub(r"<mrow>\1<mi>\2</mi></mrow>", text)
+    text = text.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
+    if block:
+        return f'<div class="equation">{text}</div>'
+    return f'<span class="long equation">{text}</span>' if len(latex) > LONG else text
+
+
+def typeset(page: str) -> str:
+    """Return a page's HTML with the MathML of its equations."""
+    return MATH.sub(lambda found: mathml(html.unescape(found[3]).strip(), found[2] == "["), page)
