@@ -283,9 +283,12 @@ def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
 
 
 def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
-    name, module = plant.name, sys.modules[plant.build.__module__]
-    doc, *source = SOURCE.split(inspect.cleandoc(module.__doc__ or ""), maxsplit=1)
+    name = plant.name
+    doc, *source = SOURCE.split(described(plant), maxsplit=1)
     title, formula, known = equation(doc)
+    if explained := explained_by(plant):
+        formula = equation(SOURCE.split(described(explained))[0])[1]
+        known = re.sub(r"\b(\w+)\.py\b", r"`\1`", known)
     laws_shown = figures.plant_laws(name)
     labels = style.law_colours(laws_shown)
     key = "".join(
@@ -302,7 +305,7 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
     text = [
         f"# {title}",
         f"`{name}`",
-        "\n\n".join(_display(line, [*plant.parameters]) for line in formula),
+        "\n\n".join(_equation(line, [*plant.parameters]) for line in formula),
         picture,
         "\n\n".join(
             _prose(_capital(" ".join(p.split()), plant), plant.parameters)
@@ -314,10 +317,10 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
         "Without noise or disturbance, from the plant's own start.",
         f'## Use it\n\n```python\nimport smc_mujoco as smc\n\nplant = smc.plant("{name}"{_change(plant)})\n'
         f'trace = smc.run(smc.Scenario(plant=plant, law="{laws_shown[0]}"))\n```',
-        _parameters(plant, module),
+        _parameters(plant),
         _shape(plant),
         numbers,
-        _mjcf(module),
+        _mjcf(sys.modules[(explained or plant).build.__module__]),
     ]
     return Page(f"plants/{name}", _label(plant), "\n\n".join(filter(None, text)) + "\n")
 
@@ -331,16 +334,60 @@ def _change(plant: Plant) -> str:
     return (f", n={2 * plant.n}" if plant.sizes[1] > 2 else "") + f", {name}={value:g}"
 
 
+def described(plant: Plant) -> str:
+    """Return the docstring of a plant's module."""
+    return inspect.cleandoc(sys.modules[plant.build.__module__].__doc__ or "")
+
+
+def explained_by(plant: Plant) -> Plant | None:
+    """Return the plant whose module has the equation and parameters of this one: `... stand in NAME.py`."""
+    found = re.search(r"\bstand\s+in\s+(\w+)\.py", described(plant))
+    return plants()[found[1]] if found else None
+
+
 def equation(doc: str) -> tuple[str, list[str], str]:
-    """Return a plant's title, its equations, and the rest of its docstring: `Title: equation. Sentences ...`."""
+    """Return a plant's title, its equations, and the rest of its docstring.
+
+    The equations stand in the first sentence, as in `Title: M x'' = u + d. Sentences ...`, or below it as an indented
+    block; there is none if another module has them.
+    """
     first, _, others = doc.strip().partition("\n\n")
     title, _, rest = first.partition(": ")
-    if "=" not in rest:  # the equations are indented below
-        equations, _, others = others.partition("\n\n")
-        return title, [line.strip() for line in equations.splitlines()], f"{rest}\n\n{others}"
-    end = re.search(r"(?<=d)(?:\.\s|\.$|, |\s+\()", rest)
-    equation, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")")) if end else (rest, "")
-    return title, [" ".join(equation.split())], f"{more}.\n\n{others}"
+    if others.startswith("    "):
+        block, _, others = others.partition("\n\n")
+        return title, _joined(block), f"{rest}\n\n{others}"
+    if "=" not in rest:
+        return title, [], f"{rest}\n\n{others}"
+    words, rest = re.fullmatch(r"((?:[^=,]+, )*)(.*)", " ".join(rest.split())).groups()  # pyright: ignore
+    end = re.search(r"\.\s|\.$|, |(?<=d)\s+\(", rest)
+    formula, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")")) if end else (rest, "")
+    return title, [formula], f"{words.rstrip(', ') or more}.\n\n{others}"
+
+
+def _joined(block: str) -> list[str]:
+    """Return the equations of an indented block; a line that is indented further continues the one before."""
+    found: list[str] = []
+    for line in block.splitlines():
+        if line.startswith("     ") and found:
+            found[-1] += "\n" * line.lstrip().startswith("[") + " " + line.strip()
+        else:
+            found.append(line.strip())
+    return found
+
+
+def _equation(text: str, names) -> str:
+    """Return an equation as displayed LaTeX; `X = [a, b]` is a column, more rows are a matrix."""
+    if "= [" not in text:
+        return _display(text, names)
+    left, _, right = text.partition(" = ")
+    rows = [notation.clauses(row.strip()[1:-1].strip()) for row in right.split("\n")]
+    if len(rows) == 1:
+        rows = [[entry] for entry in rows[0]]
+    latex = r" \\ ".join(" & ".join(notation.formula(entry.strip(), names) for entry in row) for row in rows)
+    return (
+        f'<div class="formula" markdown><div markdown>${notation.formula(left, names)} = '
+        rf"\begin{{pmatrix}} {latex} \end{{pmatrix}}$</div></div>"
+    )
 
 
 def _capital(text: str, plant: Plant) -> str:
@@ -349,18 +396,18 @@ def _capital(text: str, plant: Plant) -> str:
     return text if (len(first) == 1 and first != "a") or first in plant.parameters else text[:1].upper() + text[1:]
 
 
-def units(plant: Plant, module) -> list[str]:
-    """Return the unit of each parameter, from the comment beside or above them."""
-    lines = inspect.getsource(module).splitlines()
-    (at,) = [i for i, line in enumerate(lines) if line.strip().startswith("parameters=")]
+def units(plant: Plant) -> list[str]:
+    """Return the unit of each parameter, from the comment beside or above them in the module that has them."""
+    lines = inspect.getsource(sys.modules[(explained_by(plant) or plant).build.__module__]).splitlines()
+    at = next(i for i, line in enumerate(lines) if re.search(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{", line))
     comment = lines[at].partition("#")[2] or lines[at - 1].partition("#")[2]
     return [unit.strip() for unit in comment.split(",")]
 
 
-def _parameters(plant: Plant, module) -> str:
+def _parameters(plant: Plant) -> str:
     rows = [
         f"| `{name}` | ${notation.symbol(name)}$ | {value:g} | {_unit(unit)} |"
-        for (name, value), unit in zip(plant.parameters.items(), units(plant, module), strict=True)
+        for (name, value), unit in zip(plant.parameters.items(), units(plant), strict=True)
     ]
     return "## Parameters\n\n| name | symbol | value | unit |\n|---|---|---|---|\n" + "\n".join(rows)
 

@@ -67,11 +67,11 @@ def still(plant: str) -> bytes:
 
 
 def plant_laws(plant: str) -> tuple[str, ...]:
-    """Return the paper's laws if they can drive every joint of the plant, else the laws for the plant."""
+    """Return the paper's laws if they can drive every joint of the plant, else the laws for it; without any, `none`."""
     import smc_mujoco as smc
 
     known = smc.laws(plant)
-    return PAPER_LAWS if set(PAPER_LAWS) <= set(known) else tuple(name for name in known if name != "none")
+    return PAPER_LAWS if set(PAPER_LAWS) <= set(known) else tuple(name for name in known if name != "none") or ("none",)
 
 
 def _case(plant: str, law: str, condition: str):

@@ -17,7 +17,7 @@ FUNCTIONS = ("sgn", "sat", "tanh", "atanh", "sech", "sqrt", "min", "max", "sup",
 SYMBOLS = {  # names of several letters
     "de": "e'", "dt": r"\Delta t", "dq": "q'", "ds": r"\delta s", "eq": r"v_{\mathrm{eq}}", "inf": r"\infty",
     "grav": r"\mathrm{grav}", "int": r"\int", "gq": "g_q", "fq": "f_q", "bq": "b_q", "kp": "k_p", "ki": "k_i",
-    "kd": "k_d", "kc": "k_c", "tt": "t_t",
+    "kd": "k_d", "kc": "k_c", "tt": "t_t", "cf": "c_f", "cfq": "c_{fq}", "Jp": "J_p", "Jc": "J_c", "Ir": "I_r",
 }  # fmt: skip
 OPERATORS = {
     "<=": r"\le ", ">=": r"\ge ", "+-": r"\pm ", "->": r"\to ", ">>": r"\gg ", "~": r"\approx ", "..": r"\dots ",
@@ -66,7 +66,7 @@ def is_symbol(token: Token, after: Token | None, gains: Collection[str]) -> bool
         return False
     text = token.text
     if text in ARTICLES and not token.mark:
-        if after is None or after.kind not in ("name", "word", "code") or not after.space:
+        if after is None or after.kind not in ("name", "word", "code") or not after.space or after.text in FUNCTIONS:
             return True
         return text in gains and is_symbol(after, None, gains)
     known = text in gains or text in GREEK or text in FUNCTIONS or text in SYMBOLS
@@ -338,6 +338,8 @@ def symbol(text: str, index: str = "") -> str:
     ]
     below = [part for part in [*below, index, "-" * last] if part]
     base = GREEK.get(letters) or SYMBOLS.get(letters) or (letters if len(letters) == 1 else rf"\mathrm{{{letters}}}")
+    base, indexed, first = base.partition("_")  # cf1 is c with index f, 1
+    below = [first.strip("{}")] * bool(indexed) + below
     return rf"{base}_{{{','.join(below)}}}" if below else base
 
 
