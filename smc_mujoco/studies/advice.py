@@ -8,9 +8,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from smc_mujoco.analysis.bootstrap import Interval
-from smc_mujoco.analysis.ranking import Comparison, Rank
+from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank
+from smc_mujoco.common import html
 from smc_mujoco.common.text import number
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import Metric
@@ -27,11 +29,10 @@ class Choice:
     Attributes:
       law: with its gains for the plant.
       source: where the gains are from, in words.
-      rank: its mean rank over the blocks, and its place with an interval.
+      rank: its mean rank over the blocks, and its place with an interval; NaN if it is not compared.
       settles: share of its runs that settle.
       fit: whether it settles often enough to be advised.
       medians: need -> median over the conditions, with its interval.
-      unbeaten: need -> in how many conditions no finalist is better.
     """
 
     law: Component
@@ -40,7 +41,6 @@ class Choice:
     settles: float
     fit: bool
     medians: Mapping[str, Interval]
-    unbeaten: Mapping[str, int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,7 +54,7 @@ class Advice:
       wanted: properties that every law here has, in words.
       choices: the finalists, the advised one first.
       others: names of the laws that the screening left out, in its order.
-      comparison: of the finalists; its blocks are those of `blocks`.
+      comparison: of the finalists that are fit, or of all if none is; its blocks are those of `blocks`.
       table: the finalists' runs.
     """
 
@@ -83,16 +83,39 @@ class Advice:
         return [(need, condition) for need in self.needs for condition in self.conditions]
 
     def wins(self, law: str, rival: str) -> list[tuple[str, str]]:
-        """Return the need and the condition of each block in which a law is better than a rival."""
+        """Return the need and the condition of each block in which a law is better than a rival; both are compared."""
         a, b = (self.comparison.laws.index(name) for name in (law, rival))
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
+    def better(self, law: str, need: str) -> dict[str, list[str]]:
+        """Return finalist -> the conditions in which it is better than a law on a need, those with most first."""
+        found = {}
+        for rival in self.compared:
+            if its := [condition for asked, condition in self.wins(rival, law) if asked == need]:
+                found[rival] = its
+        return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+
+    def dominated(self, law: str) -> list[str]:
+        """Return the finalists that are better than a law in some block, and worse in none."""
+        rivals = (name for name in self.compared if name != law)
+        return [name for name in rivals if self.wins(name, law) and not self.wins(law, name)]
+
+    @property
+    def compared(self) -> list[str]:
+        """The finalists that are compared, best first."""
+        return [choice.law.name for choice in self.choices if choice.law.name in self.comparison.laws]
+
     @property
     def level(self) -> list[str]:
-        """The finalists that cannot be told from the advised law in any block, and settle as it does."""
-        first, *others = self.choices
-        names = [choice.law.name for choice in others if choice.fit == first.fit]
-        return [name for name in names if not self.wins(first.law.name, name) and not self.wins(name, first.law.name)]
+        """The finalists that cannot be told from the advised law in any block."""
+        first, *others = self.compared
+        return [name for name in others if not self.wins(first, name) and not self.wins(name, first)]
+
+    @property
+    def code(self) -> str:
+        """The advised law as Python, "" for a law that is not in the catalogue under its name."""
+        known = catalogue().get(self.law.name)
+        return f"smc.{self.law!r}" if known is not None and known.function is self.law.function else ""
 
     # the table
 
@@ -116,11 +139,10 @@ class Advice:
             place = f"{choice.rank.place:g}" if choice.fit else "–"
             if choice.fit and not math.isnan(choice.rank.low):
                 place += f" ({_range(choice.rank.low, choice.rank.high)})"
-            cells = [
-                _interval(choice.medians[need])
-                + " *" * (len(self.choices) > 1 and choice.unbeaten[need] == len(self.conditions))
-                for need in self.needs
-            ]
+            name = choice.law.name
+            rivalled = len(self.compared) > 1 and name in self.compared
+            stars = [" *" * (rivalled and not self.better(name, need)) for need in self.needs]
+            cells = [_interval(choice.medians[need]) + star for need, star in zip(self.needs, stars, strict=True)]
             rows.append([choice.law.name, place, f"{100 * choice.settles:.0f} %", *cells])
         return rows
 
@@ -132,80 +154,128 @@ class Advice:
             f"place by mean rank, and medians of {len(self.conditions)} condition{'s' * (len(self.conditions) > 1)}, "
         )
         text += f"with 95 % intervals over {seeds} seeds. *: no finalist is better in any condition."
+        if any(self.dominated(name) for name in self.compared):
+            text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         return text + " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
 
     # the answer
 
     @property
     def answer(self) -> list[str]:
-        """The advice in sentences: what to use and why, the second choice, how sure that is."""
-        return list(filter(None, [self._use(), self._second(), self._sure(), self._left_out()]))
+        """The advice in sentences: what to use and why, what to use for one need, the second choice, how sure it is."""
+        parts = [self._use(), self._because(), *self._instead(), self._second(), self._sure(), self._left_out()]
+        return list(filter(None, parts))
 
     def _use(self) -> str:
-        first, others = self.choices[0], self.choices[1:]
+        first, others = self.choices[0], self.compared[1:]
         law = f"{first.law} ({first.source})"
-        settles = f"It settles in {100 * first.settles:.0f} % of its runs."
-        if not first.settles:
+        if not first.settles or not first.fit:
+            why = "none settles in any run" if not first.settles else "none settles often enough in every condition"
             cure = "give longer runs, a stronger actuator, more suitable laws or easier conditions"
-            return f"No law can be advised, because none settles in any run: {cure}. The best mean rank has {law}."
-        if not others:
-            return f"Use {law}, because it is the only law here that suits. {settles}"
-        if len(self.level) == len(others):
-            number = f"all {len(self.choices)} finalists" if len(others) > 1 else "both laws"
+            return f"No law can be advised, because {why}: {cure}. The best mean rank has {law}."
+        if others and len(self.level) == len(others):
+            every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
             return (
-                f"No law can be called the best: {number} are level in every comparison. Use the one that you know; "
-                f"{law} has the best mean rank. {settles}"
+                f"No law can be called the best: {every} are level in every comparison. Use the one that you know. "
+                f"The best mean rank has {law}."
             )
-        return f"Use {law}, because {self._why(first)}. {settles}"
+        return f"Use {law}."
 
-    def _why(self, first: Choice) -> str:
-        """Return on which needs no finalist is better, and how often one is on the others."""
-        count, reasons = len(self.conditions), []
-        if best := [need for need in self.needs if first.unbeaten[need] == count]:
-            reasons.append(f"no finalist is better on {_joined(best)}")
+    def _because(self) -> str:
+        first, count = self.choices[0], len(self.compared)
+        if not first.settles or not first.fit:
+            return ""
+        leads = first.rank.mean == min(choice.rank.mean for choice in self.choices if choice.fit)
+        why = f"it has the best mean rank of {count} finalists"
+        if not leads:
+            why = "it has the best mean rank of those that none dominates, being better somewhere and worse nowhere"
+        if count == 1:
+            alone = "is the only law here that suits" if len(self.choices) == 1 else "alone settles often enough"
+            why = f"it {alone}"
+        if len(self.level) == count - 1 > 0:
+            return f"It settles in {100 * first.settles:.0f} % of its runs."
+        parts = [f"Because {why}. It settles in {100 * first.settles:.0f} % of its runs."]
+        parts += [self._standing(first, need) for need in self.needs] if count > 1 else []
+        return " ".join(parts)
+
+    def _standing(self, choice: Choice, need: str) -> str:
+        """Return how a law does on a need, and who is better."""
+        value, better = self._value(choice, need), self.better(choice.law.name, need)
+        if not better:
+            return f"{need.capitalize()}: {value}; no finalist is better."
+        by_where: dict[str, list[str]] = {}
+        for name, conditions in better.items():
+            by_where.setdefault(self._where(conditions), []).append(name)
+        rivals = [f"{_joined(names)}{where}" for where, names in by_where.items()]
+        return f"{need.capitalize()}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
+
+    def _instead(self) -> list[str]:
+        """Return for each need on which a finalist is better than the advised law: which, what it gives and costs."""
+        first, sentences = self.choices[0], []
+        if len(self.needs) == 1 or not first.fit:
+            return []
+        known = {choice.law.name: choice for choice in self.choices}
         for need in self.needs:
-            if (lost := count - first.unbeaten[need]) > 0:
-                where = "" if count == 1 else f" in {lost} of {count} conditions"
-                reasons.append(f"on {need} another is better{where}")
-        return f"it has the best mean rank: {', '.join(reasons)}"
+            better = self.better(first.law.name, need)
+            if not better:
+                continue
+            name = min(better, key=lambda one: (-len(better[one]), known[one].medians[need].median))
+            costs = [other for other in self.needs if other != need and self.better(name, other).get(first.law.name)]
+            other = known[name]
+            changes = [f"{self._value(other, one)} instead of {self._number(first, one)}" for one in (need, *costs)]
+            text = f"If only {need} counts: {other.law}, with {changes[0]}"
+            sentences.append(text + f"; it costs {_joined(changes[1:])}." if costs else text + ".")
+        return sentences
 
     def _second(self) -> str:
         if len(self.choices) < 2:
             return ""
         first, second = self.choices[:2]
+        named = f"Second choice: {second.law} ({second.source})"
+        if not second.fit:
+            return f"{named}; it settles too seldom to be advised."
         ahead, behind = self.wins(second.law.name, first.law.name), self.wins(first.law.name, second.law.name)
         parts = [f"better {self._on(ahead)}"] * bool(ahead) + [f"worse {self._on(behind)}"] * bool(behind)
-        how = "; ".join(parts) or "level with the first in every comparison"
-        if not second.fit:
-            how = "it settles too seldom to be advised"
-        return f"Second choice: {second.law} ({second.source}); {how}."
+        return f"{named}; {'; '.join(parts) or 'level with the first in every comparison'}."
 
     def _sure(self) -> str:
-        if len(self.choices) < 2:
+        if len(self.compared) < 2:
             return "How sure: nothing could be compared with it."
-        first, second = (choice.law.name for choice in self.choices[:2])
-        won, lost, of = len(self.wins(first, second)), len(self.wins(second, first)), len(self.blocks)
-        level = of - won - lost
-        parts = [f"against the second it wins {won}, loses {lost} and is level in {level} of {of} comparisons"]
-        rank = self.choices[0].rank
-        if not math.isnan(rank.low):
-            parts.append(f"its place is {_range(rank.low, rank.high)} of {len(self.choices)} with 95 % confidence")
-        better: dict[str, list[str]] = {}
-        for choice in self.choices[1:]:
-            if blocks := self.wins(choice.law.name, first):
-                better.setdefault(self._on(blocks), []).append(choice.law.name)
-        parts += [f"better than it {where}: {_joined(names)}" for where, names in better.items()]
-        if self.level:
-            parts.append(f"not to be told from it: {_joined(self.level)}")
-        if (runs := int(self.comparison.runs.max())) < int(self.comparison.seeds.max()):
-            parts.append(f"of two laws there are {runs} distinct runs at most, since seeds change little here")
-        return f"How sure: {'; '.join(parts)}. This holds for these gains, over starts and noise."
+        first, *others = self.compared
+        rank, runs, seeds = self.choices[0].rank, int(self.comparison.runs.max()), int(self.comparison.seeds.max())
+        if runs < SEEDS:
+            what = f"{seeds} seeds"
+            if runs < seeds:
+                what = f"{runs} distinct runs of two laws, since seeds change little here"
+            return f"How sure: not at all, with {what}. A law is called better from {SEEDS} on."
+        beaten = [name for name in others if first in self.dominated(name)]
+        mixed = [name for name in others if self.wins(name, first)]
+        parts = [
+            f"it dominates {_joined(beaten)}: better somewhere, worse nowhere" if beaten else "",
+            f"not to be told from {_joined(self.level)}" if self.level else "",
+            f"a matter of what counts against {_joined(mixed)}, better here and worse there" if mixed else "",
+            f"its place by mean rank is {_range(rank.low, rank.high)} of {len(self.compared)} with 95 % confidence",
+        ]
+        return f"How sure: {'; '.join(filter(None, parts))}. This holds for these gains, over starts and noise."
 
     def _left_out(self) -> str:
         if not self.others:
             return ""
         names, more = self.others[:NAMED], ", ..." * (len(self.others) > NAMED)
-        return f"A screening left out {len(self.others)} other laws, best first: {', '.join(names)}{more}"
+        laws = "law" if len(self.others) == 1 else "laws"
+        left = f"A screening with fewer runs left out {len(self.others)} other {laws}, best first"
+        return f"{left}: {', '.join(names)}{more}"
+
+    def _value(self, choice: Choice, need: str) -> str:
+        """Return a median in words, such as "settling time 0.92 s"."""
+        return f"{NEEDS[need].label} {self._number(choice, need)}"
+
+    def _number(self, choice: Choice, need: str) -> str:
+        median = choice.medians[need].median
+        return number(median) + (f" {NEEDS[need].unit_for(self.plant.unit)}" if math.isfinite(median) else "")
+
+    def _where(self, conditions: Sequence[str]) -> str:
+        return "" if len(conditions) == len(self.conditions) else f" under {_joined(conditions)}"
 
     def _on(self, blocks: Sequence[tuple[str, str]]) -> str:
         """Return blocks in words, such as "on calm under noise and sine"."""
@@ -221,18 +291,15 @@ class Advice:
         cells = [self.heads, *self.rows]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in cells]
-        return "\n".join([self.title, *(line.rstrip() for line in lines), self.key, "", *self.answer])
+        answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
+        return "\n".join([self.title, *(line.rstrip() for line in lines), self.key, "", *answer])
 
     def __repr__(self) -> str:
         return f"Advice({self.plant.name}: {self.law})"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        head = "".join(f"<th>{escape(text)}</th>" for text in self.heads)
-        body = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in self.rows)
-        answer = "".join(f"<p>{escape(text)}</p>" for text in (self.key, *self.answer))
-        return f"<p><b>{escape(self.title)}</b></p><table><tr>{head}</tr>{body}</table>{answer}"
+        paragraphs = "".join(f"<p>{html.text(sentence)}</p>" for sentence in self.answer)
+        return html.table(self.heads, self.rows, self.title, self.key, range(1, len(self.heads)), most=40) + paragraphs
 
 
 def _interval(interval: Interval) -> str:

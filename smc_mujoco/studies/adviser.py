@@ -7,17 +7,21 @@
 What is asked is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous,
 two-gains ...). With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
-1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`.
-2. Screening: each law runs in each condition from a few seeds. Those with the best mean ranks are the finalists.
+1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
+   with the same bound on u, the same starts and as many evaluations as those of the package.
+2. Screening: each law runs in each condition from a few seeds. The finalists are those with the best mean ranks, and
+   the best one on each need.
 3. The finalists run from further seeds, which the screening has not seen, so that a law which was lucky there has no
    advantage. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the
    same in every condition, and the tests are corrected for all pairs of finalists in all blocks.
 
 A law is not fit if it settles in less than half as many runs of a condition as the law that settles in the most: to do
-nothing would be calmest. Laws that are not fit rank behind all others. The first in mean rank is advised.
+nothing would be calmest. Laws that are not fit are not compared. A law dominates another if it is better in some block
+and worse in none. Laws are ordered by mean rank, but none before a law that dominates it. The first one is advised.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,7 +31,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import Comparison, Rank, compare, ranks
+from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranks
 from smc_mujoco.analysis.tuning import result, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
@@ -51,6 +55,7 @@ from smc_mujoco.studies.table import Table
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
 NO_VELOCITY = "no-velocity"
+SHIPPED = "tuned gains of the package"
 LEAST_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
 
 
@@ -123,25 +128,26 @@ def which(
     if len(candidates) < len(found):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
-    def ran(names: Sequence[str], numbers: range, part: str) -> Table:
+    def ran(names: Sequence[str], numbers: range, part: str) -> Contest:
         runs = grid(machine, [candidates[name].law for name in names], asked, numbers, "default", duration, starts)
-        return study(runs, folder / part, threads=threads, progress=progress)
+        return _contest(study(runs, folder / part, threads=threads, progress=progress), machine, compared)
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:
-        names = [rank.law for rank in _order(ran(names, range(extent.screening), "screening"), machine, compared)[0]]
-        names, others = names[: extent.finalists], names[extent.finalists :]
-    table = ran(names, range(extent.screening, extent.screening + seeds), "finals")
-    order, comparison = _order(table, machine, compared)
+        screening = ran(names, range(extent.screening), "screening")
+        first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
+        others = [rank.law for rank in screening.order if rank.law not in first]
+        names = [name for name in names if name in first]
+    finals = ran(names, range(extent.screening, extent.screening + seeds), "finals")
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in asked),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in properties if name != NO_VELOCITY),
-        choices=_choices(order, comparison, table, candidates, compared),
+        choices=_choices(finals, candidates, compared),
         others=tuple(others),
-        comparison=comparison,
-        table=table,
+        comparison=finals.comparison,
+        table=finals.table,
     )
 
 
@@ -221,8 +227,13 @@ def _with_gains(
     threads: int | None,
     progress: bool,
 ) -> list[Candidate]:
-    """Return the laws with gains for the plant: given, shipped, tuned or default ones, in this order of preference."""
+    """Return the laws with gains for the plant: given, shipped, tuned or default ones, in this order of preference.
+
+    Laws that are tuned beside shipped gains are tuned as these were: the same starts, the same number of evaluations.
+    """
     found = [_known(plant, law) for law in laws]
+    if any(candidate and candidate.source == SHIPPED for candidate in found):
+        budget, starts = FULL.budget, None
     missing = [k for k, candidate in enumerate(found) if candidate is None]
     with bar("gains", len(missing), shown=progress and bool(missing), counted=True) as drawn:
         for k in missing:
@@ -245,7 +256,7 @@ def _known(plant: Plant, law: Component | Template) -> Candidate | None:
         return None
     if not gain_sets.file(plant.name, law.name, gain_sets.OBJECTIVES["tuned"]).is_file():
         return None
-    return Candidate(gain_sets.law(plant, law.name, "tuned"), "tuned gains of the package")
+    return Candidate(gain_sets.law(plant, law.name, "tuned"), SHIPPED)
 
 
 def _tuned(
@@ -272,10 +283,24 @@ def _tuned(
 # the comparison
 
 
-def _order(table: Table, plant: Plant, needs: Sequence[str]) -> tuple[list[Rank], Comparison]:
-    """Return the laws' ranks, those that are fit first, and their comparison over all needs and conditions."""
+class Contest(NamedTuple):
+    """Runs of laws and what follows from them.
+
+    `comparison`: of the laws that are fit, or of all if none is. `order`: all laws, best first; those that are not fit
+    come last and have NaN for a rank. `specialists`: the law with the best mean rank on each need.
+    """
+
+    table: Table
+    comparison: Comparison
+    order: list[Rank]
+    fit: set[str]
+    specialists: list[str]
+
+
+def _contest(table: Table, plant: Plant, needs: Sequence[str]) -> Contest:
+    """Compare laws over all needs and conditions."""
     (group,) = paired_runs.groups(table, by=("plant",))
-    ran = paired_runs.scenarios(table, group)
+    fit, ran = _fit(group, table), paired_runs.scenarios(table, group)
     parts, floors = [], []
     for need in needs:
         there, scores, outcomes = group.scores(paired_runs.values(table, NEEDS[need].name))
@@ -283,9 +308,28 @@ def _order(table: Table, plant: Plant, needs: Sequence[str]) -> tuple[list[Rank]
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
         parts.append((scores, outcomes))
         floors += [paired_runs.floor(ran[k], NEEDS[need].unit) for k in there]
-    scores, outcomes = ({law: np.concatenate([part[i][law] for part in parts]) for law in group.laws} for i in (0, 1))
-    comparison, fit = compare(scores, floors, outcomes=outcomes), _fit(group, table)
-    return sorted(ranks(comparison), key=lambda rank: (rank.law not in fit, rank.mean)), comparison
+    laws = [law for law in group.laws if law in fit] or group.laws
+    scores, outcomes = ({law: np.concatenate([part[i][law] for part in parts]) for law in laws} for i in (0, 1))
+    comparison = compare(scores, floors, outcomes=outcomes)
+    by_need = np.split(block_ranks(comparison.centres, comparison.floors), len(needs), axis=1)
+    specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
+    nan = math.nan
+    unfit = [Rank(law, nan, nan, nan, nan, nan, 1.0, best=False) for law in group.laws if law not in laws]
+    return Contest(table, comparison, [*_order(comparison), *unfit], fit, specialists)
+
+
+def _order(comparison: Comparison) -> list[Rank]:
+    """Return the laws by mean rank, each behind all that dominate it."""
+    ahead = np.any(comparison.better, axis=0)
+    dominates = np.logical_and(ahead, ~ahead.T)
+    left, ordered = ranks(comparison), []
+    while left:
+        at = [comparison.laws.index(rank.law) for rank in left]
+        free = [rank for rank, k in zip(left, at, strict=True) if not dominates[at, k].any()]
+        first = (free or left)[0]  # none is free only if the laws dominate each other in a circle
+        ordered.append(first)
+        left.remove(first)
+    return ordered
 
 
 def _settled(group: paired_runs.Group, table: Table) -> np.ndarray:
@@ -300,28 +344,19 @@ def _fit(group: paired_runs.Group, table: Table) -> set[str]:
     return {law for law, one in zip(group.laws, enough.tolist(), strict=True) if one}
 
 
-def _choices(
-    order: Sequence[Rank],
-    comparison: Comparison,
-    table: Table,
-    candidates: Mapping[str, Candidate],
-    needs: Sequence[str],
-) -> tuple[Choice, ...]:
-    """Return the finalists with all that is said of them, in this order."""
-    (group,) = paired_runs.groups(table, by=("plant",))
-    settled, fit, choices = _settled(group, table).mean(axis=1), _fit(group, table), []
-    for rank in order:
-        at = comparison.laws.index(rank.law)
-        cells = np.split(comparison.cells[at], len(needs))
-        beaten = np.split(comparison.better[:, :, at].any(axis=1), len(needs))
+def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequence[str]) -> tuple[Choice, ...]:
+    """Return the finalists with all that is said of them, best first."""
+    (group,) = paired_runs.groups(finals.table, by=("plant",))
+    settled, choices = _settled(group, finals.table).mean(axis=1), []
+    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name))[1] for need in needs}
+    for rank in finals.order:
         choice = Choice(
             law=candidates[rank.law].law,
             source=candidates[rank.law].source,
             rank=rank,
             settles=float(settled[group.laws.index(rank.law)]),
-            fit=rank.law in fit,
-            medians={need: median_of(own) for need, own in zip(needs, cells, strict=True)},
-            unbeaten={need: int((~lost).sum()) for need, lost in zip(needs, beaten, strict=True)},
+            fit=rank.law in finals.fit,
+            medians={need: median_of(scores[need][rank.law]) for need in needs},
         )
         choices.append(choice)
     return tuple(choices)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import ranking
+from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.cli import main
+from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
@@ -42,12 +45,14 @@ def test_the_advised_law_has_the_best_mean_rank_of_those_that_settle(advice):
     assert list(ranks.values()) == sorted(ranks.values())
 
 
-def test_doing_nothing_is_calmest_and_is_not_advised(advice):
+def test_doing_nothing_is_calmest_and_is_not_advised_nor_compared(advice):
     idle = advice.choices[-1]
     assert (idle.law.name, idle.fit, idle.settles) == ("idle", False, 0.0)
-    assert idle.unbeaten["calm"] == 2
-    assert advice.rows[-1][1:3] == ["–", "0 %"]
+    assert idle.medians["calm"].median == 0.0
+    assert advice.rows[-1][1:] == ["–", "0 %", "never", "0"]
     assert "settles too seldom" in advice.key
+    assert advice.compared == [choice.law.name for choice in advice.choices[:-1]]
+    assert "idle" not in text(advice)
 
 
 def test_a_law_settles_less_than_half_as_often_as_the_best_before_it_is_not_fit(advice):
@@ -57,42 +62,79 @@ def test_a_law_settles_less_than_half_as_often_as_the_best_before_it_is_not_fit(
         assert share == {"idle": 0.0, "slow": 1.0}
 
 
-def test_wins_are_those_of_the_comparison_and_the_answer_counts_them(advice):
-    first, second = advice.law.name, advice.second.name
-    won, lost = advice.wins(first, second), advice.wins(second, first)
-    assert won
-    assert not set(won) & set(lost)
-    assert f"it wins {len(won)}, loses {len(lost)} and is level in {4 - len(won) - len(lost)} of 4" in text(advice)
+def test_wins_are_those_of_the_comparison(advice):
     medians = {
-        law: advice.table.select(law=law, condition="nominal").column("settling_time") for law in (first, "slow")
+        law: np.median(advice.table.select(law=law, condition="nominal").column("settling_time"))
+        for law in (advice.law.name, "slow")
     }
-    assert np.median(medians[first]) < 0.97 * np.median(medians["slow"])
-    assert ("fast", "nominal") in advice.wins(first, "slow")
-    assert ("fast", "nominal") not in advice.wins("slow", first)
+    assert medians[advice.law.name] < 0.97 * medians["slow"]
+    assert ("fast", "nominal") in advice.wins(advice.law.name, "slow")
+    assert ("fast", "nominal") not in advice.wins("slow", advice.law.name)
+    assert advice.better("slow", "fast")[advice.law.name] == ["nominal", "noise"]
 
 
 def test_the_answer_says_what_why_and_how_sure(advice):
-    use, second, sure = advice.answer
-    assert use.startswith(f"Use {FAST} (gains as given), because it has the best mean rank: ")
-    assert second.startswith(f"Second choice: {advice.second} (")
-    assert sure.startswith("How sure: against the second")
+    use, because, second, sure = advice.answer
+    assert use == f"Use {FAST} (gains as given)."
+    assert because.startswith(
+        "Because it has the best mean rank of 3 finalists. It settles in 100 % of its runs. Fast: "
+    )
+    settling, calm = (number(advice.choices[0].medians[need].median) for need in ("fast", "calm"))
+    assert f"Fast: settling time {settling} s; no finalist is better. Calm: TV rate {calm} N/s; no fin" in because
+    assert second == f"Second choice: {advice.second} (gains as given); worse on fast and calm."
     low, high = advice.choices[0].rank.low, advice.choices[0].rank.high
-    assert f"its place is {low:g}{f' to {high:g}' if high > low else ''} of 4" in sure
-    assert "better than it on calm: idle" in sure
+    assert sure.startswith("How sure: it dominates slow and classical: better somewhere, worse nowhere; ")
+    assert f"its place by mean rank is {low:g}{f' to {high:g}' if high > low else ''} of 3" in sure
 
 
-def test_where_another_law_is_better_the_answer_says_on_what(advice):
-    lost = 2 - advice.choices[0].unbeaten["calm"]
-    assert lost == 2
-    assert "on calm another is better in 2 of 2 conditions" in advice.answer[0]
+def with_cells(advice, **cells):
+    """Advice on the same runs with other scores: law -> medians of fast and calm, each under nominal and noise."""
+    spread = np.linspace(0.99, 1.01, 24)
+    scores = {law: np.outer(own, spread) for law, own in cells.items()}
+    comparison = ranking.compare(scores)
+    names = {choice.law.name: choice for choice in advice.choices}
+    choices = []
+    for rank in adviser._order(comparison):
+        medians = {need: median_of(scores[rank.law][2 * k : 2 * k + 2]) for k, need in enumerate(("fast", "calm"))}
+        choices.append(dataclasses.replace(names[rank.law], rank=rank, medians=medians))
+    return dataclasses.replace(advice, comparison=comparison, choices=tuple(choices))
 
 
-def test_sentences_follow_the_numbers(advice):
-    """With the first two laws exchanged, they exchange their places in every sentence."""
-    turned = dataclasses.replace(advice, choices=(advice.choices[1], advice.choices[0], *advice.choices[2:]))
-    assert turned.answer[0].startswith(f"Use {advice.second} ")
-    won, lost = len(advice.wins(advice.second.name, FAST.name)), len(advice.wins(FAST.name, advice.second.name))
-    assert f"it wins {won}, loses {lost} " in turned.answer[2]
+def test_where_another_law_is_better_the_answer_says_which_and_what_it_gives_and_costs(advice):
+    found = with_cells(advice, observer_free=[1, 1, 9.9, 9.9], slow=[2, 2, 3, 8], classical=[4, 4, 9, 9])
+    first = text(found)
+    assert found.law.name == "slow"
+    assert "Calm: TV rate 5.50 N/s; no finalist is better." in first
+    assert "Fast: settling time 2.00 s; better is observer_free." in first
+    assert f"If only fast counts: {FAST}, with settling time 1.00 s instead of 2.00 s; it costs TV rate 9.90" in first
+    assert "a matter of what counts against observer_free, better here and worse there" in first
+    assert "it dominates classical" in first
+
+
+def test_a_need_in_one_condition_is_named_with_it(advice):
+    found = with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 9, 3], classical=[3, 3, 10, 10])
+    assert found.law.name == "observer_free"
+    assert "Calm: TV rate 9.00 N/s; better is slow under noise." in text(found)
+    assert f"Second choice: {SLOW} (gains as given); better on calm under noise; worse on fast." in text(found)
+
+
+def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
+    """slow has the best mean rank, being second everywhere; observer_free is level with it but in one comparison."""
+    cells = {"observer_free": [1.02, 1.02, 9.0, 5.0], "slow": [1.0, 1.0, 9.0, 9.0], "classical": [1.0, 1.0, 9.0, 9.0]}
+    found = with_cells(advice, **cells)
+    assert found.law.name == "observer_free"
+    assert found.dominated("slow") == ["observer_free"]
+    assert found.dominated("observer_free") == []
+    turned = with_cells(advice, **(cells | {"observer_free": [1.5, 1.02, 9.0, 5.0]}))
+    assert turned.dominated("slow") == []
+
+
+def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advice):
+    found = with_cells(advice, observer_free=[1, 1, 9, 5], slow=[1, 1, 9, 9], classical=[2, 2, 10, 10])
+    worse = dataclasses.replace(found.choices[1], rank=found.choices[1].rank._replace(mean=0.5))
+    assert "the best mean rank of 3 finalists" in found.answer[1]
+    passed = dataclasses.replace(found, choices=(found.choices[0], worse, *found.choices[2:]))
+    assert "the best mean rank of those that none dominates" in passed.answer[1]
 
 
 def test_a_table_has_a_row_for_each_finalist_with_intervals(advice):
@@ -102,7 +144,8 @@ def test_a_table_has_a_row_for_each_finalist_with_intervals(advice):
     assert f"{interval.median:.3g}" in advice.rows[0][3]
     for row in advice.rows:
         assert all(cell in str(advice) for cell in row)
-    assert "<td>observer_free</td>" in advice._repr_html_()
+    assert ">observer_free</td>" in advice._repr_html_()
+    assert "<p>Use observer_free(" in advice._repr_html_()
     assert repr(advice) == f"Advice(duffing: {FAST})"
 
 
@@ -111,14 +154,15 @@ def test_equal_laws_are_level_and_no_law_is_called_the_best(folder):
     found = smc.which("duffing", needs="fast,calm", laws=twins, out=folder, **COMMON)
     assert found.level == [found.choices[1].law.name]
     assert found.answer[0].startswith("No law can be called the best: both laws are level in every comparison.")
-    assert "level with the first in every comparison" in found.answer[1]
-    assert "not to be told from it: " in text(found)
+    assert "level with the first in every comparison" in text(found)
+    assert f"not to be told from {found.choices[1].law.name}" in text(found)
 
 
 def test_few_seeds_tell_no_law_from_another(folder):
     few = smc.which("duffing", needs="fast", laws=[FAST, SLOW], out=folder, **COMMON | {"seeds": 4})
     assert few.answer[0].startswith("No law can be called the best")
     assert not few.comparison.better.any()
+    assert "How sure: not at all, with 4 seeds. A law is called better from 16 on." in text(few)
 
 
 def test_if_nothing_settles_nothing_is_advised(folder):
@@ -129,11 +173,13 @@ def test_if_nothing_settles_nothing_is_advised(folder):
 def test_one_law_is_the_only_one(folder):
     found = smc.which("duffing", laws=FAST, out=folder, **COMMON)
     assert (found.second, found.needs) == (None, adviser.USUAL)
-    assert (
-        found.answer[0]
-        == f"Use {FAST} (gains as given), because it is the only law here that suits. It settles in 100 % of its runs."
-    )
-    assert found.answer[1:] == ["How sure: nothing could be compared with it."]
+    assert found.answer == [
+        f"Use {FAST} (gains as given).",
+        "Because it is the only law here that suits. It settles in 100 % of its runs.",
+        "How sure: nothing could be compared with it.",
+    ]
+    assert found.code == "smc.law('observer_free', lam=6, k1=2)"
+    assert dataclasses.replace(found, choices=(dataclasses.replace(found.choices[0], law=SLOW),)).code == ""
 
 
 # the screening
@@ -144,14 +190,32 @@ def test_finalists_are_the_best_of_a_screening_and_run_from_other_seeds(folder, 
     found = smc.which("duffing", needs="fast", laws=[SLOW, FAST, smc.law("none").named("idle")], out=folder, **COMMON)
     assert [choice.law.name for choice in found.choices] == ["observer_free", "slow"]
     assert found.others == ("idle",)
-    assert found.answer[-1] == "A screening left out 1 other laws, best first: idle"
+    assert found.answer[-1] == "A screening with fewer runs left out 1 other law, best first: idle"
     screened = smc.Table.read(folder / "screening")
     assert set(screened.column("seed")) == {0, 1, 2}
     assert set(found.table.column("seed")) == set(range(3, 19))
     assert set(screened.column("law")) == {"observer_free", "slow", "idle"}
 
 
+def test_the_best_law_on_each_need_is_a_finalist(folder, monkeypatch):
+    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(finalists=1, screening=3))
+    calm = smc.law("observer_free", lam=6.0, k1=1.75).named("calm")
+    found = smc.which("duffing", needs="fast,calm", laws=[SLOW, FAST, calm], out=folder, **COMMON)
+    assert {choice.law.name for choice in found.choices} == {"observer_free", "calm"}
+    assert found.others == ("slow",)
+
+
 # gains
+
+
+def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(monkeypatch):
+    asked = []
+    monkeypatch.setattr(adviser, "_tuned", lambda plant, law, budget, starts, *rest: asked.append((budget, starts)))
+    known, other = adviser.QUICK.budget, smc.starts(x0=0.5)
+    laws = [catalogue()["classical"], catalogue()["observer_free_q15"]]
+    for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
+        adviser._with_gains(plant, laws, known, other, "gains", None, False)
+    assert asked == [(adviser.FULL.budget, None), (known, other), (known, other)]
 
 
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
@@ -248,11 +312,11 @@ def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch
     printed = " ".join(capsys.readouterr().out.split())
     assert not end.value.code
     assert (
-        "Use fast(lam=6, k1=2) (gains as given), because it has the best mean rank: no finalist is better on fast."
+        "Use fast(lam=6, k1=2) (gains as given). Because it has the best mean rank of 2 finalists. It settles"
         in printed
     )
     assert "Second choice: slow(lam=6, k1=4) (gains as given); worse on fast." in printed
-    assert "How sure: against the second it wins 1, loses 0 and is level in 0 of 1" in printed
+    assert "How sure: it dominates slow: better somewhere, worse nowhere; its place" in printed
     assert math.isfinite(float(printed.partition("results.parquet; ")[2].split()[0]))
 
 

@@ -79,6 +79,9 @@ def which(
         terminal.note(sentence, wrap=True)
     runs = f"{len(advice.table)} runs of the finalists are in {printable(str(out / 'finals' / 'results.parquet'))}"
     terminal.print()
+    if advice.code:
+        terminal.note(f"In Python: {advice.code}", wrap=True)
+        terminal.print()
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
 
 
