@@ -21,7 +21,8 @@ CATALOGUES = {
 }  # fmt: skip
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
-    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "studies", "envs", "testing", "cli",
+    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "twins", "studies", "envs",
+    "testing", "cli",
 )  # fmt: skip
 MOVED = "moved"  # old names of modules, for one release
 HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}

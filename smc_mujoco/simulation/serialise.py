@@ -13,6 +13,7 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.rig_controllers import CONTROLLERS
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction  # noqa: F401  # whose parts a file may name
@@ -73,7 +74,7 @@ def restore(data: dict) -> Scenario:
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _find(data["law"], "law", laws()),
+        "law": _find(data["law"], "law", laws() | CONTROLLERS),
         "velocity": _find(data["velocity"], "estimator", estimators()),
         "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),
@@ -117,7 +118,8 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
     named = (
         [known[data["name"]]] if data["name"] in known else known.values()
     )  # one of the library may have been renamed
-    if template := next((one for one in named if one.function.__module__ == home), None):
+    there = (one for one in named if one.function.__module__ == home and {*data["gains"]} <= {*one.gains})
+    if template := next(there, None):
         bound = template.bind(data["gains"])
         return bound if bound.name == data["name"] else bound.named(data["name"])
     return Component(

@@ -20,7 +20,7 @@ GRAV = 9.81
 STATES = 1000
 # plant -> parameters that have friction and rotors of every kind
 ROUGH = {
-    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5},
+    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "tx": 0.1, "ty": -0.2},
     "double_pendulum": MODEL_1_0,
     "pendubot": MODEL_1_0,
     "acrobot": MODEL_1_0,
@@ -38,7 +38,10 @@ def furuta(p, q, v, u):
     mass = np.array([[p.J + p.m * p.L**2 + Jp * s * s, p.m * p.L * p.l * c], [p.m * p.L * p.l * c, Jp]])
     gyration = np.array([2 * Jp * s * c * v[0] * v[1] - p.m * p.L * p.l * s * v[1] ** 2, -Jp * s * c * v[0] ** 2])
     friction = np.array([p.b, p.bq]) * v + np.array([p.cf, p.cfq]) * np.sign(v)
-    return np.linalg.solve(mass, [u[0], 0.0] - gyration - friction + [0.0, p.m * GRAV * p.l * s])
+    arm, ahead = np.array([math.sin(q[0]), -math.cos(q[0]), 0.0]), np.array([math.cos(q[0]), math.sin(q[0]), 0.0])
+    jacobian = np.array([p.L * ahead - p.l * s * arm, p.l * (c * ahead - s * np.array([0.0, 0.0, 1.0]))])
+    down = GRAV * np.array([p.tx, p.ty, -math.sqrt(1.0 - p.tx**2 - p.ty**2)])
+    return np.linalg.solve(mass, [u[0], 0.0] - gyration - friction + p.m * jacobian @ down)
 
 
 def double_pendulum(p, q, v, u):

@@ -1,0 +1,269 @@
+"""A rig: a real machine as data, from which scenarios are made and with which records are repeated.
+
+    rig = smc.rig("qube_servo")
+    rig.scenario(law="none", duration=5.0)         # a Scenario of that machine
+    rig.fit(record)                                # {"theta": 95.1, ...}, percent
+
+A rig's file states its quantities, each with unit and source, and one function that makes the fields of a Scenario from
+them. Identification changes quantities; everything else is the existing road of scenarios, runs and traces.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, find, number
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import modules
+from smc_mujoco.control.law import Law
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.twins import records
+from smc_mujoco.twins.records import Columns, Record
+
+Values = SimpleNamespace  # quantities by name
+FAR_BETTER = 50.0  # percent that a fit must gain to take a record's angles for degrees; chosen
+UNSCORED = -1e3  # percent, of a replay that fails or leaves the machine's range
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A number of a rig.
+
+    Attributes:
+      value: SI units.
+      unit: "kg m^2", "V s/rad", ...; "" for none.
+      source: where the number comes from: a publication and its licence, or the records it was identified from.
+      least, most: range that identification keeps to.
+    """
+
+    value: float
+    unit: str
+    source: str
+    least: float = -np.inf
+    most: float = np.inf
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A real machine.
+
+    Attributes:
+      name: as in `smc.rigs()`.
+      label: what it is, in a line.
+      quantities: name -> Quantity.
+      machine: quantities by name -> fields of a Scenario: plant, actuator, sensor, control period and so on.
+      controller: the rig's own law, if it is known: closed-loop records are replayed with it.
+      columns: what the columns of its records are.
+      commands: (record, index of the start) -> what the rig adds to its controller's u from there on, (K,). None: only
+        the column of the feedforward, if there is one.
+      start, score_from: s after a record's first sample: where a replay starts, and from when its fit counts.
+      free: names of the quantities that its records can tell, which `smc.identify` finds by default.
+      published: name of a parameter set -> values of quantities in it, with their source under "source".
+      ensemble: sets of quantities that fit about as well, each a mapping name -> value.
+      about: licence and history of the data, and what the twin is known to be good for.
+    """
+
+    name: str
+    label: str
+    quantities: Mapping[str, Quantity]
+    machine: Callable[[Values], dict[str, Any]]
+    controller: Law | None = None
+    columns: Columns = dataclasses.field(default_factory=Columns)
+    commands: Callable[[Record, int], np.ndarray] | None = None
+    start: float = 0.0
+    score_from: float = 0.0
+    free: tuple[str, ...] = ()
+    published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
+    ensemble: tuple[Mapping[str, float], ...] = ()
+    about: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("quantities", "published"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        return f"rig({self.name!r})"
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Quantity -> its value."""
+        return {name: quantity.value for name, quantity in self.quantities.items()}
+
+    def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
+        """Return the rig with other values of some quantities.
+
+        Args:
+          values: quantity -> value, SI units.
+          source: where the values come from.
+
+        Raises:
+          ScenarioError: an unknown quantity, or a value out of its range.
+        """
+        changed = dict(self.quantities)
+        for name, value in values.items():
+            known = find(f"quantity of {self.name}", name, changed)
+            new = number(f"{self.name}'s {name}", value, least=known.least, most=known.most)
+            if new != known.value:
+                changed[name] = dataclasses.replace(known, value=new, source=source)
+        return dataclasses.replace(self, quantities=changed)
+
+    def set(self, name: str) -> "Rig":
+        """Return the rig with a published set of parameters."""
+        chosen = dict(find(f"parameter set of {self.name}", name, self.published))
+        return self.with_values(chosen, chosen.pop("source"))
+
+    def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
+        """Return a Scenario of the machine.
+
+        Args:
+          law: the law; None: the rig's own controller.
+          fields: fields of a Scenario that replace the rig's.
+
+        Raises:
+          ScenarioError: no law, where the rig's own controller is not known.
+        """
+        if law is None and self.controller is None:
+            raise ScenarioError(f"the controller of {self.name} is not known: give a law")
+        own: dict[str, Any] = {"law": law or self.controller}
+        return Scenario(**self.machine(Values(**self.values)) | own | fields)
+
+    def replay(
+        self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None, rounded: bool = True
+    ) -> Scenario:
+        """Return the scenario that repeats a record from its measured state on.
+
+        With the rig's own controller the loop is closed: only references and feedforward come from the record, and u is
+        the controller's. Without one, the recorded command is the feedforward of the law "none".
+
+        Args:
+          record: column -> values, (K,); see `columns`.
+          start: s after the first sample; None: the rig's.
+          duration: s; None: to the end of the record.
+          rounded: whether the encoder rounds to counts. Which sample a count falls on cannot be predicted, so a run
+            without rounding is nearer to what a record can tell.
+        """
+        data = records.checked(record, self.columns, self.period, self.name)
+        first = round((self.start if start is None else start) / self.period)
+        last = len(data[self.columns.time]) - 1
+        if duration is not None:
+            last = min(last, first + round(duration / self.period))
+        if last - first < records.LEAST_SAMPLES:
+            seconds = len(data[self.columns.time]) * self.period
+            raise ScenarioError(
+                f"the record of {self.name} lasts {seconds:.3g} s, too short to repeat it from {first * self.period:g} "
+                f"s on: give at least {(first + records.LEAST_SAMPLES) * self.period + self.period:.3g} s"
+            )
+        fields = self.machine(Values(**self.values))
+        sensor = fields.get("sensor")
+        if sensor is not None and not rounded:
+            fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
+        x, v = records.state(data, self.columns, self.period, first)
+        times = self.period * np.arange(last + 1 - first)
+
+        def signal(values: np.ndarray) -> TimeSeries:
+            return TimeSeries(times.tolist(), values[: len(times)].tolist())
+
+        known: dict[str, Any] = {"law": self.controller or "none", "duration": float(times[-1])}
+        known |= {"x0": tuple(x - (sensor.bias if sensor else 0.0)), "v0": tuple(v)}
+        if self.controller is None:
+            known["feedforward"] = signal(data[self.columns.u][first:])
+        else:
+            known["reference"] = signal(data[self.columns.reference][first:])
+            added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
+            known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
+        return Scenario(**fields | known)
+
+    @functools.cached_property
+    def period(self) -> float:
+        """The control period, s."""
+        return self.scenario("none").control_period
+
+    def fit(self, record: Mapping[str, Any], rounded: bool = False) -> dict[str, float]:
+        """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
+
+        The norms are over all samples from `score_from` on; 100 is perfect, 0 is as good as the mean.
+
+        Args:
+          record: column -> values, (K,), such as a loaded npz file; see `columns`.
+          rounded: whether the prediction is rounded to counts of the encoder.
+
+        Returns:
+          Percentage of each joint's column, and, in a closed loop, of u.
+
+        Raises:
+          ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
+            angles in degrees.
+        """
+        data = records.checked(record, self.columns, self.period, self.name)
+        least = round(self.score_from / self.period) + records.LEAST_SAMPLES
+        if round(self.start / self.period) + records.LEAST_SAMPLES <= len(data[self.columns.time]) < least:
+            raise ScenarioError(
+                f"the record of {self.name} lasts {len(data[self.columns.time]) * self.period:.3g} s, too short to "
+                f"score it from {self.score_from:g} s on: give at least {least * self.period:.3g} s"
+            )
+        found = self.fits([record], rounded)[0]
+        if min(found.values()) < 100.0 - FAR_BETTER and "rad" in self.scenario("none").plant.units:
+            radians = records.in_radians(record, self.columns)
+            other = self.fits([radians], rounded)[0]
+            if min(other.values()) > min(found.values()) + FAR_BETTER:
+                raise ScenarioError(
+                    f"the angles of the record of {self.name} look like degrees, as it fits by "
+                    f"{records.percent(other)} with them in radians and by {records.percent(found)} as they are: "
+                    "give radians"
+                )
+        return found
+
+    def fits(self, many: list[Mapping[str, Any]], rounded: bool = False) -> list[dict[str, float]]:
+        """Return `fit` of several records, without the check for degrees; they are simulated at once."""
+        scenarios = [self.replay(record, rounded=rounded) for record in many]
+        return [self._score(record, trace) for record, trace in zip(many, run(scenarios), strict=True)]
+
+    def predicted(self, trace: Any) -> dict[str, np.ndarray]:
+        """Return what the columns of the record would be in a replay, (K,) each."""
+        sensor = trace.scenario.sensor
+        bias = sensor.bias if sensor else 0.0
+        found = {name: trace.x[:, i] + bias for i, name in enumerate(self.columns.x)}
+        if sensor is not None:
+            for i, name in enumerate(self.columns.x):
+                if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad"):
+                    found[name] = quantum * np.floor(found[name] / quantum + 0.5)
+        return found | ({self.columns.u: trace.u[:, 0]} if self.controller else {})
+
+    def _score(self, record: Mapping[str, Any], trace: Any) -> dict[str, float]:
+        after = round((self.score_from - self.start) / self.period)
+        first = round(self.score_from / self.period)
+        found = {}
+        for name, values in self.predicted(trace).items():
+            y = np.asarray(record[name], float)[first : first + len(values) - after]
+            residual = np.linalg.norm(y - values[after:]) / np.linalg.norm(y - y.mean())
+            found["u" if name == self.columns.u else name] = (
+                100.0 * (1.0 - float(residual)) if np.isfinite(residual) else UNSCORED
+            )
+        return found
+
+
+@functools.cache
+def catalogue() -> dict[str, Rig]:
+    """Return every rig of smc_mujoco.twins.rigs, by name."""
+    values = [value for module in modules("smc_mujoco.twins.rigs") for value in vars(module).values()]
+    return {r.name: r for r in sorted((r for r in values if isinstance(r, Rig)), key=lambda r: r.name)}
+
+
+def rig(name: str, **values: float) -> Rig:
+    """Return the rig `name`, with some of its quantities changed.
+
+    Raises:
+      ScenarioError: an unknown rig or quantity, or a value out of its range.
+    """
+    return find("rig", name, catalogue()).with_values(values)
+
+
+def rigs() -> list[str]:
+    """List the names that `rig` knows."""
+    return list(catalogue())
