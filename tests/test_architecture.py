@@ -93,6 +93,12 @@ def test_the_package_has_these_rooms_and_no_other():
     assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"} == {*ROOMS, MOVED}
 
 
+def test_no_two_files_of_tests_share_a_name():
+    """They would be one module, and pytest would run neither."""
+    names = [path.name for path in (ROOT / "tests").rglob("*.py")]
+    assert sorted(set(names)) == sorted(names)
+
+
 @pytest.mark.parametrize("path", [path for path in FILES if path.parent != PACKAGE], ids=label)
 def test_a_file_imports_from_its_own_room_and_those_below(path):
     room = path.relative_to(PACKAGE).parts[0]

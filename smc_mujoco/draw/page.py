@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
@@ -136,8 +137,20 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     """Write a figure to files of these names. The same figure gives the same files."""
     whole = page.get_figure(root=True)
     dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": None}, whole.get_layout_engine()
+    lay_out(whole, paths[0].suffix[1:])
+    whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
         with replacing(path) as part:
             whole.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=dates[path.suffix])
-        whole.set_layout_engine("none")  # laid out once; the other files keep it
     whole.set_layout_engine(layout)
+
+
+def lay_out(whole: Figure, format: str) -> None:
+    """Place the parts of a figure as they fit in a file of this format."""
+    canvas, dpi, layout = whole.canvas, whole.dpi, whole.get_layout_engine()
+    if layout is not None:
+        get_registered_canvas_class(format)(whole)  # texts are as large as this canvas draws them
+        whole.dpi = DPI
+        layout.execute(whole)
+        whole.set_canvas(canvas)
+        whole.dpi = dpi
