@@ -135,6 +135,8 @@ def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     """Write a figure to files of these names. The same figure gives the same files."""
+    if not paths:
+        return
     whole = page.get_figure(root=True)
     dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": None}, whole.get_layout_engine()
     lay_out(whole, paths[0].suffix[1:])
