@@ -25,6 +25,7 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
+from smc_mujoco.studies.board_tables import size
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
 from smc_mujoco.studies.paper.claims.verdict import Claim
@@ -256,7 +257,7 @@ def _block_cell(board: Board | None, like: Block) -> Text:
     first, second = sorted(block.medians, key=block.medians.__getitem__)[:2]
     settles = board.metric == SETTLES  # its medians are shares that do not settle
     medians = [1 - block.medians[law] if settles else block.medians[law] for law in (first, second)]
-    text = (">" if settles else "<").join(_median(median, board.metric, digits=2) for median in medians)
+    text = (">" if settles else "<").join(size(median, board.metric, digits=2) for median in medians)
     return Text(_folded(first, 12), style.law_colour(first)).append(f"\n{text}", "dim")
 
 
@@ -270,17 +271,11 @@ def _law_cell(board: Board | None, law: str) -> Text:
     entry = next((e for e in board.entries if e.law == law), None) if board else None
     if board is None or entry is None:
         return Text("")
-    middle = _median(entry.interval.median, board.metric)
-    low, high = (_median(value, board.metric, digits=2) for value in entry.interval[1:3])
+    middle = size(entry.interval.median, board.metric)
+    low, high = (size(value, board.metric, digits=2) for value in entry.interval[1:3])
     text = Text(f"{middle} " if middle else "", "bold" if entry.rank.best else "")
     text.append(f"#{entry.rank.place:g}").append("*" if entry.rank.best else " ")
     return text.append(f"\n{low}–{high}" if low else "", "dim not bold")
-
-
-def _median(value: float, metric: str, digits: int = 3) -> str:
-    if math.isnan(value):
-        return ""
-    return f"{100 * value:.0f}" if metric == SETTLES else number(value, digits)
 
 
 def _winner_cell(board: Board | None) -> Text:

@@ -1,9 +1,10 @@
-"""Short tables and curves as HTML, which notebooks show.
+"""Short tables, curves, pictures and films as HTML, which notebooks show.
 
 They have no colours of their own: text and lines take the colour of the page, light or dark. All text is escaped, but
 for `Html`.
 """
 
+import base64
 import html
 from collections.abc import Mapping, Sequence
 
@@ -128,3 +129,24 @@ def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
         x, y = x[kept], y[kept]
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
     return [f'<polyline points="{points}" fill="none" stroke="currentColor" {style}/>'] if len(x) else []
+
+
+def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
+    """Return a picture or a film that is in the page itself, and no wider than it.
+
+    Args:
+      kind: its MIME type, such as "video/mp4".
+      width: px; None for its own.
+    """
+    source = f'src="data:{kind};base64,{base64.b64encode(content).decode()}" style="max-width:100%;height:auto"'
+    source += "" if width is None else f' width="{width:.0f}"'
+    if kind.startswith("video/"):
+        return Html(f"<video {source} controls autoplay muted loop playsinline></video>")
+    return Html(f"<img {source}>")
+
+
+def in_notebook() -> bool:
+    """Return whether this process is the kernel of a notebook."""
+    from rich.console import Console
+
+    return Console().is_jupyter

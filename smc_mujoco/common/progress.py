@@ -6,6 +6,8 @@ import math
 import time
 from collections.abc import Callable, Iterator
 
+from smc_mujoco.common.html import in_notebook
+
 Report = Callable[[float, float], None]  # called with the work done and the whole work, as estimated so far
 
 
@@ -46,7 +48,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
     )
 
     console = Console(stderr=True)
-    if console.is_jupyter:
+    if in_notebook():
         with contextlib.closing(NotebookBar(what, whole, counted)) as cell:
             yield cell
         return

@@ -4,6 +4,7 @@ A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. I
 (12.8 in), an IEEE page or column, or has any size in inches.
 """
 
+import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +28,25 @@ NARROW = 6.0  # inches: narrower pages have one column of panels
 LETTERS, TITLE = 11.0, 17.0  # points on a full page
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
+
+
+class Page(Figure):
+    """A figure that a notebook shows, although pyplot does not know of it."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, float]]:
+        return png(self), {"width": css_width(self)}
+
+
+def png(page: Figure | SubFigure) -> bytes:
+    """Return the whole figure as a PNG."""
+    content = io.BytesIO()
+    page.get_figure(root=True).savefig(content, format="png", dpi=DPI)
+    return content.getvalue()
+
+
+def css_width(page: Figure | SubFigure) -> float:
+    """Return the width of the whole figure in px of a web page, 96 an inch."""
+    return 96 * page.get_figure(root=True).get_figwidth()
 
 
 def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:
@@ -61,7 +81,7 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
         w_pad=style.points(7.2) / 72, h_pad=style.points(5.0) / 72, wspace=0.02, hspace=0.02
     )
     if fig is None:
-        return Figure(figsize=(width, height), layout=layout)
+        return Page(figsize=(width, height), layout=layout)
     if isinstance(fig, Figure) and fig.get_layout_engine() is None:
         fig.set_layout_engine(layout)
     return fig

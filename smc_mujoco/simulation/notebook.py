@@ -88,7 +88,7 @@ def _words(name: str, value: object, plant: Plant) -> str:
         unit = " or ".join(efforts) if name == "u_max" else "s" if name in SECONDS else ""
         text = f"{value:g} {unit}".rstrip()
     else:
-        text = str(value)
+        text = str(value).removesuffix("()")
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 

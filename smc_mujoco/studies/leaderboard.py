@@ -13,7 +13,6 @@ others.
 
 import dataclasses
 import math
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -22,15 +21,10 @@ from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Friedman, Rank, compare, friedman, ranks
-from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
-from smc_mujoco.common.text import number
-from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.studies import board_tables
 
-TEX = {c: f"\\{c}" for c in "&%$#_{}"}  # a character -> as LaTeX writes it
-TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}"} | {c: f"${c}$" for c in "<>|"}
-TEX |= {"–": "--", "·": r"$\cdot$"}
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 
@@ -118,23 +112,16 @@ class Board:
         return winners.pop() if len(winners) == 1 else None
 
     def _repr_html_(self) -> str:
-        rows = []
-        for entry in self.entries:
-            middle, interval = _sizes(entry, self.metric)
-            law = html.strong(entry.law) if entry.rank.best else entry.law
-            rows.append((law, middle, interval, f"{entry.rank.place:g}"))
-        heads = ("law", "median", f"{100 * self.level:g} % interval", "place")
-        return html.table(heads, rows, self.title, f"{self.verdict}. Bold: no law is better.", range(1, 4), most=40)
+        return Boards([self])._repr_html_()
 
     def to_latex(self) -> str:
-        """Return the board as a LaTeX tabular, which needs the package booktabs. Bold: no law is better."""
+        """Return the board as a LaTeX tabular, which needs the package booktabs, see `Boards.to_latex`."""
         return Boards([self]).to_latex()
 
     @property
-    def title(self) -> str:
-        """What the runs share, the metric and its unit, such as "duffing: settling time (s)"."""
-        where = ", ".join(self.group.values()) or "all runs"
-        return f"{where}: {_heading(self)}"
+    def about(self) -> str:
+        """What the runs have in common, such as "duffing, nominal"; "all runs" if nothing."""
+        return ", ".join(self.group.values()) or "all runs"
 
     def wins(self, law: str) -> list[str]:
         """Return the names of the blocks in which a law wins, see `name`."""
@@ -200,60 +187,15 @@ class Boards(list[Board]):
     """Boards, a list that notebooks show as tables."""
 
     def _repr_html_(self) -> str:
-        return "<br>".join(board._repr_html_() for board in self) or html.table((), [("no boards: no metric applies",)])
+        return board_tables.as_html(self)
 
     def to_latex(self) -> str:
-        """Return a LaTeX tabular for each group: a line for each law, a column for each metric.
+        """Return a LaTeX tabular for each group of runs: a line for each law, a column for each metric.
 
-        They need the package booktabs. A cell is a median with its interval below it; bold: no law is better in any
-        block. A comment above each says what it is of.
+        It needs the package booktabs. A cell has a median with its interval. The median is bold if no law is better in
+        any block and there are enough runs for a winner. Comments above it say what it is of.
         """
-        groups: dict[tuple[str, ...], list[Board]] = {}
-        for board in self:
-            groups.setdefault(tuple(board.group.values()), []).append(board)
-        return "\n".join(_tabular(", ".join(name) or "all runs", boards) for name, boards in groups.items())
-
-
-def _tabular(name: str, boards: Sequence[Board]) -> str:
-    """Return the boards of one group as a LaTeX tabular."""
-    cells: dict[str, list[str]] = {}
-    for i, board in enumerate(boards):
-        for entry in board.entries:
-            middle, interval = _sizes(entry, board.metric)
-            bold = entry.rank.best and bool(middle)
-            sizes = [f"\\textbf{{{_tex(middle)}}}" if bold else _tex(middle)]
-            sizes += [f"[{_tex(interval)}]"] if interval else []
-            cells.setdefault(entry.law, [""] * len(boards))[i] = " ".join(sizes)
-    heads = " & ".join(["law", *(_tex(_heading(board)) for board in boards)])
-    lines = [f"{_tex(law)} & {' & '.join(row)} \\\\" for law, row in cells.items()]
-    about = f"% {name}: medians [{100 * boards[0].level:g} % intervals]; bold: no law is better. Needs booktabs."
-    begin = f"\\begin{{tabular}}{{l{'r' * len(boards)}}}"
-    rules = ["\\toprule", f"{heads} \\\\", "\\midrule", *lines, "\\bottomrule", "\\end{tabular}"]
-    return "\n".join([about, begin, *rules]) + "\n"
-
-
-def _heading(board: Board) -> str:
-    """Return a metric's label with its unit, if that is known."""
-    if board.metric == SETTLES:
-        return "settles (%)"
-    metric = CATALOGUE[board.metric]
-    units = {plant.unit for block in board.blocks if (plant := catalogue().get(block.plant))}
-    unit = metric.unit_for(units.pop()) if len(units) == 1 else "" if "{" in metric.unit else metric.unit
-    return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
-
-
-def _sizes(entry: Entry, metric: str) -> tuple[str, str]:
-    """Return a law's median and interval as text, shares in percent; "" for what is not known."""
-    factor = 100.0 if metric == SETTLES else 1.0
-    texts = ["" if math.isnan(v) else number(factor * v, 3) for v in entry.interval[:3]]
-    return texts[0], "–".join(texts[1:]) if all(texts[1:]) else ""
-
-
-def _tex(text: str) -> str:
-    """Return text with LaTeX's own characters escaped, and powers and dashes as LaTeX writes them."""
-    text = re.sub(r"(\d)e(-?\d+)\b", r"\1·10^\2", text)
-    text = "".join(TEX.get(c, c) for c in text)
-    return re.sub(r"\^(-?\d+)", r"$^{\1}$", text)
+        return board_tables.as_latex(self)
 
 
 def _listed(names: Sequence[str]) -> str:

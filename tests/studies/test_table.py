@@ -1,5 +1,7 @@
 """The table of a study: its rows are the runs' scores, and from each its run can be made again."""
 
+import dataclasses
+import html
 import json
 import math
 import os
@@ -12,10 +14,11 @@ import pytest
 from helpers.runs import fails_late
 
 import smc_mujoco as smc
+from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.study import condition, key, study
-from smc_mujoco.studies.table import Table, content
+from smc_mujoco.studies.table import MOST_ROWS, Table, content
 
 
 def small(seeds: int = 2) -> list[smc.Scenario]:
@@ -146,3 +149,29 @@ def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
     assert smc.score(table.trace(0)) == smc.score(smc.run(s))
     with pytest.raises(smc.ScenarioError, match="came from a file without its code"):
         Table.read(tmp_path).trace(0)
+
+
+# in notebooks, and as other packages read it
+
+
+def test_a_notebook_shows_the_first_rows_and_says_how_many_more(tmp_path):
+    table = study(grid(["duffing"], ["classical", fails_late()], ["nominal"], 5, "study", duration=0.05), tmp_path)
+    shown = table._repr_html_()
+    assert shown.count("<tr>") == 1 + MOST_ROWS + 1
+    assert "Table(10 runs: 1 plant, 2 laws, 1 condition)" in shown
+    assert "and 2 more" in shown
+    assert f">{number(table.rows()[0]['itae'])}<" in shown
+    failure = table.rows()[5]["failure"]
+    assert failure
+    assert html.escape(failure) in shown
+    none = dataclasses.replace(table, data=table.data.slice(0, 0))._repr_html_()
+    assert "Table(0 runs: 0 plants, 0 laws, 0 conditions)" in none
+    assert "more" not in none
+
+
+def test_packages_that_speak_arrow_read_the_table_as_it_is(tmp_path):
+    table = study(small(), tmp_path)
+    assert pa.table(table).equals(table.data)
+    old, new = pa.string(), pa.large_string()
+    wanted = pa.schema([field.with_type(new) if field.type == old else field for field in table.data.schema])
+    assert pa.RecordBatchReader.from_stream(table, wanted).schema.field("law").type == new

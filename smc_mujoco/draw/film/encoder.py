@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -28,13 +29,8 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
       MissingPackageError: there is no ffmpeg.
       ScenarioError: it cannot write.
     """
-    with extras.extra("film", "a film"):
-        import imageio_ffmpeg
-        import mediapy
-
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
-    writer = mediapy.VideoWriter(path, shape, **options, ffmpeg_args=ARGUMENTS)
+    writer = mediapy().VideoWriter(path, shape, **options, ffmpeg_args=ARGUMENTS)
     try:
         with sigint_blocked():
             writer.__enter__()
@@ -44,6 +40,20 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
         if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
             raise KeyboardInterrupt from None
         raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
+
+
+def mediapy() -> ModuleType:
+    """Return mediapy, with the ffmpeg of imageio_ffmpeg.
+
+    Raises:
+      MissingPackageError: one of them is not installed, or has no ffmpeg.
+    """
+    with extras.extra("film", "a film"):
+        import imageio_ffmpeg
+        import mediapy as module
+
+    module.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+    return module
 
 
 @contextlib.contextmanager

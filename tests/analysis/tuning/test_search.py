@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 import warnings
 
 import pytest
@@ -337,3 +338,15 @@ def test_the_command_refuses_in_one_sentence(call, arguments, word):
     assert err.startswith("smc-mujoco: ")
     assert err.count("\n") == 1
     assert word in err
+
+
+def test_a_notebook_shows_the_gains_with_their_bounds(found):
+    shown = found._repr_html_()
+    rows = re.findall(r"<td[^>]*>(\w+)</td>" + 3 * r"<td[^>]*>([^<]*)</td>", shown)
+    assert [row[0] for row in rows] == list(found.gains)
+    for name, value, low, high in rows:
+        assert float(value) == pytest.approx(found.gains[name], rel=1e-5)
+        assert [float(low), float(high)] == pytest.approx(list(found.searched[name]), rel=1e-2)
+    assert f"objective {found.objective:.4g} s²" in shown
+    assert f"own gains {found.before:.4g} s²" in shown
+    assert "observer_free on duffing" in shown

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -491,3 +492,24 @@ def test_a_claim_that_is_none_ends_in_a_sentence(terminal):
 def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
     (claim,) = claims(only=["18"], gains="study", quick=quick)
     assert claim.measured.endswith(told)
+
+
+def test_a_notebook_shows_claims_in_a_line_each_and_one_in_full(only):
+    only(
+        entry("3", found={"study": [YES], "tuned": [NO, YES]}, note="<Mind> the gap."),
+        entry("18", found=[], note="Nothing to see."),
+        entry("19", found=[NO]),
+    )
+    several = claims(gains=["study", "tuned"])
+    shown = several._repr_html_()
+    assert isinstance(several, list)
+    assert re.findall(r"<b>(.*?)</b>", shown) == ["◐ partly supported, flips", "– not testable", "○ refuted"]
+    assert "no = 3 (asked: &lt; 2)" in shown
+    assert "Nothing to see." in shown
+    assert "1 partly supported, " in shown
+    full = several[0]._repr_html_()
+    rows = re.findall(r"<td[^>]*>(study|tuned)</td><td[^>]*>(.)</td><td[^>]*>(yes|no)</td><td[^>]*>(\S+)</td>", full)
+    assert rows == [("study", "✓", "yes", "1"), ("tuned", "✗", "no", "3"), ("tuned", "✓", "yes", "1")]
+    assert "flips with the gains" in full
+    assert "&lt;Mind&gt; the gap." in full
+    assert "flips" not in several[2]._repr_html_()

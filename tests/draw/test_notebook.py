@@ -1,0 +1,151 @@
+"""Films and figures in a notebook's cell: they are there, play at their speed, and fit on a phone."""
+
+import base64
+import io
+import re
+import subprocess
+import sys
+import types
+
+import imageio_ffmpeg
+import matplotlib.figure
+import numpy as np
+import pytest
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl, html
+from smc_mujoco.draw.film import film
+
+SIZE = (320, 180)
+FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
+renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+
+
+@pytest.fixture(scope="module")
+def trace() -> smc.Trace:
+    return smc.run(smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.2))
+
+
+@pytest.fixture
+def cell(monkeypatch) -> list[str]:
+    """A notebook's cell: the HTML that it shows, in order."""
+    shown: list[str] = []
+    display = types.ModuleType("IPython.display")
+    display.HTML = str
+    display.display = lambda text, **_: shown.append(text) or types.SimpleNamespace(update=lambda text: None)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    monkeypatch.setattr(html, "in_notebook", lambda: True)
+    return shown
+
+
+def content(shown: str) -> bytes:
+    """The file in a page."""
+    return base64.b64decode(re.findall(r'src="data:[^;]+;base64,([^"]+)"', shown)[0])
+
+
+# figures
+
+
+def test_a_notebook_shows_a_figure_that_pyplot_does_not_know_of(trace):
+    figure = smc.figure(trace, size="ieee-column")
+    picture, metadata = figure._repr_png_()
+    assert Image.open(io.BytesIO(picture)).width == pytest.approx(3.5 * 150, abs=1)
+    assert metadata == {"width": pytest.approx(3.5 * 96)}
+    formatters = pytest.importorskip("IPython.core.formatters")
+    told, about = formatters.DisplayFormatter().format(figure)
+    assert told["image/png"] == picture
+    assert about["image/png"] == metadata
+
+
+def test_show_takes_any_figure_and_the_file_of_one(cell, trace, tmp_path):
+    figure = matplotlib.figure.Figure(figsize=(2.0, 1.0))
+    smc.show(figure)
+    smc.figure(trace, tmp_path / "a.png", size=(6.0, 4.0))
+    smc.show(tmp_path / "a.png")
+    sizes = [Image.open(io.BytesIO(content(shown))).size for shown in cell]
+    assert sizes == [(300, 150), (900, 600)]
+    assert 'width="192"' in cell[0]
+    assert all(shown.startswith("<img ") and "max-width:100%" in shown for shown in cell)
+
+
+# films
+
+
+@renders
+def test_frames_are_those_of_the_film_again_and_again(trace):
+    frames = smc.frames(trace, title="twice", **FILM)
+    assert len(frames) == 5
+    assert np.allclose(frames.times, [0.0, 0.05, 0.1, 0.15, 0.2])
+    first, second = list(frames), list(frames)
+    wanted = list(film.frames(trace, film.clock(trace, 20.0, 1.0), None, "twice", SIZE))
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, wanted)
+    assert first[0].shape == (180, 320, 3)
+    assert not np.array_equal(first[0], first[-1])
+    assert repr(frames) == "Frames(5 of 320 x 180 px, 20 a second)"
+
+
+@renders
+def test_mediapy_takes_the_frames_with_their_speed(trace):
+    mediapy = pytest.importorskip("mediapy")
+    shown = mediapy.show_video(smc.frames(trace, **FILM), return_html=True)
+    assert probe(content(shown)) == (320, 180, 20.0, 5)
+
+
+@renders
+def test_show_films_traces_and_frames(cell, trace):
+    smc.show([trace, trace], labels=["a", "b"], **FILM)
+    smc.show(smc.frames(trace, **FILM))
+    assert [probe(content(shown)) for shown in cell if shown] == [(320, 180, 20.0, 5)] * 2
+    assert all('width="320"' in shown and "max-width:100%" in shown for shown in cell if shown)
+    assert content(cell[0]) != content(cell[-1])
+
+
+def probe(film: bytes) -> tuple[int, int, float, int]:
+    """Width, height, frames a second and number of frames of an .mp4."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", "pipe:", "-f", "null", "-"]
+    told = subprocess.run(command, input=film, capture_output=True, check=False).stderr.decode()
+    width, height = re.findall(r"Video:.* (\d+)x(\d+)", told)[0]
+    return (
+        int(width),
+        int(height),
+        float(re.findall(r"([\d.]+) fps", told)[0]),
+        int(re.findall(r"frame= *(\d+)", told)[-1]),
+    )
+
+
+# mistakes
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        (5, "cannot show 5: give traces"),
+        ("notes.txt", r"cannot show 'notes.txt': end the name in \.mp4, "),
+        ("nothing.mp4", "no film or picture at nothing.mp4"),
+        ([], "no traces to draw"),
+        ([1, 2], r"cannot show \[1, 2\]: give traces"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_sentence(cell, what, sentence):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        smc.show(what)
+    assert cell == []
+
+
+def test_where_nothing_renders_show_says_so_before_it_films(cell, trace, monkeypatch):
+    monkeypatch.setattr(film, "missing", lambda: "no film: no OpenGL here")
+    monkeypatch.setattr(film, "film", lambda *_: pytest.fail("it filmed"))
+    with pytest.raises(smc.ScenarioError, match=r"^no film: no OpenGL here$"):
+        smc.show(trace)
+
+
+def test_outside_of_a_notebook_show_names_what_to_call(trace):
+    with pytest.raises(smc.ScenarioError, match=r"needs a notebook: .* smc.film\(traces, 'film.mp4'\)"):
+        smc.show(trace)
+
+
+def test_a_speed_that_no_film_has_is_refused_at_once(trace):
+    with pytest.raises(smc.ScenarioError, match="fps is 0"):
+        smc.frames(trace, fps=0.0)

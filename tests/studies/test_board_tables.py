@@ -1,0 +1,159 @@
+"""Boards in notebooks and papers: the numbers of the text board, escaped, and bold only what is not beaten."""
+
+import io
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from smc_mujoco.cli import tables
+from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.studies.board_tables import TEX
+from smc_mujoco.studies.leaderboard import Boards, leaderboard
+
+EVIL = r"50 % & <b>x_1^{2}</b> \ λ = 2 #~$"
+LAWS = (EVIL, "second", "third")
+SEEDS = 20
+METRICS = ("itae", "settles", "ultimate_bound")
+
+
+class Stand:
+    """A stand-in for a study's table: three laws, the first clearly better in ITAE; one law never settles."""
+
+    def __init__(self, seeds: int = SEEDS, conditions: tuple[str, ...] = ("nominal",)):
+        laws, count = len(LAWS), seeds * len(conditions)
+        noise = np.random.default_rng(0).uniform(0.9, 1.1, (laws, count))
+        sizes = np.array([[1.0], [2.0], [4e-7]])
+        self.columns = {
+            "plant": ["duffing"] * laws * count,
+            "law": np.repeat(LAWS, count),
+            "condition": np.tile(np.repeat(conditions, seeds), laws),
+            "seed": np.tile(np.arange(seeds), laws * len(conditions)),
+            "failure": [None] * laws * count,
+            "diverged_at": np.full(laws * count, math.nan),
+            "itae": (sizes[:] * noise).ravel(),
+            "settling_time": np.repeat([0.5, 1.0, math.inf], count),
+            "ultimate_bound": np.repeat([0.1, 0.1, 0.1], count),
+        }
+
+    def column(self, name: str) -> np.ndarray:
+        return np.asarray(find("column", name, self.columns))
+
+    def scenario(self, i: int):
+        raise ScenarioError("no run")
+
+
+@pytest.fixture(scope="module")
+def boards() -> Boards:
+    return leaderboard(Stand(), metrics=METRICS)
+
+
+def printed(boards: Boards) -> str:
+    """The text board."""
+    console = Console(width=200, file=io.StringIO())
+    console.print(tables.leaderboard(boards))
+    return console.file.getvalue()
+
+
+def cells(boards: Boards) -> list[dict[str, list[str]]]:
+    """The HTML's tables: law -> the text of its cells. It must be well-formed."""
+    found = []
+    for table in ElementTree.fromstring(f"<div>{boards._repr_html_().replace('<br>', '<br/>')}</div>").iter("table"):
+        rows = [[" ".join(cell.itertext()) for cell in row if cell.tag == "td"] for row in table.iter("tr")]
+        found.append({row[0]: row[1:] for row in rows if len(row) > 1})
+    return found
+
+
+def bold(text: str) -> list[str]:
+    return re.findall(r"<b>(.*?)</b>", text)
+
+
+def test_html_has_the_numbers_of_the_text_board(boards):
+    (shown,) = cells(boards)
+    assert set(shown) == set(LAWS)
+    text = printed(boards)
+    for law in LAWS:
+        for middle, interval in (cell.split(" ") for cell in shown[law]):
+            assert re.search(rf"(?<![\d.]){re.escape(middle)} #", text), middle
+            assert re.search(rf"(?<![\d.]){re.escape(interval)}(?![\d.])", text), interval
+    assert shown["third"][1] == "0 0–16"
+    assert shown["second"][1].startswith("100 ")
+    assert re.fullmatch(r"[34]\.\de-7 \S+e-7–\S+e-7", shown["third"][0])
+
+
+def test_only_what_no_law_beats_is_bold(boards):
+    first, second = boards[0], boards[1]
+    assert first.winner == "third"
+    assert bold(first._repr_html_())[1:] == [cells(Boards([first]))[0]["third"][0].split()[0]]  # the first is the title
+    assert set(second.best) == {EVIL, "second"}
+    assert bold(second._repr_html_())[1:] == ["100", "100"]
+    assert second.to_latex().count(r"\textbf{100}") == 2
+    assert "bold: no law is better" in second.to_latex()
+    few = leaderboard(Stand(seeds=3), metrics=["itae"])
+    assert few[0].best
+    assert "textbf" not in few.to_latex()
+    assert "bold" not in few.to_latex()
+    assert bold(few._repr_html_())[1:] == []
+    assert "too few" in few._repr_html_()
+
+
+def test_verdicts_are_said_once_with_their_metrics(boards):
+    html = boards._repr_html_()
+    assert f"ITAE: {boards[0].verdict}" in html
+    assert html.count("winner: third") == 1
+    alone = Boards([boards[0]])._repr_html_()
+    assert "ITAE: " not in alone
+    assert boards[0].verdict in alone
+
+
+def test_a_group_is_a_table_and_no_board_is_said():
+    several = leaderboard(Stand(conditions=("nominal", "noise")), by=("plant", "condition"), metrics=["itae"])
+    html = several._repr_html_()
+    assert bold(html)[::2] == ["duffing, nominal", "duffing, noise"]
+    assert several.to_latex().count(r"\begin{tabular}") == 2
+    assert "no boards" in Boards()._repr_html_()
+    assert Boards().to_latex() == ""
+
+
+# LaTeX
+
+
+def test_latex_is_a_booktabs_table_of_the_same_numbers(boards):
+    lines = boards.to_latex().splitlines()
+    tabular = [line for line in lines if not line.startswith("%")]
+    assert tabular[:2] == [r"\begin{tabular}{lrrr}", r"\toprule"]
+    assert tabular[3] == r"\midrule"
+    assert tabular[-2:] == [r"\bottomrule", r"\end{tabular}"]
+    assert tabular[2] == r"law & ITAE (m s$^{2}$) & settles (\%) & ultimate bound (m) \\"
+    (shown,) = cells(boards)
+    rows = {re.split(r"(?<!\\)&", row)[0].strip(): re.split(r"(?<!\\) & ", row[:-3]) for row in tabular[4:-2]}
+    for law in ("second", "third"):
+        plain = [re.sub(r"\\textbf\{(.*?)\} \[|\[|\]", r"\1 ", cell.replace("--", "–")) for cell in rows[law][1:]]
+        plain = [re.sub(r"\$\\cdot\$10\$\^\{(-\d)\}\$", r"e\1", cell) for cell in plain]
+        plain = [cell.replace(r"\textbf{", "").replace("}", "") for cell in plain]
+        assert [" ".join(cell.split()) for cell in plain] == shown[law]
+    assert lines[0] == "% duffing"
+    assert "needs booktabs" in boards.to_latex()
+
+
+def test_latex_escapes_names(boards):
+    (row,) = [line for line in boards.to_latex().splitlines() if line.startswith("50")]
+    name, *sizes = re.split(r"(?<!\\) & ", row)
+    escaped = (
+        r"50 \% \& $<$b$>$x\_1\textasciicircum{}\{2\}$<$/b$>$ \textbackslash{} $\lambda$ = 2 \#\textasciitilde{}\$"
+    )
+    assert name == escaped
+    assert len(sizes) == len(METRICS)
+
+
+def test_latex_has_no_letter_that_an_engine_may_not_know():
+    assert all(text.isascii() and (text.startswith(("\\", "$")) or c == "–") for c, text in TEX.items())
+    assert all(text.count("$") % 2 == 0 for c, text in TEX.items() if c != "$")
+    assert TEX["μ"] == r"$\mu$"
+    assert TEX["ω"] == r"$\omega$"
+    assert TEX["Ω"] == r"$\Omega$"
+    assert TEX["₂"] == "$_2$"
+    assert TEX["²"] == "$^2$"
