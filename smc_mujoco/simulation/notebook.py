@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smc_mujoco.common.html import Html, fields, panel
-from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.mechanisms.plant import Plant
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
@@ -32,8 +32,8 @@ def scenario(s: "Scenario") -> Html:
     rows = {"plant": s.plant, "law": s.law, "duration": s.duration} | shown
     resolved = {name: getattr(s.resolved, name) for name, value in given.items() if value is None}
     kept = {name: value for name, value in resolved.items() if value is not None}
-    note = ", ".join(f"{name.replace('_', ' ')} {_words(name, value, s.plant)}" for name, value in kept.items())
-    words = {name.replace("_", " "): _words(name, value, s.plant) for name, value in rows.items()}
+    note = ", ".join(f"{name.replace('_', ' ')} {_words(name, value, s)}" for name, value in kept.items())
+    words = {name.replace("_", " "): _words(name, value, s) for name, value in rows.items()}
     return fields(words, "Scenario", f"by default: {note}" if note else "")
 
 
@@ -41,7 +41,7 @@ def trace(found: "Trace") -> Html:
     """Return what was run, how it ended, and small figures of x with its reference, and of u."""
     s = found.scenario
     about = {
-        "plant": _words("plant", s.plant, s.plant),
+        "plant": _words("plant", s.plant, s),
         "law": str(s.law),
         "samples": f"{len(found.t)}, every {s.control_period:g} s",
     }
@@ -56,14 +56,14 @@ def trace(found: "Trace") -> Html:
 
 def _panels(found: "Trace") -> list[Html]:
     """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
-    plant, panels = found.scenario.plant, []
+    s, plant, panels = found.scenario, found.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
         channels = [i for i, own in enumerate(plant.units) if own == unit][:MOST_CHANNELS]
         reference = found.r[:, channels[0]] if found.r[:, channels].any() else None
         panels.append(panel(found.t, list(found.x[:, channels].T), f"x ({unit})", reference))
-    for unit in dict.fromkeys(plant.units[: plant.driven]):
-        channels = [i for i, own in enumerate(plant.units[: plant.driven]) if own == unit][:MOST_CHANNELS]
-        panels.append(panel(found.t, list(found.u[:, channels].T), f"u ({EFFORT[unit]})"))
+    for unit in dict.fromkeys(s.efforts[: plant.driven]):
+        channels = [i for i, own in enumerate(s.efforts[: plant.driven]) if own == unit][:MOST_CHANNELS]
+        panels.append(panel(found.t, list(found.u[:, channels].T), f"u ({unit})"))
     return panels
 
 
@@ -72,8 +72,9 @@ def _nothing(noise: object) -> bool:
     return dataclasses.is_dataclass(noise) and not any(vars(noise).values())
 
 
-def _words(name: str, value: object, plant: Plant) -> str:
-    """Return a field's value in words."""
+def _words(name: str, value: object, s: "Scenario") -> str:
+    """Return the value of a scenario's field in words."""
+    plant = s.plant
     if isinstance(value, Plant):
         parameters = ", ".join(f"{key} = {number:g}" for key, number in value.parameters.items())
         return f"{value.name}{f', n = {value.n}' if value.n > 1 else ''} ({parameters})" if parameters else value.name
@@ -84,7 +85,7 @@ def _words(name: str, value: object, plant: Plant) -> str:
     elif isinstance(value, tuple):
         text = ", ".join(map(str, value))
     elif isinstance(value, float):
-        efforts = dict.fromkeys(EFFORT[unit] for unit in plant.units[: plant.driven])
+        efforts = dict.fromkeys(s.efforts[: plant.driven])
         unit = " or ".join(efforts) if name == "u_max" else "s" if name in SECONDS else ""
         text = f"{value:g} {unit}".rstrip()
     else:

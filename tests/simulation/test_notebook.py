@@ -86,6 +86,14 @@ def test_a_trace_that_failed_says_how():
     assert "&lt;sour&gt;" in failed._repr_html_()
 
 
+def test_a_voltage_is_in_volts():
+    motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
+    rig = smc.plant("furuta", b=1e-4, bq=1e-5)
+    volts = smc.Scenario(plant=rig, law="none", x0=(0.0, 0.05), actuator=motor, duration=0.01, u_max=9.0)
+    assert cells(volts)["u max"] == "9 V"
+    assert "<title>u (V)</title>" in smc.run(volts)._repr_html_()
+
+
 def test_of_many_channels_eight_are_drawn():
     network = smc.plant("pendulum_network", n=20)
     shown = smc.run(smc.Scenario(plant=network, law="none", duration=0.01, x0=0.1))._repr_html_()
