@@ -48,8 +48,8 @@ from smc_mujoco.simulation.trace import Trace
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
 RATE = 5.0  # 1/s: standard deviation of the velocity's noise over that of the position's, as in the study's sensor
-LARGEST = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
-HEAVIEST, NOISIEST = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
+MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
+MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # of the level: resolution of a full and of a quick search
 PERIODS = {FINE: 1, COARSE: 5}  # control periods: the same for a delay
@@ -103,7 +103,7 @@ def find_boundaries(
     """Advance searches together until all are done.
 
     Args:
-      tolerated: function of (key, level) pairs, one per search that goes on. It returns whether each level is
+      tolerated: function of (key, level) pairs, one per search that continues. It returns whether each level is
         tolerated.
     """
     while tried := [(key, level) for key, search in searches.items() if (level := search.next) is not None]:
@@ -215,28 +215,28 @@ MARGIN_KINDS: dict[str, Kind] = {
     "disturbance": Kind(
         label="constant disturbance",
         unit="{u}",
-        levels=_doubled(LARGEST),
+        levels=_doubled(MAX_FORCE),
         put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
         theory=_at_rest,
     ),
     "friction": Kind(
         label="dry friction",
         unit="{u}",
-        levels=_doubled(LARGEST),
+        levels=_doubled(MAX_FORCE),
         put=_rougher,
         theory=_at_rest,
     ),
     "mass": Kind(
         label="mass",
         unit="1",
-        levels=tuple(float(factor) for factor in np.geomspace(1.0, HEAVIEST, 10)[1:]),
+        levels=tuple(float(factor) for factor in np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:]),
         put=_heavier,
         none=1.0,
     ),
     "noise": Kind(
         label="position noise",
         unit="{x}",
-        levels=_doubled(NOISIEST),
+        levels=_doubled(MAX_NOISE),
         put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),
     ),
 }

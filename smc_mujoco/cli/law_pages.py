@@ -1,7 +1,7 @@
 """Laws, surfaces and velocity estimators in the terminal: a line for each, or a page about one.
 
-Everything comes from the templates and their docstrings. A docstring begins with `Name: formula` and ends with
-`Source: ...`; between them are sentences on what is known.
+Everything comes from the templates and their docstrings. A docstring begins with `Name: formula`, continues with
+sentences on what is known, and ends with `Source: ...`.
 """
 
 import re
@@ -130,7 +130,7 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
         text = 'Every law runs without a velocity sensor where the scenario estimates it: velocity="levant".'
         console.print(text, highlight=False)
     if not found:
-        console.print(f"{title}: leave something out", highlight=False)
+        console.print(f"{title}: leave out a need, --family or --plant", highlight=False)
         return
     columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
@@ -138,7 +138,7 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
         u = "continuous" if law.continuous else "jumps"
         table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
     console.print(table, "")
-    key = "arrives: what theory has at 0 after a finite time, s or the error e. u: whether it jumps there."
+    key = "arrives: what is 0 after a finite time by theory, s or the error e. u: whether it jumps there."
     console.print(key, style="dim", highlight=False)
 
 
@@ -155,7 +155,7 @@ def print_page(template: Template, console: Console) -> None:
         "family": template.family,
         "promises": _promises(template),
         "reads": ", ".join(f for f in Measurement._fields if f in reads(template)) * is_law,
-        "plants": (", ".join(template.plants) or "every one whose joints are all driven") * is_law,
+        "plants": (", ".join(template.plants) or "all whose joints all have actuators") * is_law,
         "discretisation": parts.discretisation,
         "known": parts.known,
         "source": parts.source,
@@ -188,7 +188,7 @@ def _promises(template: Template) -> str:
 
 
 def _degree(template: Template) -> str:
-    """Return the relative degree in words: of what a law acts on, or a surface gives; an estimator has none."""
+    """Return the relative degree in words: of a law's sliding variable, or of a surface; "" for an estimator."""
     degree = template.relative_degree
     if template.kind == "law":
         return f"{degree}: acts on {DEGREES[degree]}" if degree in DEGREES else str(degree)

@@ -70,4 +70,4 @@ def options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Define the options that stand before a command."""
+    """Define the options that come before a command."""

@@ -1,5 +1,6 @@
 """Performance of a scene: from its declaration to printed scores, traces, figures and a film."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -39,11 +40,7 @@ def perform(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ScenarioError(f"cannot make the folder {out} ({error.strerror}): choose another with --out") from error
-    with clock("compiling"):
-        for _, _, scenario in scene.runs():
-            prepare(scenario)
-    with clock("simulating"):
-        traces = simulate(scene, threads)
+    traces = simulate(scene, threads, clock)
     for condition, runs in traces.items():
         for table in tables.scores(_title(scene, condition), runs):
             terminal.print(table)
@@ -74,11 +71,13 @@ def _title(scene: Scene, condition: str) -> str:
     return f"{scene.title}, {condition}" if len(scene.conditions) > 1 else scene.title
 
 
-def simulate(scene: Scene, threads: int | None) -> Traces:
+def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullcontext) -> Traces:
     """Run all scenarios of the scene, in one call, with a progress bar."""
-    runs = list(scene.runs())
+    with clock("compiling"):
+        runs = [(condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()]
     traces: dict[str, dict[str, Trace]] = {condition: {} for condition in scene.conditions}
-    made = run([scenario for _, _, scenario in runs], threads, progress=True)
+    with clock("simulating"):
+        made = run([prepared for _, _, prepared in runs], threads, progress=True)
     for (condition, label, _), trace in zip(runs, made, strict=True):
         traces[condition][label] = trace
     return traces
@@ -114,14 +113,14 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
 
 
 def _labels(runs: Mapping[str, Trace]) -> list[str]:
-    """Return the labels of a condition for pictures; the name of a law, surface or estimator is put in words."""
+    """Return the labels of a condition's runs for pictures: boundary_layer as "Boundary layer"."""
     from smc_mujoco.draw.style import label
 
     return [label(name) for name in runs]
 
 
 def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None = None) -> list[Path]:
-    """Film the scene's filmed condition; where nothing can render, print why and return no file."""
+    """Film one condition of the scene, `scene.film`. If nothing can render, print why and return no file."""
     from smc_mujoco.draw.film import film as video
 
     if sentence := video.missing() or gl.note():

@@ -115,7 +115,7 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
     """Return the tables of some metrics of condition -> label -> trace.
 
     There is a table for each metric, with a line for each label and a column for each condition. A single condition
-    has one table, with a column for each metric. Metrics that no plant has a value of are left out.
+    has one table, with a column for each metric. Metrics that apply to no plant are left out.
     """
     every = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = {(scenario.plant, scenario.efforts[0]): None for scenario in every}
@@ -141,14 +141,14 @@ def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]
 
 
 def _cell(metric: Metric, trace: Trace | None) -> Text | str:
-    """Return a metric of a run as text: "" where there is no run, or the metric is not for its plant."""
+    """Return a metric of a run as text; "" if there is no run, or the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
     return FAILED if trace.diverged_at is not None else number(metric.of(trace))
 
 
 def _by_label(title: str, heads: Iterable[Text], width: int = 16) -> Table:
-    """Return an empty table whose lines begin with a label, shown up to a width, and go on with numbers."""
+    """Return an empty table with a column for labels, cut to a width, and columns for numbers."""
     label = Column("law", no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     return titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
@@ -247,7 +247,7 @@ def _sample(blocks: Sequence[Block]) -> str:
 
 
 def _block_cell(board: Board | None, like: Block) -> Text:
-    """Return the winner of the block with the plant and condition of `like`, and two medians; or how many are level."""
+    """Return the winner of the block with the plant and condition of `like`, and two medians; else how many tie."""
     blocks = {(block.plant, block.condition): block for block in board.blocks} if board else {}
     block = blocks.get((like.plant, like.condition))
     if board is None or block is None:

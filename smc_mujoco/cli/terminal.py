@@ -36,7 +36,7 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, and the time since it was made."""
+    """The console of a command, which also measures the time of the command."""
 
     def __init__(self):
         super().__init__()

@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import MOST, ScenarioError, number, shown, unknown, whole
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, number, shown, unknown, whole
 
-OURS = "smc_mujoco"
-LONGEST = 255  # bytes of a file's name
+PACKAGE = "smc_mujoco"
+MAX_FILE_NAME = 255  # bytes of a file's name
 _explained_types: set[type] = set()  # classes whose methods are wrapped already
 
 
@@ -40,7 +40,7 @@ def explained(value: Any) -> Any:
     """
     if isinstance(value, types.FunctionType):
         value = _explained(value)
-        value.__module__ = OURS  # where pickle finds this one
+        value.__module__ = PACKAGE  # where pickle finds this one
     if isinstance(value, type) and not issubclass(value, BaseException):
         _explain_methods(value)
     if isinstance(value, types.ModuleType):
@@ -53,7 +53,7 @@ def explained(value: Any) -> Any:
 
 def _explain_methods(kind: type) -> None:
     """Replace the public methods of one of our classes by ones whose calls name the argument that does not fit."""
-    if kind in _explained_types or kind.__module__.partition(".")[0] != OURS:
+    if kind in _explained_types or kind.__module__.partition(".")[0] != PACKAGE:
         return
     _explained_types.add(kind)
     for name, held in list(vars(kind).items()):
@@ -149,10 +149,10 @@ class _Names(dict):
     def __missing__(self, name: str) -> Any:
         if hasattr(builtins, name):
             raise KeyError(name)
-        package = sys.modules[OURS]
+        package = sys.modules[PACKAGE]
         if name in dir(package):
             return getattr(package, name)
-        for module in [module for key, module in list(sys.modules.items()) if key.startswith(f"{OURS}.")]:
+        for module in [module for key, module in list(sys.modules.items()) if key.startswith(f"{PACKAGE}.")]:
             if name in vars(module):
                 return vars(module)[name]
         return type(name, (), {})  # a type of a module that is not loaded: no value can be of it
@@ -183,7 +183,7 @@ def _text(value: Any) -> bool:
 
 def _path(value: Any) -> bool:
     text = os.fspath(value)
-    return _text(text) and all(len(part.encode()) <= LONGEST for part in Path(text).parts)
+    return _text(text) and all(len(part.encode()) <= MAX_FILE_NAME for part in Path(text).parts)
 
 
 def _number(value: Any) -> bool:
@@ -267,7 +267,7 @@ def _several(origin: type, held: list[Kind], count: int | None) -> Kind:
         if count not in (None, len(value)):
             return False
         kinds = itertools.repeat(held[0]) if count is None and held else held
-        items = itertools.islice(value, MOST)  # a long range would take minutes
+        items = itertools.islice(value, MAX_ITEMS)  # a long range would take minutes
         return all(kind.takes(item) for kind, item in zip(kinds, items, strict=False))
 
     plural = held[0].several if held else "values"

@@ -11,17 +11,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 T = TypeVar("T")
-LONGEST_NAME = 100  # characters: chosen, for tables and figures
-MOST = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-LONGEST = 1500  # characters of a message, which may hold a long path
+MAX_NAME = 100  # characters: chosen, for tables and figures
+MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
+MAX_MESSAGE = 1500  # characters of a message, which may hold a long path
 
 
 class ScenarioError(ValueError):
     """Bad input. The message is one sentence on one line: the thing, its value, the cure."""
 
     def __init__(self, message: str):
-        long = len(message) > LONGEST
-        super().__init__(printable(f"{message[: LONGEST - 503]}...{message[-500:]}" if long else message))
+        long = len(message) > MAX_MESSAGE
+        super().__init__(printable(f"{message[: MAX_MESSAGE - 503]}...{message[-500:]}" if long else message))
 
 
 class ScenarioWarning(UserWarning):
@@ -126,14 +126,14 @@ def _real(value: Any) -> Any:
 
 
 def taken(what: str, values: Iterable[T]) -> list[T]:
-    """Return the items of a user's list, or raise ScenarioError naming `what` if there are more than MOST or no end."""
+    """Return the items of a user's list, or raise ScenarioError naming `what` if there are more than MAX_ITEMS."""
     try:
         items = iter(values)
     except Exception:  # an array without axes, or a user's object that fails
         raise ScenarioError(f"{what} is {shown(values)}: give a list") from None
-    first = list(itertools.islice(items, MOST + 1))
-    if len(first) > MOST:
-        raise ScenarioError(f"{what} has more than {MOST:,} items: give fewer")
+    first = list(itertools.islice(items, MAX_ITEMS + 1))
+    if len(first) > MAX_ITEMS:
+        raise ScenarioError(f"{what} has more than {MAX_ITEMS:,} items: give fewer")
     return first
 
 
@@ -149,8 +149,8 @@ def name(what: str, value: object) -> str:
     """Return `value` if it is a name, 1 to 100 printable characters, else raise ScenarioError naming `what`."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
-    if len(value) > LONGEST_NAME:
-        raise ScenarioError(f"{what} is {shown(value)}, {len(value)} characters: give at most {LONGEST_NAME}")
+    if len(value) > MAX_NAME:
+        raise ScenarioError(f"{what} is {shown(value)}, {len(value)} characters: give at most {MAX_NAME}")
     return value
 
 

@@ -38,7 +38,7 @@ if hasattr(os, "register_at_fork"):
 def installed(control: Any) -> Iterator[None]:
     """Install this control callback, or None, and no other callback, for the length of a with block.
 
-    Afterwards all are what they were before. One thread at a time: the runs of others would go on without their laws.
+    Afterwards all callbacks are restored. Other threads wait, because their runs would continue without their laws.
     """
     with _lock:
         before = _callbacks()

@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Sequence
 
 
-class Late(Exception):
+class TimedOut(Exception):
     """A command was stopped because its time was up."""
 
 
@@ -19,7 +19,7 @@ def timed(command: Sequence[str], timeout: float, output: bool = True) -> subpro
       output: whether to keep what it prints. A user's code may print without end and fill the memory.
 
     Raises:
-      Late: its time was up.
+      TimedOut: its time was up.
       OSError: there is no such program.
     """
     pipe = subprocess.PIPE if output else subprocess.DEVNULL
@@ -36,7 +36,7 @@ def timed(command: Sequence[str], timeout: float, output: bool = True) -> subpro
     try:
         printed = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
-        raise Late from None
+        raise TimedOut from None
     finally:
         if process.poll() is None or (process.stdout and not process.stdout.closed):  # it, or what it left behind
             with contextlib.suppress(ProcessLookupError):

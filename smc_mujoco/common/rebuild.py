@@ -1,7 +1,7 @@
-"""Copies of functions that call other copies of their compiled helpers: compiled with bounds checks, or plain Python.
+"""Copies of functions in which every compiled helper is replaced, by one with bounds checks or by plain Python.
 
-numba checks array bounds only on request, and the helpers that a law calls are compiled as its author chose. So a law
-runs with copies of its helpers: compiled with checks or, in the reference loop, as plain Python functions.
+A law's author compiles its helpers, and numba checks array bounds only on request. So the callback runs a law with
+copies of its helpers that are compiled with checks, and the reference loop with the helpers' plain Python.
 """
 
 from collections.abc import Callable
@@ -12,15 +12,12 @@ from numba.core.dispatcher import Dispatcher
 
 
 def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
-    """Apply `finish` to the Python code of a function and of every compiled function that it calls.
+    """Return a copy of a function that calls copies of its compiled helpers.
 
     Args:
-      function: plain or compiled.
-      finish: called with each plain Python function; returns the one to use in its place.
-      made: functions that are finished already. Those of this call are added.
-
-    Returns:
-      `finish` of a copy of the function that calls the finished functions.
+      function: plain Python or compiled.
+      finish: called with the plain Python of each copy, such as numba.njit; returns what is used in its place.
+      made: function -> its copy, of copies that exist already. New ones are added.
     """
     return _rebuild(getattr(function, "py_func", function), finish, {} if made is None else made)
 
@@ -28,7 +25,7 @@ def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, An
 def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
     if not isinstance(function, FunctionType):
         return finish(function)
-    if function not in made and not _reaches(function):
+    if function not in made and not _calls_compiled(function):
         made[function] = finish(function)
     elif function not in made:
         space, names = dict(function.__globals__), names_in(function.__code__)
@@ -42,7 +39,7 @@ def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
 
 
 def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
-    """Return a compiled function rebuilt; a module with its functions of these names rebuilt; else the value."""
+    """Return the copy of a compiled function, a copy of a module with its functions of these names, or the value."""
     if isinstance(value, Dispatcher):
         return _rebuild(value.py_func, finish, made)
     if isinstance(value, ModuleType) and _holds(value, names):
@@ -53,7 +50,8 @@ def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
     return value
 
 
-def _reaches(function: FunctionType) -> bool:
+def _calls_compiled(function: FunctionType) -> bool:
+    """Return whether a function refers to a compiled function, by name or in a module."""
     names = names_in(function.__code__)
     values = [function.__globals__[name] for name in names if name in function.__globals__]
     values += [cell.cell_contents for cell in function.__closure__ or ()]

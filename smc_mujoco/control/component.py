@@ -130,7 +130,7 @@ class Component:
     def named(self, name: str) -> "Component":
         """Return the same function and gains under another name, to compare two sets of gains of one law.
 
-        Tables and figures show the name, and its runs count as other runs.
+        Tables and figures show the name, and runs under different names are different runs.
 
         Raises:
           ScenarioError: not a name of 1 to 100 printable characters.
@@ -161,7 +161,7 @@ def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str = 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Template:
-    """A function with the properties its decorator states.
+    """A function with the properties that its decorator gives it.
 
     Attributes:
       gains: name -> default, unit and range.
@@ -212,7 +212,7 @@ class Template:
 
     @property
     def doc(self) -> str:
-        """The docstring of the function's module if it has a file of its own, else the function's."""
+        """The docstring of the function's module if the module has the function's name, else the function's."""
         module = inspect.getmodule(self.function)
         own = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
@@ -338,7 +338,7 @@ def template(
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
             if name not in stated:
-                raise unknown("gain with a sign", name, stated)
+                raise unknown(f"gain that is {sign}", name, stated)
             stated[name] = dataclasses.replace(stated[name], **{sign: True})
 
     def decorate(function: Callable) -> Template:

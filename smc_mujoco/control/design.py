@@ -25,7 +25,7 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
     if plant.underactuated:
         raise ScenarioError(
             f"{plant.name}'s channel {plant.driven} has no actuator, and lqr does not see such a joint: "
-            "take a law that does, 'hierarchical'"
+            "take the law 'hierarchical', which does"
         )
     rows = [_channel(plant, i) for i in range(plant.n)]
     for i, (_, _, b) in enumerate(rows):

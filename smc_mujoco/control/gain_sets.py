@@ -3,7 +3,7 @@
     law("duffing", "classical")                # tuned by the rule of `tuning`, with a cost of the variation of u
     law("duffing", "classical", "study")       # as first chosen
 
-- study: a first tuning of the paper's laws to the same bound |u| <= 6, kept whatever the results.
+- study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the result of `tuning` for every general law, with 96 evaluations and a cost of the variation of u. The laws of
   LAWS are tuned from three seeds, so that their results show the spread of tuning; all others from one. Three tunings
   are three samples of this spread, however many runs use them in turn.
@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
 # The laws on the report's first page: the four of the paper, two added by its first study, and the first law of each
-# other family in the table of docs/catalogue.md. The table was older than all tunings.
+# other family in the table of docs/catalogue.md, which was written before any tuning.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
@@ -42,7 +42,7 @@ FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", 
 FORMS["super_twisting_unclamped"] = "super_twisting"
 SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
-# The set "study": plant -> law -> gains. Super-twisting was tuned with its integral limited to u_max, and runs so.
+# The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with it.
 STUDY: dict[str, dict[str, dict[str, float]]] = {
     "inverted_pendulum": {
         "observer_free": {"lam": 4.364, "k1": 9.708},
@@ -100,11 +100,11 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     find("set of gains", gains, dict.fromkeys((*SETS, "default")))
     if gains == "default":
         return base
-    machine = find_plant(plant) if isinstance(plant, str) else plant
+    plant = find_plant(plant) if isinstance(plant, str) else plant
     if gains == "study":
-        values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(machine.name)])
+        values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)])
     else:
-        values = _tuned(machine, FORMS.get(name, name), gains, seed)
+        values = _tuned(plant, FORMS.get(name, name), gains, seed)
     return dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
 
 
@@ -145,8 +145,8 @@ def paper_plant(plant: object) -> str:
         find("plant of the paper's study", plant, STUDY)
         return plant
     raise ScenarioError(
-        f"plant is {shown(plant)}, and the paper's plants, which have conditions and gains, are {', '.join(STUDY)}: "
-        "give one of these, or smc.study scenarios of your own"
+        f"plant is {shown(plant)}, and the paper's study has conditions and gains only for {', '.join(STUDY)}: "
+        "give one of these, or give smc.study your own scenarios"
     )
 
 
@@ -161,10 +161,10 @@ def _tuned(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float
     if path.is_file():
         return _read(path)
     example = next(iter(find_law(name).gains), "k")
-    cure = f"give the law with gains of its own, as {name}({example}=...)"
+    cure = f"give the law's gains yourself, as {name}({example}=...)"
     if not plant.unscaled:
         cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
-    cure += ", or take default ones (--gains default)"
+    cure += ", or take the defaults (--gains default)"
     raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
 
 

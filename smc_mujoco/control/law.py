@@ -141,11 +141,11 @@ def law_function(
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
       rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
-      family: in a word, such as "terminal", to find the law by.
+      family: one word, such as "terminal", by which lists group the laws.
       continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws of e), however short
         the control period. Default: no.
       finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e", the error; "s", the
-        sliding variable, after which e decays as the surface says; "", the default, neither.
+        sliding variable, so that e then decays as on the surface; "", the default, neither.
 
     The function must be pure: state belongs in memory, parameters in gains. A compiled function keeps the values that
     its globals and closure had at compilation, and its random numbers would come from a shared generator. Each new
@@ -171,7 +171,7 @@ def checked_name(law: Law) -> Law:
     if known is None or law.function in (None, known.function):
         return law
     raise ScenarioError(
-        f"law {law.name!r} is yours and has the name of one of the library: rename its function, or give "
+        f"your law {law.name!r} has the name of a law of the library: rename its function, or give "
         f"law.named('my_{law.name}')"
     )
 
@@ -197,7 +197,7 @@ def laws(plant: Plant | str | None = None) -> list[str]:
     """List the names that `law` knows; with a plant, only those of laws for this plant.
 
     A law that names no plants is for every plant whose channels all have an actuator. `none` is for every plant. A law
-    for joints without an actuator is also for models of your own with such joints.
+    for joints without an actuator is also for your own models with such joints.
     """
     if plant is None:
         return list(catalogue())

@@ -175,8 +175,8 @@ def policy(act: Any, *, reference: bool = False) -> Law:
       reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
 
     The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
-    ONNX and torch get it as a batch of one in the network's own type. A policy that looks ahead must make and step its
-    environments in its own thread. In another thread they would wait for the run to end, and the run for them.
+    ONNX and torch get it as a batch of one in the network's own type. A policy that simulates ahead must make and step
+    its environments in the thread that calls it. In another thread they and the run would wait for each other forever.
 
     Raises:
       ScenarioError: none of these, no such file, or a library that is not installed.

@@ -3,8 +3,8 @@
     suitable(["continuous", "two-gains"], family="terminal")     # templates of laws
     reads(smc.law("pid").template)                               # {"e", "de", ...}: what the law measures
 
-A property is derived from the law's code where that is possible. What only theory says, continuity and finite time,
-stands in the law's decorator. Tests compare both with what the law does.
+A property is derived from the law's code where that is possible. Continuity and finite time, which only theory tells,
+are given in the law's decorator. Tests compare both kinds with what the law does.
 """
 
 import ast
@@ -23,7 +23,7 @@ VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor
 
 
 class Property(NamedTuple):
-    """A property of a law: its words, as in "laws that need no model", and the function that tells it."""
+    """A property of a law: its words, as in "laws that need no model", and the function that tests it."""
 
     words: str
     holds: Callable[[Template], bool]
@@ -35,7 +35,7 @@ def reads(law: Template) -> frozenset[str]:
 
 
 def searched(law: Template) -> list[str]:
-    """Return the names of the gains that must be chosen for a plant: those that tuning does not hold."""
+    """Return the names of the gains that tuning searches: those that must be chosen for a plant."""
     return [name for name, gain in law.gains.items() if not gain.held]
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 WINDOW = 0.01, 40  # of a mean: share of the run, and fewest samples; chosen, see `window`
-STILL = 2e-3  # of the largest value: smaller steps between samples are no moves
-REVERSALS = 6  # so many in a row are chattering, if each follows within a quarter of a window
+STILL = 2e-3  # of the largest value: smaller steps between samples do not count as moves
+REVERSALS = 6  # this many in a row are chattering, if each follows within a quarter of a window
 POINTS = 250  # parts of a line, of which the least and the largest value are kept
 
 

@@ -237,7 +237,7 @@ def signals(
     traces = [finite(trace) for trace in traces]
     cells = {(trace.scenario.law.name, column): trace for trace, column in zip(traces, columns, strict=True)}
     if len(cells) < len(traces):
-        raise ScenarioError("two traces of one law under one condition: give each condition a label of its own")
+        raise ScenarioError("two traces of one law under one condition: give each condition its own label")
     group, *others = [group for group in style.split(traces) if group.driven]
     if others:
         raise ScenarioError(f"u of {traces[0].scenario.plant.name} has several units: draw it with smc.figure")

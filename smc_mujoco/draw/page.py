@@ -57,7 +57,7 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
     """
     if fig is not None:
         if size is not None:
-            raise ScenarioError(f"size is {shown(size)}, and fig has one already: give one of the two")
+            raise ScenarioError(f"size is {shown(size)}, but fig already has a size: give one of the two")
         box = fig.bbox.transformed(fig.dpi_scale_trans.inverted())
         return box.width, box.height
     if size is None:
@@ -132,7 +132,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
 def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:
     """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
 
-    ".5" in "lam_0.5" and ".b c" in "a.b c" are no endings.
+    ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings.
 
     Raises:
       ScenarioError: no name, an unknown format or ending, or an ending that contradicts the format.

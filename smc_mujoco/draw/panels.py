@@ -20,23 +20,22 @@ from smc_mujoco.draw.decimate import columns, end, line, stretches, window
 from smc_mujoco.draw.states import HOLD, at_rest, has_dry_friction
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
-from smc_mujoco.simulation.reference import LEFT_THE_WORLD
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 COLUMNS = 360  # of a panel
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # height of the close-up, as a share of the largest |u|: hides round-off; chosen
 MAX_LIGHT = 9  # channels of a network that are drawn one by one
-LASTING = 0.98  # quantile of |reaction| that a panel shows in full; what is larger are blows; chosen
+LASTING = 0.98  # quantile of |reaction| that a panel shows in full; larger values are blows; chosen
 MAX_RESTS = 12  # marked in a phase portrait
 SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
-MAX_SMALL = 12  # channels that have small panels of their own
+MAX_SMALL = 12  # channels that each have two small panels
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
 DASH = 5.0  # widths of a line
 TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
-JUMP = 2.0  # a rate of the reference so many times its 99 % quantile is that of a jump; chosen
-REALISM = ("force", "reaction")  # quantities of realistic mechanisms alone
+JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
+REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
 UNBANDED = ("x", "e", "spread")  # drawn sample by sample, without a mean over time
 
 REFERENCE = "reference"  # id of its lines
@@ -375,8 +374,7 @@ def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
     for trace in traces if not seen else ():
         y = QUANTITIES[name](trace)
-        left = trace.failure is None or trace.failure.startswith(LEFT_THE_WORLD)
-        seen.append(y[: max(1, int(0.8 * len(y)))] if left else y)
+        seen.append(y[: max(1, int(0.8 * len(y)))] if trace.plant_diverged else y)
     seen = [y for y in seen if np.isfinite(y).all()] or [np.zeros(1)]
     return float(min(y.min() for y in seen)), float(max(y.max() for y in seen))
 

@@ -21,7 +21,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 
 HEIGHT = 6.4  # inches on a full page
-MIN_VARIATION = 1e-6  # 1/s, drawn for smaller ones, because the axis is logarithmic
+MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis is logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 CHOSEN = {"mfc": "none", "lw": 0}
 

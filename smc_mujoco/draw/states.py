@@ -47,7 +47,9 @@ def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
     steps = [0] if scenario.jump is None else [0, scenario.jump_step]
     compiled = assembly.model([scenario])
-    return [Shape(step * scenario.resolved.physics_step, assembly.numbered(compiled, scenario, step)) for step in steps]
+    return [
+        Shape(step * scenario.resolved.physics_step, assembly.with_values(compiled, scenario, step)) for step in steps
+    ]
 
 
 def timeline(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | None]:

@@ -22,7 +22,6 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
-from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.trace import Trace
 
@@ -263,8 +262,7 @@ def ending(trace: Trace) -> str:
     """Return how a run failed: "diverged at 0.4 s" (the plant) or "failed at 0.4 s" (its law); "" if it did not."""
     if trace.diverged_at is None:
         return ""
-    off = trace.failure is None or trace.failure.startswith(reference.LEFT_THE_WORLD)
-    return f"{'diverged' if off else 'failed'} at {trace.diverged_at:.3g} s"
+    return f"{'diverged' if trace.plant_diverged else 'failed'} at {trace.diverged_at:.3g} s"
 
 
 def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:

@@ -27,7 +27,7 @@ from smc_mujoco.simulation.scenario import Scenario
 GAIN = "gain:"  # prefix of the sliders' names
 SPACE = 32  # code of the key in GLFW
 FRAME = 1.0 / 60.0  # s, of most screens
-MAX_FRAME = 0.1  # s, most time that a frame simulates and takes, so that slow runs still respond to the mouse
+MAX_FRAME = 0.1  # s, longest time that a frame simulates and takes, so that slow runs still respond to the mouse
 SETTLED = 30  # frames without a change after which gains are printed: half a second
 
 
@@ -103,7 +103,7 @@ class Live:
 
     def build(self, step: int) -> None:
         """Give the model on screen the true parameters that hold from a physics step on."""
-        for name, value in assembly.numbers(self.loop.compiled, self.loop.scenario, step).items():
+        for name, value in assembly.field_values(self.loop.compiled, self.loop.scenario, step).items():
             array(self.model, name)[: len(value)] = value  # sliders are the last actuators
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 

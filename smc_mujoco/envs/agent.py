@@ -3,8 +3,8 @@
     act = smc.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-The code of the reference loop calls the law, so it sees what it would see in `smc.run`, and its episode is the trace of
-that run.
+The reference loop calls the law, so the law measures the same as in `smc.run`, and the episode equals the trace of that
+run.
 """
 
 import dataclasses

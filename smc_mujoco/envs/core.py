@@ -76,7 +76,7 @@ class Setting:
         changes = _checked({} if changes is None else changes, task)
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
         if math.inf in self.scenario.limits:
-            raise ScenarioError("u_max is inf: give a finite one, which actions are multiplied by")
+            raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)
         self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
         self.model = _compiled(self.scenario, edit)
@@ -240,7 +240,7 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
         raise ScenarioError(f"reference {failure}: give another") from None
     if not (finite := np.isfinite(references).all(axis=1)).all():
         at = f"t = {times[np.argmin(finite)]:.6g} s"
-        raise ScenarioError(f"reference {shown(scenario.reference)} is no finite number at {at}: give another")
+        raise ScenarioError(f"reference {shown(scenario.reference)} is not a finite number at {at}: give another")
     return references
 
 
@@ -251,4 +251,4 @@ def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     model = ready(spec, 0)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
-    return assembly.numbered(model, scenario)
+    return assembly.with_values(model, scenario)

@@ -1,9 +1,9 @@
 """Ids of the plants in gymnasium: "smc/CartPole-v0", and "Duffing-v0" where gymnasium has no environment of that name.
 
 gymnasium has no plugins: `gymnasium.make("smc_mujoco:Duffing-v0")` imports this package and then looks the id up. So
-importing this package registers the ids, if gymnasium has been imported; if not, the next import of the package does
-(see `smc_mujoco.__init__`). The package does not import gymnasium itself, which is optional and slow to import.
-This module is light: it reads the names of the plants from their files.
+importing this package registers the ids if gymnasium has been imported; otherwise a later import of the package does
+(see `smc_mujoco.__init__`). The package does not import gymnasium itself, which is optional and slow to import. This
+module imports no plant: it reads the names of the plants from their files.
 """
 
 import pkgutil

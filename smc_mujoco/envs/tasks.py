@@ -31,9 +31,7 @@ from smc_mujoco.simulation.signals import Sine
 LN10 = math.log(10.0)
 RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
 SWING_UP_SPREAD = 0.1  # rad, largest distance from hanging at the start of a swing-up: chosen
-SWING_UP_TORQUE = (
-    0.5  # u_max of a swing-up, over the torque that holds the pendulum level: chosen, too weak for one push
-)
+SWING_UP_TORQUE = 0.5  # u_max of a swing-up, of the torque that holds the pendulum level: chosen, too weak for one push
 TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `track`: chosen
 
 Pair = tuple[np.ndarray, np.ndarray]
@@ -149,10 +147,10 @@ def reward(e: np.ndarray, w: np.ndarray) -> Any:
 
 def tasks(plant: Plant | str) -> list[str]:
     """Return the names of the tasks that a plant has."""
-    machine = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(machine, Plant):
+    found = find_plant(plant) if isinstance(plant, str) else plant
+    if not isinstance(found, Plant):
         raise ScenarioError(f"plant is {shown(plant)}: give smc.plant(...) or one of the names smc.plants() lists")
-    return [name for name, task in TASKS.items() if task.fits(machine)]
+    return [name for name, task in TASKS.items() if task.fits(found)]
 
 
 def starts(task: Task, plant: Plant) -> Pair:

@@ -3,8 +3,8 @@
     environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
 
 Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy begins the next
-one as gymnasium's own vectors do: in the next step, which ignores the action (AutoresetMode.NEXT_STEP, the default), in
-the same step, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
+one as gymnasium's own vector environments do: in the next step, which ignores the action (AutoresetMode.NEXT_STEP, the
+default), in the same step, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
 """
 
 import math
@@ -114,7 +114,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
           Observations, rewards, terminated, truncated and infos, as in gymnasium.
         """
         if not self.randoms:
-            raise ScenarioError("these environments have not begun: call reset first")
+            raise ScenarioError("no episode has begun: call reset first")
         anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
         if anew.any() and mode is AutoresetMode.DISABLED:
             raise ScenarioError(f"the episode of copy {np.argmax(anew)} is over: reset it with the option reset_mask")
@@ -180,7 +180,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             cure = f"give an array of {self.num_envs} bools, one of them True"
             raise ScenarioError(f"reset_mask is {shown(mask)}: {cure}")
         if not self.randoms:
-            raise ScenarioError("reset_mask is for environments that have begun: call reset without it first")
+            raise ScenarioError("reset_mask needs episodes that have begun: call reset without it first")
         return mask, {name: value for name, value in options.items() if name != "reset_mask"}
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Protocol
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import MOST, ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
@@ -25,7 +25,7 @@ from smc_mujoco.common.registry import modules
 
 DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
-LARGEST = 1e15  # SI units; no parameter of a mechanism is larger
+MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 
@@ -180,7 +180,7 @@ class Plant:
         """Why tuning cannot derive its scales from the plant, or ""."""
         if self.underactuated or self.mixed:
             return "it has free joints, or channels of two units: choose a plant that has neither"
-        return f"it has no nominal model, of which tuning takes its scales: {self.unmodelled}" * bool(self.unmodelled)
+        return f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}" * bool(self.unmodelled)
 
     def spec(self) -> mujoco.MjSpec:
         """Return the mechanism as an editable MjSpec, with default parameters."""
@@ -193,7 +193,7 @@ class Plant:
           factors: parameter name -> factor on its value (the true plant's mismatch).
           nuserdata: length of mjData.userdata.
         """
-        model = ready(self.spec(), whole("nuserdata", nuserdata, 0, MOST))
+        model = ready(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
@@ -209,7 +209,7 @@ class Plant:
                 raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
             values[name] *= factor
         for name, value in values.items():
-            if not abs(value) <= LARGEST or (value <= 0.0 and name in self.positive):
+            if not abs(value) <= MAX_PARAMETER or (value <= 0.0 and name in self.positive):
                 raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
         return Values(**values)
 
@@ -217,7 +217,7 @@ class Plant:
 def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
-    # else MuJoCo would reset a diverging run to the initial state and go on
+    # otherwise MuJoCo would reset a diverging run to the initial state and continue
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET.value
     return compiled(spec)
 
@@ -259,8 +259,8 @@ def plant(name: str, **parameters: float) -> Plant:
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
-        above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -LARGEST)
-        values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=LARGEST)
+        above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -MAX_PARAMETER)
+        values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=MAX_PARAMETER)
     for key in base.dry:
         number(f"{name}'s {key}", values[key], least=0.0)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
-HIGH = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
+HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
 
 
@@ -219,7 +219,7 @@ def hf_share(trace: Trace) -> float:
     power = (np.abs(np.fft.rfft(u, axis=0)) ** 2).sum(axis=1)
     power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
     frequency = np.arange(power.size) / (t[-1] - t[0])
-    return power[frequency > HIGH * (1 + CONSTANT)].sum() / power[1:].sum()
+    return power[frequency > HIGH_PASS * (1 + CONSTANT)].sum() / power[1:].sum()
 
 
 @metric("s", realistic=True)

@@ -151,8 +151,8 @@ def refuse(trace: Trace) -> None:
         why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
     else:
         return
-    fault = trace.failure is not None and "left the finite world" not in trace.failure  # of a law or a signal
-    cure = "mend that" if fault else "change the gains or u_max, or end the run earlier"
+    fault = trace.failure is not None and not trace.plant_diverged
+    cure = "correct the law or signal" if fault else "change the gains or u_max, or end the run earlier"
     run = f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
     raise ScenarioError(f"{run} has no score, {why}: {cure}")
 

@@ -1,1 +1,1 @@
-"""From a scenario to a trace."""
+"""Runs: from a scenario to a trace."""

@@ -21,11 +21,11 @@ from smc_mujoco.simulation.trace import Trace, from_log
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
-FOREIGN_STEPS = 200  # of an own model: with its contacts MuJoCo takes 0.1 s and more a step once it has diverged
+USER_MODEL_STEPS = 200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
 FULL = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 OVERFLOWED = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 
-Report = Callable[[int], None]  # told the number of simulated steps just done
+Report = Callable[[int], None]  # called with the number of steps since its last call
 
 
 class Chunk:
@@ -36,11 +36,11 @@ class Chunk:
         self.scenarios = scenarios = [one.resolved for one in self.given]
         first, count = scenarios[0], len(scenarios)
         self.compiled = assembly.model(scenarios, nuserdata=callback.USERDATA)
-        self.model = assembly.numbered(self.compiled, first)
+        self.model = assembly.with_values(self.compiled, first)
         self.channels = channels(self.model)
         self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
         self.records = np.zeros(count, state.SIMULATION)
-        self.packed = []  # whose addresses stand in the records
+        self.packed = []  # the arrays whose addresses are in the records
         for i, (one, log) in enumerate(zip(prepared, self.logs, strict=True)):
             self.records[i], packed = pack(one, self.channels, log, self.model.nq, self.model.nv)
             self.packed.append(packed)
@@ -75,7 +75,7 @@ class Chunk:
         """Set the true parameters that hold from a step on."""
         derived = []
         for i in indices:
-            for name, value in assembly.numbers(self.compiled, self.scenarios[i], step).items():
+            for name, value in assembly.field_values(self.compiled, self.scenarios[i], step).items():
                 held = self.fields[name][i] if name in self.fields else array(self.model, name)
                 if np.any(held != value):
                     self.fields[name] = self.batch.expand(name)
@@ -87,18 +87,18 @@ class Chunk:
     def fill_histories(self) -> None:
         """Fill the history of late sensors with the initial state."""
         history = self.batch.bind("history")
-        model, data = assembly.numbered(self.compiled, self.scenarios[0]), mujoco.MjData(self.model)
+        model, data = assembly.with_values(self.compiled, self.scenarios[0]), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
             data.qpos[:], data.qvel[:] = assembly.start(model, scenario)
-            assembly.put_numbers(model, self.compiled, scenario, 0)
+            assembly.put_values(model, self.compiled, scenario, 0)
             encoder.remember(model, data)
             history[i] = data.history
 
     def advance(self, steps: int, report: Report) -> None:
-        """Step the simulations that still run, in slices, so that progress shows and Ctrl-C is heard."""
+        """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
         size = len(self.scenarios) * self.scenarios[0].plant.n
         while steps:
-            most = FOREIGN_STEPS if self.scenarios[0].plant.direct else SLICE_STEPS // size
+            most = USER_MODEL_STEPS if self.scenarios[0].plant.direct else SLICE_STEPS // size
             count = min(steps, max(1, most))
             calls = count * self.scenarios[0].stages
             self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count), calls)
@@ -106,10 +106,10 @@ class Chunk:
             steps -= count
 
     def attempt(self, action: Callable[[np.ndarray], None], calls: int) -> None:
-        """Do something to the simulations that still run; note those in which MuJoCo raises, or that lack calls.
+        """Do something to the simulations that still run. Mark those in which MuJoCo raises or skips the callback.
 
         Args:
-          calls: how often it has the callback called in each.
+          calls: how often MuJoCo should call the callback in each.
         """
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
@@ -124,7 +124,7 @@ class Chunk:
         except (ValueError, mujoco.UnexpectedError) as error:
             if "allocate memory" in str(error):
                 raise
-            # someone's Python function took the callback's place; the count of calls tells
+            # another Python callback replaced ours; the count of calls shows it below
         short = [i for i in alive if i not in self.errors and records["calls"][i] != self.calls]
         records["failure"][short] = state.INTERRUPTED
         records["failed_step"][short] = before // self.scenarios[0].stages
@@ -153,7 +153,7 @@ class Chunk:
                 return failure_in_python.rpartition(", at t = ")[0]
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
         return {
-            state.DIVERGED: self.errors.get(i, reference.LEFT_THE_WORLD),
+            state.DIVERGED: self.errors.get(i, reference.PLANT_DIVERGED),
             state.NOT_FINITE: f"{law} returned NaN, inf or a command above {controller.MAX_CONTROL:g}",
             state.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
             state.ESTIMATOR_RAISED: f"{estimator} raised an exception",
@@ -168,10 +168,10 @@ class Chunk:
 
 
 def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
-    """Return why a simulation failed, in the words of Python, which compiled functions lack.
+    """Return why a simulation failed, from Python's exception, whose text compiled functions lack.
 
-    The function that failed is called once more, in Python, with what its record still holds, so the words depend on
-    nothing but the run. Return None if it does not fail again, because it had already changed its memory.
+    The function that failed is called once more, in Python, with the inputs in its record, so the text depends only on
+    the run. Return None if it does not fail again, because it had already changed its memory.
     """
     n = s.plant.n
     joints = state.view(packed.numbers, int(record["joints"]), (2 + 4 * n,))

@@ -3,8 +3,8 @@
     with installed():
         batch.step(nstep=1000)
 
-The callback is global to the process, so `installed` holds a lock, and puts back what was there before. In simulations
-of others the callback does nothing. It recognises ours by the magic number in their userdata.
+The callback is global to the process, so `installed` holds a lock, and restores the callback that was there before. The
+callback acts only in this package's simulations, which it recognises by the magic number in their userdata.
 """
 
 # pyright: reportCallIssue=false
@@ -25,7 +25,7 @@ from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.state import simulation_at
 
-with mjcb.installed(None):  # this import compiles a model, so do it before it would have to wait for a run of ours
+with mjcb.installed(None):  # this import compiles a model; imported later, it would wait for a run to end
     import mujoco.batch
 
 USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simulation's record
@@ -33,9 +33,9 @@ USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simul
 
 @functools.cache
 def magic() -> float:
-    """Magic number that marks our userdata.
+    """Magic number that marks this package's userdata.
 
-    A hash of the sources, so that a stale compiled callback ignores a record written by newer code.
+    It is a hash of the sources, so that an outdated compiled callback ignores a record written by newer code.
     """
     rooms = Path(__file__).parent, Path(__file__).parents[1] / "common", Path(__file__).parents[1] / "control"
     sources = b"".join(path.read_bytes() for room in rooms for path in sorted(room.glob("*.py")))

@@ -1,4 +1,4 @@
-"""Channels: where each degree of freedom that a law sees stands in the mjData of a compiled model."""
+"""Channels: the indices in mjData of each degree of freedom that a law sees."""
 
 import mujoco
 import numpy as np
@@ -34,8 +34,8 @@ _LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
 def channels(model: mujoco.MjModel) -> np.ndarray:
     """Return the channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each other joint.
 
-    A disturbance d acts on the body that carries the joint, as a force along the axis of a slide or a torque about that
-    of a hinge, so that its generalised force is d. A horizontal one acts on the centre of mass.
+    A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque about the axis of a
+    hinge, so that its generalised force is d. A horizontal force acts on the body's centre of mass.
 
     Raises:
       ScenarioError: an actuator does not drive a hinge or slide with gear 1, or its joint lacks a position or velocity
@@ -58,9 +58,9 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     name = f"actuator {model.actuator(drive).name!r}" if drive >= 0 else f"sensor of joint {model.joint(joint).name!r}"
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
-        raise ScenarioError(f"{name} is on no hinge or slide joint: give it one")
+        raise ScenarioError(f"{name} is not on a hinge or slide joint: give it one")
     direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECTLY) >= 0
-    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct one may be any
+    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct channel may have any axis
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))

@@ -61,7 +61,7 @@ def component(kind: str, value: object) -> Component:
     if isinstance(made, Component) and made.kind == kind:
         return made
     field = "velocity" if kind == "estimator" else kind
-    raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), one of your own, or a name")
+    raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
 def state(name: str) -> Callable[[float | Sequence[float] | None], tuple[float, ...] | None]:
@@ -80,7 +80,7 @@ def state(name: str) -> Callable[[float | Sequence[float] | None], tuple[float, 
 
 
 def per_channel(name: str, values: tuple[float, ...] | None, n: int) -> tuple[float, ...] | None:
-    """Return n positions or rates, from n numbers or one; none may be where a run has already diverged."""
+    """Return n positions or rates, from n numbers or one. A run beyond MAX_STATE has diverged, so none may be there."""
     if values is None:
         return None
     if len(values) not in (1, n):
@@ -90,7 +90,7 @@ def per_channel(name: str, values: tuple[float, ...] | None, n: int) -> tuple[fl
 
 
 def physics_step(value: object, period: float, least: float) -> float | None:
-    """Return a step that divides the control period exactly, from one that does up to rounding; s."""
+    """Return a step, s, that divides the control period exactly, from one that does so up to rounding."""
     if value is None:
         return None
     h = number("physics_step", value, above=0.0, least=least)
@@ -188,8 +188,8 @@ def actuator(value: Actuator | Sequence[Actuator] | None) -> tuple[Actuator, ...
         raise ScenarioError(f"actuator has {len(drives)} drives, {shown(items)}: give one, or two in series")
     if len(drives) == 2 and not isinstance(drives[0], Lag):
         raise ScenarioError(
-            f"actuator has {shown(drives[0])} before {shown(drives[1])}, and of two drives in series the first is a "
-            f"Lag: give one drive, or (smc.Lag(0.01), another)"
+            f"actuator has {shown(drives[0])} before {shown(drives[1])}, but the first of two drives in series must be "
+            f"a Lag: give one drive, or (smc.Lag(0.01), another)"
         )
     return tuple(sorted(items, key=lambda part: not part.drives))
 

@@ -1,10 +1,11 @@
-"""Conditions: what a plant has to be controlled in, as named fields of a Scenario, for any plant.
+"""Conditions: noise, disturbances, delays and other circumstances of a run, as named fields of a Scenario.
 
     worn = smc.condition("worn gear", friction=smc.Coulomb(0.05), actuator=smc.Backlash(0.02))
     smc.grid(["duffing"], ["classical"], ["nominal", worn, "noise + delay_10ms"], seeds=16)
 
-The conditions of the suite have names, such as "noise", and stand in `NAMED`. Names joined by "+" hold at once. As
-text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed and never evaluated:
+A condition applies to any plant. Those of the suite are in `NAMED`, under names such as "noise". Names joined by "+"
+apply together. As text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed
+and never evaluated:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
@@ -105,7 +106,7 @@ class Condition:
 
 
 def condition(name: str, **fields: Any) -> Condition:
-    """Return a condition of your own, for `grid`, `tune`, `margins` and `basin`.
+    """Return your own condition, for `grid`, `tune`, `margins` and `basin`.
 
     Args:
       name: its name in tables and figures; not a name of the suite.
@@ -122,7 +123,7 @@ def condition(name: str, **fields: Any) -> Condition:
         raise ScenarioError(f"condition {name!r} has no fields: give some, such as friction=smc.Coulomb(0.05)")
     for field in fields:
         if field in OTHERS:
-            raise ScenarioError(f"condition {name!r} sets {field}, which the grid itself says: leave it out")
+            raise ScenarioError(f"condition {name!r} sets {field}, which the grid sets itself: leave it out")
         if field not in FIELDS:
             raise unknown("field of a Scenario", field, FIELDS)
     return Condition(name, fields)
@@ -160,8 +161,8 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 def parse(text: str) -> Condition:
     """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)".
 
-    Values are numbers, texts, lists, dicts, and calls of parts, signals and estimators: those of the suite, and a
-    user's own that are imported. Nothing is evaluated.
+    Values are numbers, texts, lists, dicts, and calls of parts, signals and estimators. These may be the suite's or
+    imported ones of the user. Nothing is evaluated.
 
     Raises:
       ScenarioError: the text cannot be read, or names something unknown.
@@ -238,7 +239,7 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 
 def _kinds() -> dict[str, Any]:
-    """Return name -> class of all parts and signals, users' own included. Of equal names the suite's class counts."""
+    """Return name -> class of all parts and signals, also of users'. The suite's comes before its namesakes."""
     kinds: list[type] = [Noise, Jump, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
@@ -282,7 +283,7 @@ def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) ->
 
 
 def _equal(one: Any, other: Any) -> bool:
-    """Return whether two values are equal; no, if comparing them fails, as with arrays."""
+    """Return whether two values are equal; False if comparing them fails, as with arrays."""
     try:
         return bool(one == other)
     except Exception:
@@ -306,7 +307,7 @@ def _contact(plant: Plant, duration: float) -> Fields:
     """Return a blow against the obstacles of a plant: its neighbours, or stops."""
     if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
         return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
-    raise ScenarioError(f"condition 'contact' asks for stops, and plant {plant.name!r} has none: choose another")
+    raise ScenarioError(f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another")
 
 
 IDEAL: dict[str, Recipe] = {

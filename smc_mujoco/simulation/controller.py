@@ -9,8 +9,8 @@ in series. At every stage, disturbance(t) goes to xfrc_applied. Each sample is l
 last one.
 
 Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
-again, so the clock cannot distinguish a sample from a last stage. A run that leaves the finite world, or whose law
-raises an exception, is marked in its record and gets no more control. The simulations beside it go on.
+again, so the clock cannot distinguish a sample from a last stage. A run that diverges, or whose law raises an
+exception, is marked in its record and gets no more control. The other simulations of the batch continue.
 """
 
 # pyright: reportCallIssue=false
@@ -65,9 +65,9 @@ def control(at, sim, data):
     failure = record.FINE
     if stage == 0:
         _sum_forces(sim, data)
-        if _escaped(sim, data):
+        if _diverged(sim, data):
             failure = record.DIVERGED
-        elif k >= sim.samples:  # somebody steps the simulation beyond its end
+        elif k >= sim.samples:  # the simulation is stepped beyond its end
             failure = record.INTERRUPTED
         elif within == 0:
             failure = _measure(at, sim, data, k)
@@ -85,8 +85,8 @@ def control(at, sim, data):
 
 
 @njit(error_model="numpy", inline="always")
-def _escaped(sim, data):
-    """Return whether the mechanism has left the finite world."""
+def _diverged(sim, data):
+    """Return whether a position or velocity of the mechanism is NaN or above MAX_STATE."""
     for i in range(sim.nq):
         if not abs(data.qpos[i]) < MAX_STATE:
             return True
@@ -98,7 +98,7 @@ def _escaped(sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _call(function, i, inputs, outputs):
-    """Call a function for channel i, with addresses of what it gets and gives. Return 0, or 1 if it raised."""
+    """Call a function for channel i, with the addresses of its inputs and outputs. Return 0, or 1 if it raised."""
     return call(function.address, inputs, function.parameters, function.memory + i * function.stride, outputs)
 
 
@@ -253,9 +253,9 @@ def _clear(data, channel):
 
 @njit(error_model="numpy")
 def _disturb(at, sim, data, t):
-    """Apply the disturbances at time t, s. Return a failure code.
+    """Apply the sum of the disturbances at time t, s, to the body of each channel, or to its joint in a user's model.
 
-    Their sum acts on the body of each channel, in users' models on its joint.
+    Return a failure code.
     """
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed

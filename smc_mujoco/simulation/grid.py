@@ -2,7 +2,7 @@
 
     scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
 
-Plants, laws and conditions may be those of the suite, by name, or your own.
+Plants, laws and conditions are names of the suite's, or your own objects.
 """
 
 import warnings
@@ -12,7 +12,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import MOST, ScenarioError, ScenarioWarning, one_line, shown, taken, users_frame, whole
+from smc_mujoco.common.errors import (
+    MAX_ITEMS,
+    ScenarioError,
+    ScenarioWarning,
+    one_line,
+    shown,
+    taken,
+    users_frame,
+    whole,
+)
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
@@ -22,7 +31,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
-from smc_mujoco.simulation.model import model, numbered, start
+from smc_mujoco.simulation.model import model, start, with_values
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import REST, U_MAX, Scenario
 
@@ -44,8 +53,8 @@ def grid(
 
     Args:
       plants: names or Plants, one or several.
-      laws: names, with gains from the set `gains`, or laws with gains of their own.
-      conditions: names, such as "noise" or "noise + coulomb", or conditions of your own, see `condition`.
+      laws: names, which get their gains from the set `gains`, or laws with their own gains.
+      conditions: names, such as "noise" or "noise + coulomb", or your own conditions, see `condition`.
       seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise, the same in every
         condition and under every law; see `starts`. If a law was tuned several times, the seed also selects which of
         its gains are used.
@@ -54,16 +63,16 @@ def grid(
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: an unknown name, different plants, laws or conditions of the same name, gains that the set does not
-        have, runs that begin at rest at 0 and stay there, or more than a million runs.
+      ScenarioError: an unknown name, different plants, laws or conditions of the same name, no gains in the set, runs
+        that begin at rest at 0 and stay there, or more than a million runs.
 
     Warns:
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MOST)))
+    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)))
     plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
-    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MOST:
-        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MOST:,} runs at most")
+    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MAX_ITEMS:
+        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most")
     conditions = [find_condition(condition) for condition in conditions]
     _check_apart(plants, laws, conditions)
     made = [
@@ -93,24 +102,23 @@ def case(
     Args:
       changes: Scenario field -> value, in place of what the condition sets.
     """
-    machine = _plant(plant)
-    asked, seed = find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
-    fields: dict[str, Any] = {"plant": machine, "law": _law(machine, law, gains, seed), "duration": duration}
-    if machine.name in sets.STUDY:
+    plant, condition, seed = _plant(plant), find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
+    fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
+    if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
-    conditioned, around = asked.on(machine, duration), starts or Starts()
-    around.check_condition(asked.name, conditioned)
-    scenario = Scenario(**fields | conditioned | dict(changes))
-    return around.place(scenario, seed).named(asked.name)
+    of_condition, starts = condition.on(plant, duration), starts or Starts()
+    starts.check_condition(condition.name, of_condition)
+    scenario = Scenario(**fields | of_condition | dict(changes))
+    return starts.place(scenario, seed).named(condition.name)
 
 
 def check_moving(seeds: Sequence[Scenario]) -> None:
-    """Raise ScenarioError if nothing happens in any of the runs, which differ only in their seeds, whatever the law."""
+    """Raise ScenarioError if no run moves under any law. The runs differ only in their seeds."""
     if all(map(_rests, seeds)):
         at = seeds[0]
         raise ScenarioError(
-            f"{at.plant.name} starts at rest at 0 and nothing moves it, condition {at.condition!r}: say where its runs "
-            "begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
+            f"{at.plant.name} starts at rest at 0 and nothing moves it under condition {at.condition!r}: give another "
+            "start, with starts=smc.starts(x0=0.5) or --x0 0.5"
         )
 
 
@@ -119,7 +127,7 @@ def _rests(scenario: Scenario) -> bool:
     moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
     if moved or scenario.noise != Noise() or scenario.reference != REST:
         return False
-    made = numbered(model([scenario]), scenario)
+    made = with_values(model([scenario]), scenario)
     data = mujoco.MjData(made)
     data.qpos[:], data.qvel[:] = start(made, scenario)
     mujoco.mj_forward(made, data)
@@ -130,17 +138,17 @@ def _check_apart(
     plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
 ) -> None:
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
-    machines = [_plant(plant) for plant in plants]
-    chosen = [law if isinstance(law, str) else coerce.law(law) for law in laws]
+    chosen_plants = [_plant(plant) for plant in plants]
+    chosen_laws = [law if isinstance(law, str) else coerce.law(law) for law in laws]
     # name, thing, and what distinguishes it from others
     for what, cure, things in (
-        ("plants", "give each a grid of its own", [(p.name, p, (p.build, p.parameters, p.n)) for p in machines]),
+        ("plants", "give each its own grid", [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants]),
         (
             "laws",
             "name one of them, as smc.law(...).named('slow') or --laws \"slow: classical(k=2)\"",
-            [(law if isinstance(law, str) else law.name, law, law) for law in chosen],
+            [(law if isinstance(law, str) else law.name, law, law) for law in chosen_laws],
         ),
-        ("conditions", "give each a name of its own", [(c.name, c, str(c)) for c in conditions]),
+        ("conditions", "give each its own name", [(c.name, c, str(c)) for c in conditions]),
     ):
         known = {}
         for name, thing, content in things:
@@ -167,8 +175,8 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     if gains != "default" and known is not None and plant.parameters != known.parameters:
         changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != known.parameters[name]]
         warnings.warn(
-            f"gains of set {gains!r} were found for {plant.name} as it comes, and this one has {', '.join(changed)}: "
-            "tune the law on it, or give it gains of its own",
+            f"gains of set {gains!r} were found for {plant.name} with its default parameters, and this one has "
+            f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
             ScenarioWarning,
             users_frame(),
         )

@@ -3,11 +3,11 @@
     around = smc.starts(spread=0.2)                    # within 20 % of the plant's own x0, the default of a grid
     around = smc.starts(x0=0.0, by=0.3)                # within 0.3 rad (or m) of 0
 
-A seed gives every law and every condition the same start. Seed 0 is the start x0 itself. Seed s starts channel i from
+A seed gives every law and every condition the same start. Seed 0 is x0 itself. Seed s starts channel i from
 
     x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
 
-A plant with contacts must start clear of its obstacles: there z_i is -|z_i|, which moves the start inwards, and
+A run with contacts must start clear of its obstacles. So z_i is replaced by -|z_i|, which moves the start inwards, and
 pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
@@ -21,8 +21,8 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
 from smc_mujoco.simulation.scenario import Scenario
 
-SPREAD = 0.2  # of a channel's start, by which seeds move it to either side; chosen
-SEEDS = 2**52  # seeds from here on are those of tuning, which no grid takes
+SPREAD = 0.2  # of x0, to either side; chosen
+SEEDS = 2**52  # number of a grid's seeds; larger ones are kept for tuning
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -30,9 +30,9 @@ class Starts:
     """Where runs begin, by seed; see `starts`.
 
     Attributes:
-      x0: the middle, one number or one for each channel; None: the plant's own, or what the condition gives.
-      spread: by how much of itself a channel's start moves to either side.
-      by: by how much it moves besides, rad or m.
+      x0: the middle, one number or one for each channel; None: the plant's own, or the condition's.
+      spread: how far starts lie to either side of the middle, as a fraction of it.
+      by: how much farther they lie, rad or m.
     """
 
     x0: tuple[float, ...] | None = None
@@ -49,7 +49,7 @@ class Starts:
         return max(abs(x) for x in middle) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
-        """Raise ScenarioError for a condition whose fields say another middle of the starts."""
+        """Raise ScenarioError if both the starts and the fields of a condition set x0."""
         if self.x0 is not None and "x0" in fields:
             raise ScenarioError(f"condition {name!r} and the starts, or --x0, both set x0: give one of them")
 
@@ -74,8 +74,8 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
 
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's own.
-      spread: by how much of itself a channel's start moves to either side, 0 or more.
-      by: by how much it moves besides, rad or m, 0 or more; for a plant that rests at 0.
+      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more.
+      by: how much farther they lie, rad or m, 0 or more; for a plant that rests at 0.
 
     Raises:
       ScenarioError: a number out of its range.

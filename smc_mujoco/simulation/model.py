@@ -19,12 +19,12 @@ from smc_mujoco.mechanisms.hardware.part import ROTOR, START, Part, joint_ids
 from smc_mujoco.mechanisms.plant import array, ready
 from smc_mujoco.simulation.scenario import Scenario
 
-PATH_POINTS = 400  # on the path to a start, which must be free: 1 cm apart on the longest rail
+PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: contacts give way by less, so a deeper start begins with a blow
 
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
-    """Return the scenario's parts, in the order in which they are built in and their numbers written."""
+    """Return the scenario's parts, in the order in which they are added to the model."""
     contact = () if scenario.contact.kind == "none" else (scenario.contact,)
     sensor = () if scenario.sensor is None else (scenario.sensor,)
     actuator = scenario.actuator if scenario.tandem is None else scenario.actuator[1:]  # the callback has the first
@@ -53,7 +53,7 @@ def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
 
 
 def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
-    """Return the compiled model that scenarios of one structure share, without their numbers."""
+    """Return the compiled model that scenarios of one structure share, without their values."""
     made = ready(spec(scenarios), nuserdata)
     first = scenarios[0].resolved
     made.opt.timestep = first.physics_step
@@ -61,22 +61,22 @@ def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
     return made
 
 
-def numbered(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
-    """Return a copy of the compiled model with the scenario's numbers from a physics step on."""
+def with_values(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
+    """Return a copy of the compiled model with the scenario's values from a physics step on."""
     made = copy.copy(compiled)
-    put_numbers(made, compiled, scenario, step)
+    put_values(made, compiled, scenario, step)
     mujoco.mj_setConst(made, mujoco.MjData(made))
     return made
 
 
-def put_numbers(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> None:
-    """Write the scenario's numbers into a copy of the compiled model. The caller calls mj_setConst."""
-    for name, value in numbers(compiled, scenario, step).items():
+def put_values(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> None:
+    """Write the field values of a scenario into a copy of the compiled model. The caller calls mj_setConst."""
+    for name, value in field_values(compiled, scenario, step).items():
         array(made, name)[:] = value
 
 
-def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Return model field -> its values from a physics step on, for every field that the scenario's numbers set."""
+def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
+    """Return model field -> its values from a physics step on, for every field that the scenario sets."""
     plant, found = scenario.plant, {}
     fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
     of_parts = (part.fields(compiled) for part in parts(scenario))
@@ -87,9 +87,9 @@ def numbers(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str
 
 
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints where the model has them.
+    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints as in the model.
 
-    The model has them where its start keyframe says, or else at qpos0.
+    That is, in the model's start keyframe, or else in qpos0.
     """
     key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
     qpos, qvel = (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy(), np.zeros(compiled.nv)
@@ -104,8 +104,8 @@ def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.
 def check_starts(scenarios: Sequence[Scenario]) -> None:
     """Check that scenarios of one structure start on the free side of their obstacles.
 
-    The path from the plant's own start, or from 0 if that is not free, must cross no obstacle. A run that begins beyond
-    a stop, or half-way through it, is no run of this mechanism.
+    The path from the plant's own start, or from 0 if that is not free, must cross no obstacle, because the mechanism
+    could not get to a start beyond a stop or inside it.
 
     Raises:
       ScenarioError: a run starts inside an obstacle or beyond it.
@@ -118,7 +118,7 @@ def check_starts(scenarios: Sequence[Scenario]) -> None:
         place = scenario.plant, scenario.resolved.x0, frozen(scenario.factors(0))  # all that the check depends on
         if place not in seen:
             seen.add(place)
-            put_numbers(scratch, compiled, scenario, 0)
+            put_values(scratch, compiled, scenario, 0)
             check_start(scratch, data, scenario)
 
 

@@ -5,7 +5,7 @@ Laws, estimators, signals and nominal models all become functions of one C type:
     int64 f(const double *inputs, const double *parameters, double *memory, double *outputs)
 
 It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in compiled functions
-that a law calls, so a law that writes beyond its memory fails instead of corrupting its neighbour. Functions of the
+that a law calls, so a law that writes beyond its memory fails instead of overwriting other data. Functions of the
 math module do not raise in compiled code. Outside their domain they return NaN, and inf beyond the largest float. If
 that reaches u or s, the run ends.
 """
@@ -139,7 +139,7 @@ def of_signal(s: Signal) -> Function:
 
 
 def values_of(s: Signal) -> tuple[float, ...]:
-    """Return what a compiled signal reads at its parameters' address. Valid for as long as the signal lives.
+    """Return the numbers that a compiled signal reads as its parameters. They are valid as long as the signal exists.
 
     Raises:
       ScenarioError: the data of a series are not (2, N) float64, C-contiguous.

@@ -30,7 +30,7 @@ LIVE = """<mujoco><size nuserdata="12345"/><worldbody><body><joint name="j"/><ge
 
 
 class LayoutError(ScenarioError):
-    """This MuJoCo lays out mjModel or mjData in a way that the callback does not know."""
+    """The installed MuJoCo has a memory layout of mjModel or mjData that the callback does not know."""
 
     def __init__(self, problem: str):
         super().__init__(f"mujoco {mujoco.__version__} {problem}: install mujoco 3.17")

@@ -1,4 +1,4 @@
-"""Perturbations of a run that are not signals: measurement noise, and parameters that change during the run."""
+"""Measurement noise, and jumps of the plant's parameters during a run."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
-MEASUREMENT, PROCESS = 0, 1  # streams: of sensor noise, and of the first process noise, which the others follow
-DROPOUT = 1 << 32  # stream that decides which readings get lost
+MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise, and of the first process noise; further ones count on from it
+DROPOUT = 1 << 32  # stream that decides which readings are lost
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
 _W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)

@@ -56,7 +56,7 @@ class Prepared:
 
     @property
     def bytes(self) -> int:
-        """Memory of its simulation: log, mjData and record, without the history of a late sensor."""
+        """Memory of its simulation: log, mjData and record, without the history of a delayed sensor."""
         s = self.scenario.resolved
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
@@ -69,7 +69,7 @@ def prepare(scenario: object) -> Prepared:
     """Return a scenario with its functions compiled.
 
     Raises:
-      ScenarioError: no Scenario, or one whose functions a file could not bring back.
+      ScenarioError: it is not a Scenario, or it came from a file without the code of its functions.
     """
     if isinstance(scenario, Prepared):
         return scenario
@@ -111,12 +111,12 @@ def _compile(s: Resolved) -> Compiled:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Packed:
-    """The arrays whose addresses stand in a simulation's record. They must live as long as the simulation.
+    """The arrays whose addresses are in a simulation's record. They must exist as long as the simulation.
 
     Attributes:
       numbers: gains, memories and all else that is float64.
       signals: the disturbances, (m,) SIGNAL.
-      nominal: what the nominal model works on.
+      nominal: the data of MuJoCo's own nominal model, or None.
     """
 
     numbers: np.ndarray

@@ -1,7 +1,8 @@
 """The reference loop: mj_step, with laws, estimators and signals called as the Python functions they are.
 
-It runs what does not compile. It is also what the tests compare the compiled callback with: same Scenario, same Trace,
-but written for reading, with numpy's own Philox and none of the callback's code. A step takes tens of microseconds.
+It runs what does not compile. The tests compare the compiled callback with it: the same Scenario must give the same
+Trace. It is written for reading, with numpy's own Philox and none of the callback's code. A step takes tens of
+microseconds.
 """
 
 import math
@@ -19,7 +20,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.plant import Coupled, Plant, Values
 from smc_mujoco.simulation import model as assembly
-from smc_mujoco.simulation import philox
+from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
@@ -28,16 +29,16 @@ from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
-RAISES = (Exception, SystemExit)  # what may end a user's function while the other runs go on
+RAISES = (Exception, SystemExit)  # exceptions of a user's function that end only its own run
 RETURNS = {  # what a component returns, for messages
     "law": "the two numbers u, s",
     "surface": "the two numbers s, v_eq",
-    "estimator": "a velocity, or it and an acceleration",
+    "estimator": "a velocity, or a velocity and an acceleration",
 }
-LEFT_THE_WORLD = f"the plant left the finite world (|x| or |v| above {MAX_STATE:g}, or NaN)"
+PLANT_DIVERGED = f"{trace.PLANT_DIVERGED[0]} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 INTERRUPTED = (
-    "MuJoCo's control callback was set by someone else during the run, which went on without its law: "
-    "call mujoco.set_mjcb_control before or after it, or put back what mujoco.get_mjcb_control() gave"
+    "other code replaced MuJoCo's control callback during the run, so that its law was not called: "
+    "call mujoco.set_mjcb_control before or after the run, or restore what mujoco.get_mjcb_control() returned"
 )
 
 
@@ -49,7 +50,7 @@ def run(scenario: Scenario) -> Trace:
     """Return the trace of a scenario, simulated in the reference loop."""
     with installed():
         loop = Loop(scenario)
-    with installed(loop.control), np.errstate(all="ignore"):  # the finite world is checked, and NaN named
+    with installed(loop.control), np.errstate(all="ignore"):  # the loop itself checks for NaN and inf
         for step in range(loop.total + 1):
             loop.step(step)
             if loop.failure:
@@ -63,7 +64,7 @@ class Loop:
     def __init__(self, scenario: Scenario):
         self.scenario, n = scenario.resolved, scenario.plant.n
         self.compiled = assembly.model([scenario])
-        self.model = assembly.numbered(self.compiled, scenario)
+        self.model = assembly.with_values(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = channels(self.model)
         self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
@@ -80,7 +81,7 @@ class Loop:
         self.commands: list[np.ndarray] = []
         self.latest = np.zeros(n)  # the last command of each channel
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
-        self.last_reading = np.zeros((n, 2))  # that arrived
+        self.last_reading = np.zeros((n, 2))  # that was not lost
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.tandem, self.first = scenario.tandem, np.zeros(n)  # two drives in series, and the output of the first
@@ -104,13 +105,13 @@ class Loop:
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""
-        assembly.put_numbers(self.model, self.compiled, self.scenario, step)
+        assembly.put_values(self.model, self.compiled, self.scenario, step)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Control callback: run the law at the first stage of a sample, and the disturbance at every stage."""
         if self.failure or data._address != self.data._address:
-            return  # a law may step a model of its own, and so may other threads
+            return  # a law or another thread may step another model
         step, stage = divmod(self.calls, self.scenario.stages)
         self.calls += 1
         try:
@@ -136,7 +137,7 @@ class Loop:
         """Begin a physics step: run the law if it is a sample, and apply the command whose delay has passed."""
         self.sum_forces(data)
         if not (np.all(np.abs(data.qpos) < MAX_STATE) and np.all(np.abs(data.qvel) < MAX_STATE)):
-            raise Failure(LEFT_THE_WORLD)
+            raise Failure(PLANT_DIVERGED)
         k, within = divmod(step, self.scenario.steps)
         if within == 0:
             u, self.s = self.decide(*self.measure(data, k), k)

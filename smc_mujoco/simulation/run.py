@@ -1,9 +1,9 @@
 """Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
 
 A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
-and the number of steps. Parameters, friction levels, laws, gains, signals, delays and seeds mix freely within it. What
-does not compile runs in the reference loop. The results depend neither on the number of threads nor on the grouping nor
-on what else runs.
+and the number of steps. Its scenarios may differ in parameters, friction levels, laws, gains, signals, delays and
+seeds. Functions that do not compile run in the reference loop. The results do not depend on the number of threads, the
+grouping or the other runs.
 """
 
 import contextlib
@@ -24,9 +24,9 @@ from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-READING_BYTES = 67  # of a late sensor's history, measured: a channel and reading, in mjData and in the Batch
-CHUNK_BYTES = 256 * 2**20  # of logs and rows that one Batch holds
-MANY = 64  # runs of a chunk that leave more memory than it takes time to give it back; chosen
+READING_BYTES = 67  # measured: of a delayed sensor's history, per channel and reading, in mjData and in the Batch
+CHUNK_BYTES = 256 * 2**20  # of logs and records in one Batch
+MIN_TRIM_RUNS = 64  # runs of a chunk from which on returning its memory is worth the time; chosen
 
 
 class PlainLoopWarning(UserWarning):
@@ -36,9 +36,11 @@ class PlainLoopWarning(UserWarning):
 @overload
 def run(scenarios: Scenario, threads: int | None = None, progress: bool = False) -> Trace: ...
 @overload
-def run(scenarios: Iterable[Scenario], threads: int | None = None, progress: bool = False) -> list[Trace]: ...
 def run(
-    scenarios: Scenario | Iterable[Scenario], threads: int | None = None, progress: bool = False
+    scenarios: Iterable[Scenario | Prepared], threads: int | None = None, progress: bool = False
+) -> list[Trace]: ...
+def run(
+    scenarios: Scenario | Iterable[Scenario | Prepared], threads: int | None = None, progress: bool = False
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
@@ -48,14 +50,14 @@ def run(
       progress: whether to show a progress bar.
 
     Returns:
-      The Trace, or a list of them in the order of the scenarios. A run that fails - its law raises or returns NaN, or
-      the plant leaves the finite world - ends in a Trace whose `diverged_at` and `failure` say so; the others go on.
+      The Trace, or a list of them in the order of the scenarios. A run fails if its law raises or returns NaN, or if
+      the plant diverges. Its Trace says so in `diverged_at` and `failure`; the other runs continue.
 
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
 
-    MuJoCo's callbacks are global to the process: while a run lasts, no other one is called, and a run during which
-    somebody sets the control callback is a failure.
+    MuJoCo's callbacks are global to the process. During a run no other callback is called, and a run fails if somebody
+    sets the control callback meanwhile.
     """
     many = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
     found: list[Trace | None] = [None] * len(many)
@@ -72,7 +74,7 @@ def stream(
     threads: int | None = None,
     report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
-    """Yield pairs (index, Trace) as soon as their chunk is done. At most one chunk is in memory here."""
+    """Yield pairs (index, Trace) as soon as their chunk is done. At most one chunk is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
     slow: list[tuple[int, Prepared]] = []
@@ -89,7 +91,7 @@ def stream(
             ready = [prepared for _, prepared in chunk]
             with callback.installed(), memory_for(ready):
                 traces = Chunk(ready, threads).run(report)
-            if len(chunk) >= MANY:
+            if len(chunk) >= MIN_TRIM_RUNS:
                 give_back()
             yield from zip((index for index, _ in chunk), traces, strict=True)
     for index, prepared in slow:
@@ -104,7 +106,7 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
     """Turn a MemoryError into one sentence about the runs."""
     try:
         yield
-    except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo has all three, by the place
+    except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo raises any of the three
         if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
             raise
         count, needed = len(prepared), sum(one.bytes for one in prepared) / 2**20
@@ -115,10 +117,7 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
 
 
 def give_back() -> None:
-    """Give freed memory back to the system, where the C library is glibc.
-
-    What stays between freed mjData is 45 to 100 kB a run.
-    """
+    """Return freed memory to the system, if the C library is glibc; 45 to 100 kB a run stay allocated without it."""
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
         trim(0)
 
@@ -128,9 +127,9 @@ def _chunks(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[lis
     chunk: list[tuple[int, Prepared]] = []
     held = 0
     scenarios = [prepared.scenario for _, prepared in group]
-    late = max(READING_BYTES * s.plant.n * s.readings for s in scenarios)  # all get the longest history
+    history = max(READING_BYTES * s.plant.n * s.readings for s in scenarios)  # all get the longest one
     for one in group:
-        size = one[1].bytes + late
+        size = one[1].bytes + history
         if len(chunk) >= threads and held + size > CHUNK_BYTES:
             yield chunk
             chunk, held = [], 0

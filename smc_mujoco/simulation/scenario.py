@@ -1,8 +1,8 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
 A scenario keeps what it was given, and None where a default depends on other fields. `scenario.resolved` has these
-defaults, too. The true mechanism (`plant`, `mismatch`, `jump`, friction, contact, actuator and sensor) and what the law
-may know of it (the plant's nominal parameters) are kept apart.
+defaults, too. The true mechanism is set by `plant`, `mismatch`, `jump`, friction, contact, actuator and sensor. The law
+knows at most the plant's nominal parameters.
 """
 
 import copy
@@ -34,18 +34,18 @@ from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, Signal
 
-SHORTEST, LONGEST = 1e-9, 1e9  # s, of periods and of runs
+MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py studies what halving it changes, docs/design.md tells
+REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
-MAX_ANGLE = 3.0 * math.pi  # rad: chosen, as swing-ups overshoot within a turn and a half, and 10 may be degrees
-MAX_DEGREES = 720.0  # nobody means degrees beyond
+MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
+MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
 MAX_RATE = 100.0  # rad/s: chosen, 16 turns a second
 MAX_GAP = 0.5  # rad: chosen, 29 degrees of play
-MIN_PERCENT = 10.0  # of a mismatch: chosen, multiples of five from here on may be percent
-MIN_MILLISECONDS = 1.0  # s: chosen, as no plant here tolerates such a delay
+MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here on may be percent
+MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates as much, so it may be ms
 
 REST = Constant(0.0)
 Out = TypeVar("Out")
@@ -96,9 +96,9 @@ class Scenario:
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, else implicitfast.
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
-      mechanism: "equation", or another build of the mechanism that the plant offers.
+      mechanism: "equation", or the name of another mechanism that the plant offers.
       actuator: between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag followed by another drive, and
-        then a Backlash. None: the command is the force. u is bounded before the drives.
+        then a Backlash. None: the command is the force. u is limited to u_max before the drives.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
 
@@ -177,12 +177,12 @@ class Scenario:
         put(model=coerce.one_of("model", self.model, coerce.MODELS))
         put(integrator=coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS))
         put(mechanism=coerce.mechanism(self.mechanism, self.plant))
-        put(duration=number("duration", self.duration, above=0.0, most=LONGEST))
-        put(control_period=number("control_period", self.control_period, above=0.0, least=SHORTEST))
+        put(duration=number("duration", self.duration, above=0.0, most=MAX_TIME))
+        put(control_period=number("control_period", self.control_period, above=0.0, least=MIN_TIME))
         put(seed=whole("seed", self.seed, 0, 2**53 - 1))
         put(x0=coerce.per_channel("x0", self.x0, self.plant.n))
         put(v0=coerce.per_channel("v0", self.v0, self.plant.n))
-        put(physics_step=coerce.physics_step(self.physics_step, self.control_period, SHORTEST))
+        put(physics_step=coerce.physics_step(self.physics_step, self.control_period, MIN_TIME))
         put(u_max=None if self.u_max is None else number("u_max", self.u_max, above=0.0, infinite=True))
         put(input_delay=number("input_delay", self.input_delay, least=0.0, most=self.duration))
 
@@ -258,7 +258,7 @@ class Scenario:
 
     @property
     def readings(self) -> int:
-        """How many late readings of the sensor MuJoCo keeps."""
+        """How many delayed readings of the sensor MuJoCo keeps."""
         return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step)
 
     @property
@@ -368,7 +368,7 @@ def check_clock(s: Resolved) -> None:
     delay = s.input_delay / s.physics_step
     if abs(delay - round(delay)) > 1e-6:
         raise ScenarioError(
-            f"input_delay {s.input_delay:g} s is no whole number of physics steps of {s.physics_step:g} s: "
+            f"input_delay {s.input_delay:g} s is not a whole number of physics steps of {s.physics_step:g} s: "
             "give a physics_step that divides it"
         )
     if s.samples < 1:
@@ -396,8 +396,8 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
         raise ScenarioError(
-            f"disturbance {shown(forces[0])} pushes a body, and disturbances of {s.plant.name}, your own model, "
-            "act on its joints: give another signal"
+            f"disturbance {shown(forces[0])} is a force on a body, but {s.plant.name} is your own model, whose "
+            "disturbances act on its joints: give another signal"
         )
     if s.reference.cartesian:
         raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
@@ -413,18 +413,18 @@ def check_law(s: Resolved) -> None:
     if not fits(s.law, s.plant):
         paired = dataclasses.replace(s.plant, underactuated=True)
         hint = ": give each channel a partner" if s.plant.direct and fits(s.law, paired) else ""
-        raise ScenarioError(f"law {s.law.name!r} is for {', '.join(s.law.plants)} alone, not for {s.plant.name}{hint}")
+        raise ScenarioError(f"law {s.law.name!r} is only for {', '.join(s.law.plants)}, not for {s.plant.name}{hint}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
     if s.surface is not None and s.law.relative_degree > 1:
         raise ScenarioError(
             f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "
-            "leave it out, or give a law of degree 1"
+            "leave the surface out, or give a law of relative degree 1"
         )
     if s.surface is not None and s.surface.relative_degree != s.law.relative_degree:
         raise ScenarioError(
             f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.relative_degree}, "
-            f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another, or leave it out"
+            f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another surface, or leave it out"
         )
 
 
@@ -438,17 +438,17 @@ def check_names(s: Resolved) -> None:
 
 
 def check_mechanism(s: Resolved) -> None:
-    """Check that the integrator handles the parts' states, and mechanism and contact every parameter of the run."""
+    """Check that the integrator suits the parts, and mechanism and contact the parameters at any time."""
     if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
         raise ScenarioError(
-            f"integrator RK4 with {shown(states[0])}, whose state it does not integrate: leave the integrator out"
+            f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )
     for step in (0, s.samples * s.steps):
-        check_numbers(s.plant, s.mechanism, frozen(s.factors(step)))
+        check_parameters(s.plant, s.mechanism, frozen(s.factors(step)))
         check_contact(s.contact, s.plant, s.factors(step))
 
 
-def check_numbers(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
+def check_parameters(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
     """Raise ScenarioError for parameter factors that the plant's mechanism cannot have."""
     values = plant.values(factors)
     if name != "equation":
@@ -464,18 +464,18 @@ def built(plant: Plant, name: str) -> mujoco.MjModel:
 
 
 def check_contact(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError where a parameter has not the value for which the obstacles stand."""
+    """Raise ScenarioError if a parameter differs from the value for which the obstacles are placed."""
     for name, value in plant.placed.items() if contact.kind != "none" else ():
         is_now = getattr(plant.values(factors), name)
         if is_now != value:
             raise ScenarioError(
-                f"contact {contact.kind!r} of {plant.name} stands where {name} is {value:g}, and {name} is {is_now:g}: "
-                f"leave {name} as it is"
+                f"the obstacles of contact {contact.kind!r} of {plant.name} are placed for {name} = {value:g}, and "
+                f"{name} is {is_now:g}: leave {name} as it is"
             )
 
 
 def warn_of_degrees(s: Resolved) -> None:
-    """Warn of a start or a reference's amplitude of several turns, but not of a ramp or time series that long."""
+    """Warn of a start or a reference's amplitude of several turns. Ramps and time series may reach as far."""
     amplitude = s.reference.parameters().get("amplitude", 0.0)
     for what, values in (("x0", s.x0), ("the reference's amplitude", (amplitude,) * s.plant.driven)):
         for unit, value in zip(s.plant.units, values, strict=False):
@@ -531,7 +531,7 @@ def warn_of_weak_motors(s: Resolved) -> None:
             if motor.stall < need and (need <= limit or motor.unit):
                 warnings.warn(
                     f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
-                    f"{s.plant.name} needs {need:.3g} to stand where it starts: give it more gear, voltage or current",
+                    f"{s.plant.name} needs {need:.3g} to hold its start: give the motor more gear, voltage or current",
                     ScenarioWarning,
                     users_frame(),
                 )

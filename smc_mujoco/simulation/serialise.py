@@ -65,7 +65,7 @@ def _versions() -> dict[str, str]:
 
 
 def restore(data: dict) -> Scenario:
-    """Return the scenario that was described. A law or signal that is not installed here loses its code, not its name.
+    """Return the scenario that `describe` wrote. A law or signal that is not installed here loses its code.
 
     Recorded scenarios skip validation rules added after they were recorded.
     """
@@ -102,7 +102,7 @@ def _restore_plant(data: dict) -> Plant:
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
     if present_place(module) != find_plant(name).build.__module__:
-        raise ScenarioError(f"plant {name!r} is not the library's: run it where it is defined")
+        raise ScenarioError(f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it")
     return find_plant(name, **plant)
 
 
@@ -158,7 +158,7 @@ def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...
 def _restore_part(data: dict) -> Part:
     kind = _kinds(Part).get((data["kind"], present_place(data["module"])))
     if kind is None:
-        raise ScenarioError(f"part {data['kind']!r} of {data['module']} is not at hand: import what defines it first")
+        raise ScenarioError(f"part {data['kind']!r} is unknown here: first import {data['module']}, which defines it")
     return kind(**_values(data))
 
 
@@ -174,7 +174,7 @@ def _values(data: dict) -> dict:
 
 
 def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
-    """Return every class derived from a base, users' own included, by its name and module."""
+    """Return every class derived from a base, also users' classes, by its name and module."""
     return {_home(kind): kind for kind in subclasses(base)}
 
 

@@ -23,7 +23,7 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.simulation import philox
 
-EARLY = 1.0 - 1e-15  # factor on a switching time: sums of decimal times miss it by an ulp or two, to either side
+EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times miss it by an ulp or two either way
 TERMS = 32  # sinusoids of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
 
 
@@ -36,7 +36,7 @@ class Signal:
       positive, natural: names of parameters that must be > 0, and >= 0.
       random: whether `value` takes memory, seed, channel and stream.
       series: whether `value` takes data.
-      cartesian: whether it disturbs as a horizontal force on the body, N, instead of a force on the joint.
+      cartesian: whether it is a horizontal force on the body, N, instead of a force on the joint.
       data: the array of a series, (2, N) float64, C-contiguous.
       value: static method that returns the value and its first and second derivative.
     """
@@ -118,9 +118,9 @@ class Ramp(Signal):
 class MinimumJerk(Signal):
     """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration held to 0 .. 1: a smooth move from rest to rest.
 
-    Of all moves in that time it has the least integral of the squared jerk; velocity and acceleration are 0 at both
-    ends. Source: T. Flash & N. Hogan, "The coordination of arm movements: an experimentally confirmed mathematical
-    model", J. Neuroscience 5(7):1688, 1985.
+    No other move in that time has a smaller integral of the squared jerk. Velocity and acceleration are 0 at both ends.
+    Source: T. Flash & N. Hogan, "The coordination of arm movements: an experimentally confirmed mathematical model",
+    J. Neuroscience 5(7):1688, 1985.
     """
 
     amplitude: float
@@ -157,7 +157,7 @@ class Pulse(Signal):
 class Impulse(Signal):
     """impulse / width for time <= t < time + width, else 0: a blow with the time integral `impulse`, N s or N m s.
 
-    The integral is exact where width is a whole number of physics steps; 5 ms (chosen) is, of the usual ones.
+    The integral is exact if width is a whole number of physics steps. The default of 5 ms is, for the default steps.
     """
 
     impulse: float
@@ -181,8 +181,8 @@ class Gust(Signal):
     """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a horizontal force, N.
 
     The discrete gust of 14 CFR 25.341(a)(2) and EASA CS-25.341(a)(2), U = U_ds/2 (1 - cos(pi s/H)) for 0 <= s <= 2H,
-    in time and as a force: 2H passes in width. (MIL-F-8785C builds up in the same way, then holds.) It acts on the
-    centre of mass of every channel's body: on a slide its generalised force is F, on a pendulum F l cos x.
+    in time and as a force: 2H passes in width. (The gust of MIL-F-8785C rises in the same way and then stays.)
+    It acts on the centre of mass of every channel's body: its generalised force is F on a slide, F l cos x on a bob.
     """
 
     amplitude: float
@@ -279,7 +279,7 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
 
 @dataclasses.dataclass(frozen=True)
 class Recorded(Signal):
-    """A signal that a file names and that is not at hand: its parameters without its function; it cannot run."""
+    """A signal from a file, of a class that is not installed here. It has no function and cannot run."""
 
     kind: str
     module: str

@@ -1,9 +1,9 @@
 """The record of one simulation: all that the callback needs besides MuJoCo's own state, under names.
 
 `mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code reads the record by
-names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of the same dtype. What a user's function
-reads and writes are records, too: a law gets a MEASUREMENT and gives a CONTROL. Arrays, such as gains and memories, lie
-in one buffer beside the record, which holds their addresses.
+names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of the same dtype. Inputs and outputs of
+users' functions are records, too: a law gets a MEASUREMENT and returns a CONTROL. Arrays, such as gains and memories,
+are in one buffer outside of the record, which holds their addresses.
 """
 
 import itertools
@@ -22,14 +22,14 @@ def floats(names: Iterable[str]) -> np.dtype:
     return np.dtype([(name, "f8") for name in names], align=True)
 
 
-# What functions get and give. Law: MEASUREMENT -> CONTROL. Surface: MEASUREMENT -> SLIDING. Estimator: READING ->
+# Inputs and outputs of functions. Law: MEASUREMENT -> CONTROL. Surface: MEASUREMENT -> SLIDING. Estimator: READING ->
 # ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal model: -> MODEL.
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream"))
 CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 
-# The state of a channel between calls: the last reading that arrived, the command that has passed its delay, the output
+# The state of a channel between calls: the last reading that was not lost, the command after its delay, the output
 # of the first of two drives, and sums over a control period of the drive's force and of friction and contacts.
 CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction"))
 
@@ -66,9 +66,9 @@ SIMULATION = np.dtype(
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"), ("drive_drag", "f8"),
-        # what the nominal model gets: i, n, then x, v, a and u of all channels, (n,) each, by their addresses too
+        # addresses of the nominal model's input (i, n, x, v, a, u; the last four (n,) each) and of x, v, a and u in it
         ("joints", "i8"), ("x", "i8"), ("v", "i8"), ("a", "i8"), ("u", "i8"),
-        # what functions get and give
+        # inputs and outputs of functions
         ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("control", CONTROL), ("sliding", SLIDING),
         ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
@@ -79,7 +79,7 @@ SIMULATION = np.dtype(
 # How compiled code reads record i of an array at an address.
 simulation_at, state_at, log_at, signal_at = map(record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL))
 
-# Bytes from the start of a simulation's record to what functions get and give.
+# Bytes from the start of a simulation's record to the inputs and outputs of functions.
 MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT = (
     SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
     for name in ("y", "reading", "instant", "control", "sliding", "estimate", "motion", "model")

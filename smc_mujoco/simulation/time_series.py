@@ -13,7 +13,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.simulation.signals import EARLY, Signal
 
-MAX_GAP = 1.5  # median steps; chosen: jitter of a logger's clock stays below, a missing row does not
+MAX_GAP = 1.5  # median steps; chosen: a logger's jitter stays below, a missing row is above
 WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
 SECONDS = ("s", "sec", "second", "seconds")
 
@@ -50,7 +50,7 @@ class TimeSeries(Signal):
     def __repr__(self) -> str:
         return f"TimeSeries({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
 
-    def __reduce__(self):  # so that a copy has data of its own, also read-only
+    def __reduce__(self):  # so that a copy has its own data, also read-only
         return type(self), (self.times, self.values)
 
     def parameters(self) -> dict[str, float]:
@@ -144,10 +144,10 @@ def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
     except FileNotFoundError:
         raise ScenarioError(f"no file at {path}: give the path of a CSV file") from None
     except (OSError, ValueError, csv.Error) as error:
-        why = "it is no text" if isinstance(error, UnicodeError) else getattr(error, "strerror", None) or error
+        why = "it is not text" if isinstance(error, UnicodeError) else getattr(error, "strerror", None) or error
         raise ScenarioError(f"cannot read {str(path)!r} as CSV ({why}): give a file of cells between commas") from None
     if any("\0" in cell for _, row in rows for cell in row):
-        raise ScenarioError(f"cannot read {str(path)!r} as CSV (it is no text): give a file of cells between commas")
+        raise ScenarioError(f"cannot read {str(path)!r} as CSV (it is not text): give a file of cells between commas")
     return rows
 
 

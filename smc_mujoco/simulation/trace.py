@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
-LONGEST_FAILURE = 500  # characters; chosen
-MOST_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
-NEWER = ("force", "reaction")  # arrays that the oldest files lack, as they hold ideal runs
+PLANT_DIVERGED = "the plant diverged", "the plant left the finite world"  # how failures begin, now and in old files
+MAX_FAILURE = 500  # characters; chosen
+MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
+ADDED_ARRAYS = ("force", "reaction")  # which the oldest files lack, as they hold ideal runs
 KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
 
 
@@ -83,7 +84,7 @@ class Trace:
         return notebook.trace(self)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write a .npz file that `smc.load` reads back. Make folders. Replace an old file whole or not at all."""
+        """Write a .npz file that `smc.load` reads back. Make missing folders, and replace an old file atomically."""
         path = Path(path)
         if not path.name or "\0" in path.name:
             raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
@@ -91,15 +92,20 @@ class Trace:
             raise ScenarioError(f"cannot save to {path.name!r}: end the name in .npz")
         path = path.with_suffix(".npz")
         about = to_json(serialise.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
-        if len(about) > MOST_TEXT:
+        if len(about) > MAX_TEXT:
             raise ScenarioError(
-                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MOST_TEXT:,} "
+                f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MAX_TEXT:,} "
                 "are not read back: give it shorter time series"
             )
         arrays = {name: getattr(self, name) for name in ARRAYS}
         with replacing(path) as file:
             np.savez_compressed(file, about=np.array(about), **arrays)
         return path
+
+    @property
+    def plant_diverged(self) -> bool:
+        """Whether the run failed because its plant diverged, not because its law or a signal failed."""
+        return self.diverged_at is not None and (self.failure is None or self.failure.startswith(PLANT_DIVERGED))
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several."""
@@ -225,7 +231,7 @@ def formats(listed: str) -> tuple[str, ...]:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """Return the Trace of a log. All numbers before its end are finite: one that is not is a failure, and the end.
+    """Return the Trace of a log. A number that is not finite counts as a failure, and the trace is NaN from there on.
 
     Args:
       log: (K + 1, n) LOG.
@@ -245,7 +251,7 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
         for values in arrays.values():
             values[end:] = np.nan
         diverged_at = failed_step * scenario.resolved.physics_step
-        failure = f"{one_line(failure, LONGEST_FAILURE)}, at t = {diverged_at:.6g} s"
+        failure = f"{one_line(failure, MAX_FAILURE)}, at t = {diverged_at:.6g} s"
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
 
@@ -264,14 +270,14 @@ def load(path: str | os.PathLike) -> Trace:
     try:
         scenario = serialise.restore(about)
     except ScenarioError as error:  # names its own cure
-        raise ScenarioError(f"the scenario of {path} cannot be brought back, {error}") from None
-    except Exception as error:  # JSON that is no scenario
+        raise ScenarioError(f"the scenario of {path} cannot be restored, {error}") from None
+    except Exception as error:  # JSON that is not a scenario
         why = f"{type(error).__name__}, {error}"
         raise ScenarioError(
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
     with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
-        names = [name for name in ARRAYS if not (older and name in NEWER)]
+        names = [name for name in ARRAYS if not (older and name in ADDED_ARRAYS)]
         arrays = {name: _member(archive, name, scenario) for name in names}
     arrays.setdefault("force", arrays["applied"].copy())
     arrays.setdefault("reaction", np.where(np.isfinite(arrays["applied"]), 0.0, np.nan))
@@ -279,7 +285,7 @@ def load(path: str | os.PathLike) -> Trace:
 
 
 def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """Return an array of a file: one that fits the scenario, or else a text. Its size is checked before it is read.
+    """Return an array of a file, checked against the scenario, or a text if there is none. The size is checked first.
 
     Raises:
       ScenarioError: it has another type or shape, or more bytes than it should.
@@ -288,7 +294,7 @@ def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = Non
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)
     if scenario is None:
-        fits = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MOST_TEXT
+        fits = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MAX_TEXT
     else:
         fits = dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
     if not fits:

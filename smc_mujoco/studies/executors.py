@@ -138,7 +138,7 @@ def compute_elsewhere(
         collect(0)
     except (BrokenExecutor, CancelledError) as error:
         why = " ".join(str(error).split()).rstrip(".") or "its tasks were cancelled"
-        raise ScenarioError(f"the executor has stopped ({why}): start it and the study again to go on") from None
+        raise ScenarioError(f"the executor has stopped ({why}): start it and the study again to continue") from None
     except ImportError as error:
         raise ScenarioError(f"a worker says {error}: install smc-mujoco there, the same version as here") from None
     finally:
@@ -229,7 +229,7 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
                 raise ScenarioError(f"dask at {executor} has no workers: start `dask worker` with its address")
             yield _DaskExecutor(client)
     except KilledWorker as error:
-        raise ScenarioError(f"{error}: read the workers' logs, and start the study again to go on") from None
+        raise ScenarioError(f"{error}: read the workers' logs, and start the study again to continue") from None
     except OSError as error:  # a timeout is one
         raise ScenarioError(
             f"no dask at {executor} ({error}): start `dask scheduler` and `dask worker` there"

@@ -156,7 +156,7 @@ class Board:
         if self.why:
             return f"no winner: {self.why}"
         fewest = min(block.fewest for block in self.blocks)
-        few = f", of two of which there {'are' if fewest > 1 else 'is'} {_distinct(fewest)}"
+        few = f", two of which have {_distinct(fewest)}"
         return f"no winner, undefeated: {_listed(self.best)}{few * (fewest < SEEDS)}"
 
     @property

@@ -131,8 +131,8 @@ class Outcome:
     def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
         """Return the last condition that each label tolerates, conditions ordered from weak to strong.
 
-        That is the last before the first one in which something does not hold: "a and b 20 ms, c 10 ms, d none". If it
-        holds again in a later one, that is said.
+        That is the last before the first one in which something does not hold: "a and b 20 ms, c 10 ms, d none". The
+        sentence also says if it holds again in a later one.
         """
         where, words = self._where(holds), {}
         for label, names in where.items():

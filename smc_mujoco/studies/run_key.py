@@ -15,11 +15,11 @@ from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.paper import scenarios
 
-OURS = "smc_mujoco."
+PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
 UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that do not affect runs
-LONGEST = 60  # characters of a condition's name
+MAX_NAME = 60  # characters of a condition's name
 
 
 def described(scenario: Scenario) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
     differ = [name for name in changed if getattr(scenario, name) is not None]  # the rest are defaults
     name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
-    return name if len(name) <= LONGEST else f"{name[:LONGEST]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
+    return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
 
 def _codes(s: Scenario) -> list[str]:
@@ -80,8 +80,8 @@ def _codes(s: Scenario) -> list[str]:
     functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
     signals = [type(signal) for signal in (s.reference, s.feedforward, *s.disturbance) if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
-    own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(OURS) and kind is not type(None)]
-    if not s.plant.build.__module__.startswith(OURS):
+    own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
+    if not s.plant.build.__module__.startswith(PACKAGE):
         builds = *s.plant.contacts.items(), *s.plant.mechanisms.items()
         own.append((s.plant.build, s.plant.fields, s.plant.nominal, builds))
     return [fingerprint.of(thing) for thing in (*functions, *signals, *own)]

@@ -24,7 +24,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.outcome import Outcome, summary
 
-LONGEST = 60  # bytes of a name in a file's name, which most file systems limit to 255
+MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ class Scene:
             raise
         except Exception as error:  # whatever a user's function raises
             what = f"{type(error).__name__}: {error}"
-            raise ScenarioError(f"the answer of scene {self.title!r} raises {what}; mend its function") from error
+            raise ScenarioError(f"the answer of scene {self.title!r} raises {what}; fix its function") from error
         if not isinstance(text, str) or not text.strip():
             raise ScenarioError(
                 f"the answer of scene {self.title!r} is {shown(text)}: give a function that returns text"
@@ -163,11 +163,11 @@ def _execute(path: Path) -> dict:
     except Exception as error:  # whatever a user's script raises
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         where = f"{path}, line {lines[-1]}" if lines else str(path)
-        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; mend the file"
+        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; fix the file"
         raise ScenarioError(f"{where}: {what}") from error
 
 
-def slug(name: str, longest: int = LONGEST) -> str:
+def slug(name: str, longest: int = MAX_NAME) -> str:
     """Return a name as part of a file name: letters, digits, and _ . + - between them.
 
     It has no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.

@@ -19,7 +19,7 @@ from smc_mujoco.testing.response import StepResponse
 
 RELATIVE = 0.01  # default tolerance, as a share of the value: chosen, far above rounding errors of other processors
 UPDATE = "run pytest --smc-update"
-LEAST = 1e-9  # least tolerance, in the metric's unit: above rounding errors of a value that is 0
+MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
 
 
 def place(test: Path) -> Path:
@@ -46,7 +46,7 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
             with replacing(file) as part:
                 part.write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
-        raise ScenarioError(f"{file} cannot be written ({error.strerror}): record where it can") from None
+        raise ScenarioError(f"{file} cannot be written ({error.strerror}): record it in a writable folder") from None
 
 
 def compare(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
@@ -96,7 +96,7 @@ def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: fl
     """Return a metric's tolerance in its unit: the given one, else a share of its value, 0 if that is inf."""
     if name in tolerances:
         return number(f"tolerance of {name}", tolerances[name], least=0.0)
-    share = max(number("rel", rel, least=0.0) * abs(value), LEAST)
+    share = max(number("rel", rel, least=0.0) * abs(value), MIN_TOLERANCE)
     return float(f"{share:.2g}") if math.isfinite(value) else 0.0
 
 

@@ -50,7 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make one test for each plant and condition of the marker."""
+    """Run a test once for each plant and condition of the marker."""
     marker = metafunc.definition.get_closest_marker("smc")
     if marker is None:
         return

@@ -7,7 +7,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.testing.response import StepResponse
 
-LONGEST = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
+MAX_ID = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
 
 
 def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
@@ -24,7 +24,7 @@ def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bo
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)
     files = []
     for plant, traces in plants.items():
-        name = slug(test[-LONGEST:], LONGEST) + (f"-{slug(plant)}" if len(plants) > 1 else "")
+        name = slug(test[-MAX_ID:], MAX_ID) + (f"-{slug(plant)}" if len(plants) > 1 else "")
         title = test.rpartition("::")[2]
         files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
         if video:

@@ -138,7 +138,7 @@ class StepResponse:
         """
         __tracebackhide__ = True
         if not limits:
-            raise ScenarioError("check has no limits: give metrics with the most they may be, as settling_time=0.6")
+            raise ScenarioError("check has no limits: give metrics with their largest values, as settling_time=0.6")
         self.named(limits)
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
@@ -176,15 +176,15 @@ def respond(
         if name not in scenarios.FIELDS:
             raise unknown("field of a Scenario", name, scenarios.FIELDS)
     if "reference" in given:
-        raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, for it is the step of {step}")
+        raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, as it is the step of {step}")
     if isinstance(law, Callable) and not isinstance(law, Template):
         raise ScenarioError(f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function")
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
     chosen = find_condition(condition)
-    machine = find_plant(plant) if isinstance(plant, str) else plant
-    conditions = chosen.on(machine, number("duration", given.get("duration", scenarios.DURATION)))
+    plant = find_plant(plant) if isinstance(plant, str) else plant
+    conditions = chosen.on(plant, number("duration", given.get("duration", scenarios.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | conditions | given
     words = [chosen.name] * (chosen.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
     return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(words))

@@ -634,7 +634,7 @@ def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
     (block,) = board.blocks
     assert (block.runs, block.most, block.fewest) == (20, 20, 1)
     assert (block.best, board.winner, board.losses("a")) == (("b", "c"), None, ["c0"])
-    assert board.verdict == "no winner, undefeated: b, c, of two of which there is 1 distinct run"
+    assert board.verdict == "no winner, undefeated: b, c, two of which have 1 distinct run"
 
 
 def test_compare_counts_distinct_runs_of_each_pair():

@@ -443,7 +443,7 @@ def test_show_of_a_failed_run_says_why(call, folder):
     smc.run(smc.Scenario(plant=unstable, law="none", duration=0.1)).save("wild.npz")
     code, out, _ = call("show", "wild.npz")
     assert code == 0
-    assert "left the finite world" in " ".join(out.split())
+    assert "the plant diverged" in " ".join(out.split())
 
 
 # mistakes

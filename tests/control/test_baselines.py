@@ -108,7 +108,7 @@ def test_the_pid_s_memory_runs_by_the_control_period(dt):
 
 def test_design_refuses_a_joint_without_an_actuator():
     with pytest.raises(
-        smc.ScenarioError, match=r"cart_pole's channel 1 has no actuator, .* take a law that does, 'hier"
+        smc.ScenarioError, match=r"cart_pole's channel 1 has no actuator, .* take the law 'hierarchical"
     ):
         design.lqr("cart_pole")
 

@@ -41,7 +41,7 @@ def pair() -> list[smc.Trace]:
     return runs()
 
 
-def broken(trace: smc.Trace, at: int, failure: str = reference.LEFT_THE_WORLD) -> smc.Trace:
+def broken(trace: smc.Trace, at: int, failure: str = reference.PLANT_DIVERGED) -> smc.Trace:
     """The trace as if it had diverged at sample `at`, on its way to 1e5."""
     arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
     arrays["x"][max(at - 5, 0) : at] = 1e5

@@ -41,7 +41,7 @@ def failed(trace: smc.Trace, at: int) -> smc.Trace:
     arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
     for array in arrays.values():
         array[at:] = np.nan
-    sentence = f"{reference.LEFT_THE_WORLD}, at t = {trace.t[at]:g} s"
+    sentence = f"{reference.PLANT_DIVERGED}, at t = {trace.t[at]:g} s"
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure=sentence)
 
 

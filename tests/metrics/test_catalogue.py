@@ -631,7 +631,7 @@ def test_a_broken_trace_is_refused_by_score_and_by_every_metric(message, trace):
         text = str(refusal.value)
         assert text.startswith("duffing under classical")
         assert message in text
-        assert ("mend that" if "raised" in message else "change the gains") in text
+        assert ("correct the law" if "raised" in message else "change the gains") in text
         assert "\n" not in text
 
 

@@ -452,7 +452,7 @@ def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path):
 
 
 def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch):
-    monkeypatch.setattr("smc_mujoco.simulation.trace.MOST_TEXT", 100)
+    monkeypatch.setattr("smc_mujoco.simulation.trace.MAX_TEXT", 100)
     refused(lambda: trace.save(tmp_path / "a.npz"), "give it shorter time series")
     assert names(tmp_path) == []
 

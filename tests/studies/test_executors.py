@@ -164,7 +164,7 @@ def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
     with Elsewhere(1) as pool:
         pool.last, pool.end = 4, end
         with pytest.raises(
-            smc.ScenarioError, match=r"^the executor has stopped \(.+\): start it and the study again to go on$"
+            smc.ScenarioError, match=r"^the executor has stopped \(.+\): start it and the study again to continue$"
         ):
             study(mixed(), tmp_path, executor=pool)
     assert len(list((tmp_path / "parts").glob("*.parquet"))) == 3

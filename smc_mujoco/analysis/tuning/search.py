@@ -25,6 +25,7 @@ It is never worse than one whose budget is a multiple of 48. `objective` defines
 import contextlib
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -32,7 +33,7 @@ import numpy as np
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.result import Evaluation, Tuned, compare, load, versions
-from smc_mujoco.common.errors import find, whole
+from smc_mujoco.common.errors import ScenarioWarning, find, users_frame, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
@@ -54,7 +55,7 @@ MEMBERS, STAGE = 16, 48  # size of the population; evaluations between accurate 
 FINALISTS = 6  # candidates run accurately after each stage
 DITHER = (0.2, 0.7)  # differential weight, drawn each generation; of three tried the best within 128 evaluations
 DIGITS = 4  # of a gain
-LONGEST = 1_000_000  # candidates
+MAX_CANDIDATES = 1_000_000  # candidates
 Report = Callable[[int], None]
 
 
@@ -83,13 +84,16 @@ def tune(
 
     Raises:
       ScenarioError: a law with gains of unknown unit, a plant without scales, or an argument out of range.
+
+    Warns:
+      ScenarioWarning: the law's own gains are better than any that were tried.
     """
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     if conditions is not None:
         goal = dataclasses.replace(goal, conditions=conditions)  # pyright: ignore[reportArgumentType]
     if starts is not None:
         goal = dataclasses.replace(goal, starts=starts)
-    budget = whole("budget", budget, 1, LONGEST)
+    budget = whole("budget", budget, 1, MAX_CANDIDATES)
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, coerce.law(law), seed)
     plant, law = cases[0].plant, cases[0].law
@@ -98,17 +102,25 @@ def tune(
     reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
-    before = goal.terms(run(cases, threads))
+    tracking, variation = goal.terms(run(cases, threads))
+    before = tracking + goal.weight * variation
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
         ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
         box = _search(ledger, start, seed)
     best = min(ledger.finals, key=lambda e: e.objective)
+    if best.objective > before:
+        warnings.warn(
+            f"no set of gains tried for {law.name} on {plant.name} is better than the law's own, with an objective of "
+            f"{best.objective:.3g} s² instead of {before:.3g} s²: give a larger budget",
+            ScenarioWarning,
+            users_frame(),
+        )
     return Tuned(
         law=_with(law, tuple(start), best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
         finals=tuple(ledger.finals),
-        before=before[0] + goal.weight * before[1],
+        before=before,
         plant=plant,
         definition=goal,
         rule=RULE,

@@ -25,9 +25,7 @@ def tune(
     front: Annotated[
         Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
     ] = None,
-    conditions: Annotated[
-        str | None, typer.Option(help="Conditions, as a,b, in place of the seven of the objective (see the end).")
-    ] = None,
+    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b, in place of the seven above.")] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
@@ -35,10 +33,10 @@ def tune(
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
-    Every law has the same bound on u, the same objective, the same number of gains tried, and the same width of search
-    about the scale that each gain has by its dimension. The objective is error times time, plus variation of u, in runs
-    of 5 s: nominal, noisy, delayed, disturbed by a sine and by a constant, and with 30 % more and less mass. The same
-    seed gives the same gains.
+    Every law has the same bound on u, the same objective and the same number of sets tried. Each gain is searched over
+    the same number of decades about a scale that follows from its unit and the plant. The objective is error times
+    time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise, delay, a sine and a constant
+    disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
 
     Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
@@ -68,8 +66,6 @@ def tune(
         f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; "
         f"{len(tuned.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
     )
-    if tuned.objective > tuned.before:
-        terminal.print("no set of gains tried is better than the default ones: give a larger --budget")
     if path:
         terminal.wrote(tuned.save(path))
     if front:
@@ -85,8 +81,8 @@ def margins(
     plants: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[PLANT]...",
-            help="Plants that `list` shows, or FILE.xml:joint+joint; by default the paper's.",
+            metavar="PLANT",
+            help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint; default the paper's five.",
             show_default=False,
         ),
     ] = None,
@@ -94,11 +90,11 @@ def margins(
         str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {options.OWN_GAINS}")
     ] = None,
     kinds: Annotated[
-        str | None, typer.Option(help="Any of delay,disturbance,friction,mass,noise, as a,b; default all.")
+        str | None, typer.Option(help="Any of delay, disturbance, friction, mass and noise, as a,b; default all.")
     ] = None,
     gains: options.Gains = "tuned",
     quick: Annotated[
-        bool, typer.Option("--quick", help="Shorter runs, coarser; by default 2 plants, 4 laws, delay and disturbance.")
+        bool, typer.Option("--quick", help="Shorter runs, coarser results; default 2 plants, 4 laws, 2 kinds.")
     ] = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
@@ -109,8 +105,8 @@ def margins(
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one, noise is the
     standard deviation of the position (that of the velocity is 5/s times as large), and the delay of the command is in
-    s. The column theory is the limit of the loop linearised at rest, for laws that have one: the delay at which rest
-    turns unstable, for example. A law may tolerate more, in a small steady oscillation. The module
+    s. The column theory is the limit of the loop linearised at rest, for laws that have one: for example the delay at
+    which rest becomes unstable. A law may tolerate more, with a small steady oscillation. The module
     smc_mujoco.analysis.margins describes the search and its limits.
 
     Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
@@ -144,7 +140,7 @@ def margins(
 @errors_as_sentences()
 def basin(
     plant: options.PlantName,
-    law: Annotated[str, typer.Option(help=f"A law that `laws` shows. {options.OWN_GAINS}")] = "observer_free",
+    law: Annotated[str, typer.Option(help=f"A law. {options.OWN_GAINS}")] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
@@ -153,11 +149,11 @@ def basin(
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
 ) -> None:
-    """Map a region of attraction: run a grid of initial positions and velocities, and tell which come to rest at 0.
+    """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest at 0.
 
-    Positions reach half a turn either way, or on a rail twice the study's start. Velocities reach three times that, per
-    second. All channels of a network have the same start. A run ends as soon as it is decided, by the rule in
-    smc_mujoco.analysis.region_of_attraction.
+    Positions reach half a turn either way, or on a rail twice the study's start. Velocities reach three times that
+    number per second. All channels of a network have the same start. A run ends as soon as its outcome is decided, by
+    the rule in smc_mujoco.analysis.region_of_attraction.
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """

@@ -19,10 +19,10 @@ def check_c(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
     gains: Annotated[
         str,
-        typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order; other values where the file has them."),
+        typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order, if the file does not define them."),
     ] = "",
     memory: Annotated[
-        int | None, typer.Option(min=1, help="Size of the state, in numbers; default what the file says, or 8.")
+        int | None, typer.Option(min=1, help="Numbers of memory; default what the file says, or 8.")
     ] = None,
     symbol: Annotated[str, typer.Option(help="Name of the function.")] = "smc_law",
     flag: Annotated[
@@ -30,13 +30,13 @@ def check_c(
     ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds for each of compiler, set-up and trial.")] = 10.0,
 ) -> None:
-    """Compile a control law in C, try it in a process of its own, and say in one sentence what is wrong with it.
+    """Compile a control law in C, try it in a separate process, and say in one sentence what is wrong with it.
 
     The trial runs the law on a double integrator under noise, with and without model and surface, for 10 s and at later
-    times, and calls it at states far away. It finds crashes, endless loops, NaN, gains without a name, writes beyond
-    the law's memory, state kept elsewhere (in static data, above all), and a changed rounding mode or flush-to-zero. It
-    then runs a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2.
-    smc_law.h describes the signature; it is at the top of every file that `export-c` writes.
+    times, and calls it at very large errors. It finds crashes, endless loops, NaN, gains without a name, writes beyond
+    the law's memory, state kept elsewhere (such as static data), and a changed rounding mode or flush-to-zero. It then
+    runs a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2.
+    smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export-c` writes.
 
     The process is not a sandbox: the law can open files and connections, like any program that you start.
 
@@ -57,7 +57,7 @@ def check_c(
 def export_c(
     law: options.LawName,
     gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's own values.")
+        str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
     ] = "",
     numbers: Annotated[
         str, typer.Option("--type", metavar="double|float|q15", help="Type of numbers; q15 for observer_free only.")
@@ -66,8 +66,9 @@ def export_c(
     """Write a law as one file of C99 without dependencies, for firmware or for smc.law_from_c.
 
     The C is translated from the law's Python, operation by operation. It keeps its state in the array memory[] that its
-    caller passes, allocates nothing, and says at its top how many bytes of code and state it takes. In double precision
-    it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same bits.
+    caller passes, and allocates nothing. The comment at its top says how many bytes of code and state it takes. In
+    double precision it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same
+    bits.
 
     Example: smc-mujoco export-c observer_free --gains lam=6,k1=3 --type float > observer_free.c
     """

@@ -56,8 +56,8 @@ def laws(
     The column deg is the relative degree of the variable that a law drives to zero: 1 for a sliding variable s, of any
     surface of degree 1; 2 for the error e and its rate; 3 for e and two rates.
 
-    With --needs, --family or --plant the table has the laws that suit, and what distinguishes them. `smc-mujoco which`
-    compares such laws on a plant, and advises one.
+    With --needs, --family or --plant the table has the laws that suit, and what distinguishes them. The command
+    "smc-mujoco which" compares such laws on a plant, and advises one.
 
     Example: smc-mujoco laws super_twisting
 
@@ -71,7 +71,7 @@ def laws(
     if name is not None and filtered:
         raise ScenarioError(f"laws {name} shows one law: leave it out, or leave out --needs, --family and --plant")
     if filtered:
-        machine = None if plant is None else options.plant(plant)
-        law_pages.print_suitable(options.names(needs), family, machine, Terminal())
+        chosen = None if plant is None else options.plant(plant)
+        law_pages.print_suitable(options.names(needs), family, chosen, Terminal())
     else:
         law_pages.print_pages(name, Terminal())

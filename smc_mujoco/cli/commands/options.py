@@ -34,20 +34,20 @@ Condition = Annotated[
 ]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
 Json = Annotated[Path | None, typer.Option(help="Also write the result to a .json file.")]
-LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law that `laws` shows.")]
+LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law from the table of `smc-mujoco laws`.")]
 PlantName = Annotated[
     str,
-    typer.Argument(metavar="PLANT", help="A plant that `list` shows, or FILE.xml:joint+joint for your own model."),
+    typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model."),
 ]
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of one that `list` shows.")]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene from `smc-mujoco list`, or a scene file.")]
 Spread = Annotated[
-    float | None, typer.Option("--spread", help="Share of x0 by which seeds move the start either way; default 0.2.")
+    float | None, typer.Option("--spread", help="How far starts vary about x0, as a fraction of it; default 0.2.")
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
 
 SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or the .json file that tune wrote."
+OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or a .json file that `smc-mujoco tune` wrote."
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
@@ -58,7 +58,7 @@ def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
 def law(text: str) -> "str | Law":
     """Return a law by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
 
-    A label may stand before it, as in "slow: classical(k=2)". The text is parsed and never evaluated.
+    A label may come first, as in "slow: classical(k=2)". The text is parsed and never evaluated.
 
     Raises:
       ScenarioError: any other text, an unknown law or gain, or a file that is not a tuning.

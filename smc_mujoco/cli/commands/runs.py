@@ -40,8 +40,8 @@ def run(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Exported traces have every number to the last bit, and its unit: csv in the first line ("t [s],x [m],..."), mat in
-    the struct `units`, parquet in the metadata of each column, under "unit".
+    Exported traces have every number to the last bit, and its unit. Units are in the first line of csv ("t [s],x
+    [m],..."), in the struct units of mat, and in the metadata of each column of parquet, as "unit".
 
     Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
     """
@@ -64,7 +64,7 @@ def run(
 
 @errors_as_sentences()
 def show(
-    trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file that `run` or Trace.save wrote.")],
+    trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
     figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
     export: Annotated[
         str | None,
@@ -74,7 +74,10 @@ def show(
         ),
     ] = None,
 ) -> None:
-    """Show a trace: what was run, how it went, and its scores."""
+    """Show a trace: what was run, how it went, and its scores.
+
+    Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
+    """
     with held_back():
         from smc_mujoco.cli import tables
         from smc_mujoco.simulation.trace import formats, load
@@ -102,7 +105,7 @@ def show(
 
 
 def _print_curves(trace: "Trace", terminal: Terminal) -> None:
-    """Print the columns of a trace as curves of block characters; of a large group only the first channel."""
+    """Print the columns of a trace as curves of block characters. A large group shows only its first channel."""
     from smc_mujoco.cli import tables
 
     plant = trace.scenario.plant
@@ -121,7 +124,7 @@ def _print_curves(trace: "Trace", terminal: Terminal) -> None:
 def view(
     name: options.SceneName,
     condition: Annotated[
-        str | None, typer.Option(help="Which of the scene's conditions; default the one that is filmed.")
+        str | None, typer.Option(help="Which of the scene's conditions; default the one of the film.")
     ] = None,
     label: Annotated[str | None, typer.Option(help="Label of the run in that condition; default the first.")] = None,
 ) -> None:
@@ -133,7 +136,7 @@ def view(
     - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
     - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
 
-    The run is the one that `run` simulates, as a single simulation in Python. All other sliders and settings of the
+    The run is the same as that of `smc-mujoco run`, but is simulated in Python. All other sliders and settings of the
     viewer change only the picture.
 
     Example: smc-mujoco view inverted_pendulum --label super_twisting

@@ -97,11 +97,12 @@ def bench(
         str | None, typer.Option(help="Plants, as a,b or FILE.xml:joint+joint; default the paper's five.")
     ] = None,
     laws: Annotated[
-        str | None, typer.Option(help=f"Laws, as a,b, or all; default the report's short list. {options.OWN_GAINS}")
+        str | None,
+        typer.Option(help=f"Laws, as a,b, or all; default those of the report's first page. {options.OWN_GAINS}"),
     ] = None,
     conditions: Annotated[
         str | None,
-        typer.Option(help="Conditions, as a,b; default those of 12 that suit the plants, or none beside --condition."),
+        typer.Option(help="Conditions, as a,b; default up to 12 that suit the plants, none with --condition."),
     ] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
@@ -115,17 +116,17 @@ def bench(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
-        str, typer.Option(help="Traces to save: none, all, or the worst by plant and condition.")
+        str, typer.Option(help="Traces to save: none, all, or worst (the worst run per plant and condition).")
     ] = "none",
-    fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that the folder holds.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that are in the folder.")] = False,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: run every combination from every seed, to OUT/results.parquet.
 
-    Finished runs are kept. Stop the command whenever you like; started again with the same options, it goes on. The
-    table is that of the last command only, so give each study an --out of its own. `smc-mujoco list` shows laws and
-    conditions. --laws all ranks every general law whose gains on these plants are in the set; the set `default` has
-    them for all laws. The leaderboard names the winner under each condition, and what holds under all of them.
+    Finished runs are kept: you can stop the command at any time, and continue by starting it again with the same
+    options. The table has only the runs of the last command, so give each study its own --out. `smc-mujoco list` shows
+    laws and conditions. --laws all compares every general law that has gains for these plants in the set of --gains;
+    the set default has gains for all laws. The leaderboard names the winner under each condition, and over all of them.
 
     Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 16 --out duffing
     """
@@ -139,14 +140,14 @@ def bench(
         from smc_mujoco.studies.study import FULL, QUICK, study
 
     terminal, size = Terminal(), QUICK if quick else FULL
-    machines = [options.plant(text) for text in options.names(plants, size.plants)]
+    chosen_plants = [options.plant(text) for text in options.names(plants, size.plants)]
     length = size.duration if duration is None else duration
-    found = [find_plant(plant) if isinstance(plant, str) else plant for plant in machines]
+    found = [find_plant(plant) if isinstance(plant, str) else plant for plant in chosen_plants]
     usual = () if condition else applicable(size.conditions, found, length)
     chosen = options.names(laws, size.laws)
-    chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
+    chosen = general_laws(chosen_plants, gains) if laws == "all" else [options.law(text) for text in chosen]
     scenarios = grid(
-        machines,
+        chosen_plants,
         chosen,
         options.conditions(options.names(conditions, usual), condition),
         seeds or size.seeds,
@@ -173,7 +174,7 @@ def claims(
         bool, typer.Option("--quick", help="Coarser grids, no network above 50 pendulums, tuned gains only.")
     ] = False,
     table: Annotated[
-        Path | None, typer.Option(help="results.parquet of a bench, whose runs are then not repeated.")
+        Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
@@ -227,8 +228,8 @@ def report(
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
 
     It has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; films.
-    The file OUT/report.html needs no network and no other file; the data are beside it. If you stop the command and
-    start it again, it goes on from there.
+    The file OUT/report.html needs no network and no other file; the data are in the same folder. You can stop the
+    command at any time, and continue by starting it again.
 
     Example: smc-mujoco report --quick --out look
     """

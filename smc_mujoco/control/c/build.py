@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown, users_frame
-from smc_mujoco.common.process import Late, timed
+from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 HERE = Path(__file__).parent
@@ -89,7 +89,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     files = [str(HERE / "glue.c"), "-o", str(target)]
     try:
         done = timed([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
-    except Late:
+    except TimedOut:
         raise ScenarioError(
             f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
         ) from None
@@ -122,7 +122,7 @@ def replayer(command: tuple[str, ...]) -> Path | None:
     try:
         if timed(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
             return None
-    except (Late, OSError):
+    except (TimedOut, OSError):
         return None
     return target
 
@@ -131,7 +131,7 @@ def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, i
     """Return a law's address in its library, and (name, address, size) of the library's writable static data, by nm."""
     try:
         table = timed(["nm", "-f", "sysv", str(library)], 60.0).stdout
-    except (Late, OSError):
+    except (TimedOut, OSError):
         return 0, []
     functions = {name: int(address, 16) for name, address in FUNCTION.findall(table)}
     data = [(name, int(address, 16), int(size, 16)) for name, address, size in DATA.findall(table)]
@@ -156,8 +156,8 @@ def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     if error is None or error["line"] is None:  # from the linker or the command itself
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
-        return f"{name} does not compile, {command} says: {telling[0].strip()}; mend it, or give other flags="
+        return f"{name} does not compile, {command} says: {telling[0].strip()}; fix it, or give other flags="
     if f"'{symbol}'" in what or file == "glue.c":
         return f"{name} has another {symbol} than smc_mujoco calls: it must be {_prototype(symbol)}"
     where = f"line {error['line']}" if file == name else f"{error['file']}, line {error['line']}"
-    return f"{name} does not compile: {where}, {what}; mend it"
+    return f"{name} does not compile: {where}, {what}; fix it"

@@ -13,7 +13,7 @@ import textwrap
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.jit import AtAddress
-from smc_mujoco.common.process import Late, timed
+from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.c import build
 from smc_mujoco.control.c.translate import MATH, Untranslatable, plain, rows, translate
@@ -40,7 +40,7 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
         raise unknown("type of numbers", numbers, BYTES)
     law = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(law, Component) or law.kind != "law" or law.function is None:
-        raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), one of your own, or a name")
+        raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
     if isinstance(law.function, AtAddress):
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
     if numbers == "q15":
@@ -137,7 +137,7 @@ def _measured(code: str) -> str:
         done = timed([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
         version, tool = _tools(tuple(command))
         table = timed([tool, "-A", str(target)], 60.0).stdout
-    except (OSError, Late):
+    except (OSError, TimedOut):
         return "not measured: there is no compiler here"
     sections = [(name, int(n)) for name, n in re.findall(r"^\.(text|rodata)\S*\s+(\d+)", table, re.MULTILINE)]
     if done.returncode or not sections:

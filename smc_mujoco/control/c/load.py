@@ -1,8 +1,8 @@
 """Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
 
 `smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`, which calls the law
-the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Whatever
-can hang or crash is tried in a separate process first: loading, smc_setup and, on request, the law itself.
+the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Loading,
+smc_setup and, on request, the law itself are tried in a separate process first, because they can hang or crash.
 """
 
 # pyright: reportCallIssue=false
@@ -64,7 +64,7 @@ class CLaw(AtAddress):
     def set_up(self, gains: int, memory: int, name: str | None) -> None:
         """Call smc_setup, and set the name and the number of gains and of memory slots."""
         if code := sandbox.set_up(self.library):
-            raise ScenarioError(f"{self.path.name}: smc_setup returned {code}: mend it")
+            raise ScenarioError(f"{self.path.name}: smc_setup returned {code}: fix it")
         self.sizes, self.__name__ = (gains, memory), name or self.__name__
         sandbox.set_sizes(self.library, gains, memory)
 
@@ -129,7 +129,7 @@ def law_from_c(
     plants: Iterable[str] = (),
     modelled: bool | None = None,
 ) -> Template:
-    """Load a law of your own in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
+    """Load your own law in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
 
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.

@@ -102,7 +102,7 @@ def call(library: Library, fields: Sequence[str], gains: Sequence[float], memory
 def _run(library: Library, trial: dict | None) -> dict[str, Any]:
     """Run this file as a script, and return the constants that it prints at its end."""
     from smc_mujoco.common.errors import ScenarioError
-    from smc_mujoco.common.process import Late, timed
+    from smc_mujoco.common.process import TimedOut, timed
     from smc_mujoco.control.c import build
 
     progress, order = build.fresh(".txt"), build.fresh(".json")
@@ -111,7 +111,7 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
     command = [sys.executable, "-I", "-S", __file__, str(order)]
     try:
         code = timed(command, library.timeout, output=False).returncode
-    except Late:
+    except TimedOut:
         code = None
     lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]
     if lines[-1] == "unloading" and code == 0:
@@ -131,18 +131,18 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
 def _ended(code: int | None, timeout: float) -> str:
     """Return in words how a process ended: by an exit code, a signal or the timeout."""
     if code is None:
-        return f"did not end within {timeout:g} s: mend what it waits for, or give timeout="
+        return f"did not end within {timeout:g} s: fix what it waits for, or give timeout="
     if code >= 0:
         return f"ended the process with exit code {code}: let it return"
     names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
     name, does = names.get(-code, f"signal {-code}"), SIGNALS.get(-code, "reads, writes or divides")
-    return f"died of {name} ({signal.strsignal(-code)}): mend where it {does}"
+    return f"died of {name} ({signal.strsignal(-code)}): fix where it {does}"
 
 
 def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
     from smc_mujoco.common.errors import ScenarioError
-    from smc_mujoco.common.process import Late, timed
+    from smc_mujoco.common.process import TimedOut, timed
     from smc_mujoco.control.c import build
 
     compiler = build.compiler()
@@ -156,7 +156,7 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
         return f"{compiler[0]} has none with these flags"
     try:
         done = timed([str(n) for n in (program, file, calls, gains, memory)], library.timeout)
-    except Late:
+    except TimedOut:
         late = f"{library.symbol} did not end within {library.timeout:g} s with sanitizers"
         raise ScenarioError(f"{library.path.name}: {late}: give timeout=") from None
     if done.returncode == 0:
@@ -169,7 +169,7 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
         places = [frame for frame in FRAME.finditer(done.stderr) if Path(frame["file"]).exists()]
     name = Path(places[0]["file"]).name if places else library.path.name
     where = f"line {places[0]['line']}" if places else library.symbol
-    raise ScenarioError(f"{name} does harm in {where}: {what}; mend it")
+    raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
 
 
 # libraries through ctypes, in the script and in the process that runs the law
@@ -298,7 +298,7 @@ class Trial:
             if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
                 self.check_gains(y, before)
                 what = code or f"u = {u}, s = {s}"
-                raise Fault(f"returned {what} at t = {t:g}, e = {e:g}, de = {de:g}: mend it, or the gains")
+                raise Fault(f"returned {what} at t = {t:g}, e = {e:g}, de = {de:g}: fix it, or the gains")
             if k % 50 == 0:
                 self.check_static_data()
                 if repr(self.law_at(y, self.state(before))) != repr((code, u, s)):
@@ -376,7 +376,7 @@ def attempt(order, progress) -> None:
     done("loading it")
     print("smc_setup", file=progress)
     if code := set_up(library):
-        raise Fault(f"smc_setup returned {code}: mend it")
+        raise Fault(f"smc_setup returned {code}: fix it")
     done("smc_setup")
     if trial := order["trial"]:
         print(symbol, file=progress)

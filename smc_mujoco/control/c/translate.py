@@ -155,7 +155,7 @@ class Program:
         """Return the kinds of a function's results, and a call of it without the closing parenthesis.
 
         A function is translated once per combination of argument kinds. A literal exponent is not an argument in C:
-        each exponent gives a function of its own.
+        each exponent gives its own function.
         """
         written, tree = parsed(function)
         names = [a.arg for a in tree.args.args]

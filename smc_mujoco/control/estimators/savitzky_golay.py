@@ -16,23 +16,23 @@ Chem. 36(8):1627, 1964; P. Gorry, "General least-squares smoothing and different
 from smc_mujoco.control.estimator import estimator_function
 from smc_mujoco.control.units import Gain
 
-MOST = 128  # readings in memory
+MAX_READINGS = 128  # readings in memory
 FITS = {
-    f"whole numbers, a window of 2 to {MOST} and a degree of 1 to window - 1, else the nearest": lambda g: (
-        g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MOST
+    f"whole numbers, a window of 2 to {MAX_READINGS} and a degree of 1 to window - 1, else the nearest": lambda g: (
+        g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MAX_READINGS
     )
 }
 
 
 @estimator_function(
     gains={"window": Gain(31.0, positive=True, held=True), "degree": Gain(2.0, positive=True, held=True)},
-    memory=2 + 3 * MOST,
+    memory=2 + 3 * MAX_READINGS,
     conditions=FITS,
 )
 def savitzky_golay(y, gains, memory):
-    N = min(max(int(gains.window), 2), MOST)
+    N = min(max(int(gains.window), 2), MAX_READINGS)
     degree = min(max(int(gains.degree), 1), N - 1)
-    velocities, accelerations, readings = 2, 2 + MOST, 2 + 2 * MOST
+    velocities, accelerations, readings = 2, 2 + MAX_READINGS, 2 + 2 * MAX_READINGS
     if memory[0] == 0.0:
         memory[0] = 1.0
         end = (N - 1) / 2.0

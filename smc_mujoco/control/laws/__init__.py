@@ -6,8 +6,9 @@ and [a]^p = |a|^p sgn(a). A trailing _ means one sample earlier, a trailing + on
 brings its sliding variable and the first r - 1 derivatives of it to 0 in finite time.
 
 Formulas are as published, for s' = u + d. Without a model u is the formula itself. With a scenario's model="nominal"
-the formula is an acceleration, added to the acceleration v_eq that keeps s constant: u = (v_eq + formula - f + r'') /
-g.
+the formula is an acceleration, added to the acceleration v_eq that keeps s constant:
+
+    u = (v_eq + formula - f + r'') / g
 
 Units are those of a sliding joint. For a rotating joint read rad for m and N m for N. With the nominal model u is an
 acceleration inside the law: read m/s^2 for N.

@@ -16,8 +16,8 @@ lie in the left half-plane (x + L q is a flat output: its second derivative is g
 and a L < 1. The default gains give cart_pole a triple root at p = -2 1/s. u is singular at a g = -gq, for cart_pole at
 cos q = a L, 63 degrees; beyond this angle the pole falls.
 
-A model of your own can use the law if its joint has the same sign: q > 0 leans a pole towards growing x, and swings a
-load the other way. If it does not, reverse the axis of the joint.
+Your own model can use the law if its joint has the same sign: q > 0 leans a pole towards growing x, and swings a load
+the other way. If it does not, reverse the axis of the joint.
 
 Without the model f = fq = gq = 0 and g = 1, so u = -(k sgn(S) + rate S) / a. Its sign is right for the crane, and wrong
 for the pole, because gq < 0 outweighs a g there: the crane comes to rest, and the pole falls.

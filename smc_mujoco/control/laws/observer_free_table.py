@@ -17,8 +17,8 @@ import numpy as np
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
-MOST, END = 256, 5.0  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
-TABLE = np.array([math.tanh(END * i / MOST) for i in range(MOST)] + [1.0])
+MAX_STEPS, END = 256, 5.0  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
+TABLE = np.array([math.tanh(END * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1.0])
 
 
 @law_function(
@@ -26,14 +26,14 @@ TABLE = np.array([math.tanh(END * i / MOST) for i in range(MOST)] + [1.0])
     continuous=True,
     label="Observer-free, table",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "size": Gain(64.0, positive=True, held=True)},
-    conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MOST},
+    conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MAX_STEPS},
 )
 def observer_free_table(y, gains, memory):
     s, v_eq = sliding(y, gains.k1)
-    stride = int(MOST / min(max(gains.size, 1.0), MOST))
-    place = min(abs(s), END) * (MOST / (END * stride))
+    stride = int(MAX_STEPS / min(max(gains.size, 1.0), MAX_STEPS))
+    place = min(abs(s), END) * (MAX_STEPS / (END * stride))
     i = int(place)
-    low = min(i * stride, MOST)
-    high = min(low + stride, MOST)
+    low = min(i * stride, MAX_STEPS)
+    high = min(low + stride, MAX_STEPS)
     T = TABLE[low] + (place - i) * (TABLE[high] - TABLE[low])
     return command(y, v_eq - gains.lam * math.copysign(T, s)), s

@@ -25,7 +25,7 @@ from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.custom import mjcf_trial
 from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR
-from smc_mujoco.mechanisms.plant import LARGEST
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
@@ -230,7 +230,7 @@ def tried(source: Source, timeout: float) -> None:
         command = [sys.executable, "-I", "-S", mjcf_trial.__file__, str(order)]
         try:
             code = process.timed(command, timeout, output=False).returncode
-        except process.Late:
+        except process.TimedOut:
             code = None
         except OSError:  # this process may not start others
             return
@@ -257,7 +257,7 @@ def _complaint(source: Source, last: str, code: int | None, timeout: float) -> S
     names = {known.value: known.name for known in signal.Signals}
     how = names.get(-code, f"exit code {code}")
     hint = f"more than {MEMORY / 2**30:g} GiB of memory" if how == "SIGABRT" else "a model that attaches itself"
-    return ScenarioError(f"{source.label} ends MuJoCo with {how}, as does {hint}: mend the model")
+    return ScenarioError(f"{source.label} ends MuJoCo with {how}, as does {hint}: fix the model")
 
 
 def broken(where: str, error: str) -> ScenarioError:
@@ -274,7 +274,7 @@ def broken(where: str, error: str) -> ScenarioError:
         )
     text = re.sub(r"^(?:(?:XML )?Error: |Schema violation: |ParseXML: )+|,? ?line \d+$", "", text)
     text = re.sub(r" Element '(\w+)'$", r" in <\1>", re.sub(r" Element name '.*$", "", text))
-    return ScenarioError(f"MuJoCo cannot read {where} ({text}{place}): mend the file")
+    return ScenarioError(f"MuJoCo cannot read {where} ({text}{place}): fix the file")
 
 
 def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
@@ -350,12 +350,12 @@ def check_numbers(label: str, model: mujoco.MjModel) -> None:
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
-        wrong = np.isnan(values) if field.endswith("range") else ~(np.abs(values) <= LARGEST)
+        wrong = np.isnan(values) if field.endswith("range") else ~(np.abs(values) <= MAX_PARAMETER)
         if wrong.any():
             place = tuple(np.argwhere(wrong)[0])
             raise ScenarioError(
                 f"{field} of {label} is {values[place]:g}{_where(model, field, int(place[0]))}: "
-                f"give finite numbers of at most {LARGEST:g} in its MJCF"
+                f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
             )
 
 

@@ -45,7 +45,7 @@ from smc_mujoco.mechanisms.plant import DIRECTLY, Field, Plant, catalogue
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
-LONGEST = 86_400.0  # s, of a timeout
+MAX_TIMEOUT = 86_400.0  # s, of a timeout
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT = "give a law without a model"
 CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
@@ -147,7 +147,7 @@ def plant_from(
     equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours.
     """
     source = mjcf.source(path, assets)
-    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=LONGEST))
+    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=MAX_TIMEOUT))
     return own_plant(source, channels, name, keyframe)
 
 

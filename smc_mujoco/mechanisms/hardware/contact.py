@@ -36,9 +36,9 @@ DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is
 # m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a short blow meets e
 # within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at 0.1.
 DEPTH_OF_BOBS = 0.0015
-LIVELIEST = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
+MAX_RESTITUTION = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
 DEAD = 0.01  # smallest restitution, used for smaller ones: below, the dashpot is too stiff for a step of 1 ms
-MOST_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
+MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
 # Constant impedances d: FIRM for blows against a fixed obstacle, SPRINGY for blows between bobs and for sliding. The
 # spring carries 1 - d of a steady load. With FIRM a body that leans on an obstacle rests within 0.1 mm; at 0.99 it
 # rattles.
@@ -70,8 +70,8 @@ class Contact(Part):
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str):
             raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
-        self.check_numbers("friction", least=0.0, most=MOST_FRICTION)
-        self.check_numbers("restitution", least=0.0, most=LIVELIEST)
+        self.check_numbers("friction", least=0.0, most=MAX_FRICTION)
+        self.check_numbers("restitution", least=0.0, most=MAX_RESTITUTION)
 
     def check(self, plant: Plant) -> None:
         """Check that the plant offers this contact.

@@ -20,7 +20,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, unknown
 from smc_mujoco.mechanisms.hardware.part import Actuator, Nominal, drive_ids, drives
-from smc_mujoco.mechanisms.plant import LARGEST, Field
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
@@ -161,7 +161,7 @@ class DCMotor(Drive):
         self.check_numbers("torque_constant", "gear", above=0.0)
         self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", least=0.0)
         self.check_numbers("voltage", "current", above=0.0, most=math.inf, infinite=True)
-        if not self.constant >= LEAST_CONSTANT or not self.resistance / self.constant <= LARGEST:
+        if not self.constant >= LEAST_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
                 f"resistance of {self.resistance:g} ohm: give a stronger motor"

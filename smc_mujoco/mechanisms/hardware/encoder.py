@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.plant import Field
 
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which have rounding errors.
 EARLY = 0.5
-MOST_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
+MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,17 +64,17 @@ class Encoder(Part):
         return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
 
     def check(self, step: float) -> None:
-        """Raise ScenarioError for a time that is no whole number of physics steps, or too many readings under way."""
+        """Raise ScenarioError for a time that is not a whole number of physics steps, or too many delayed readings."""
         number("step", step, above=0.0)
-        if self.delay / (self.period or step) > MOST_READINGS:
+        if self.delay / (self.period or step) > MAX_READINGS:
             raise ScenarioError(
-                f"Encoder's delay {self.delay:g} s is more than {MOST_READINGS:,} readings long: give a shorter one"
+                f"Encoder's delay {self.delay:g} s is more than {MAX_READINGS:,} readings long: give a shorter one"
             )
         for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
             count = time / step
             if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
                 raise ScenarioError(
-                    f"Encoder's {name} {time:g} s is no whole number of physics steps of {step:g} s: "
+                    f"Encoder's {name} {time:g} s is not a whole number of physics steps of {step:g} s: "
                     "give a physics_step that divides it"
                 )
 

@@ -2,7 +2,7 @@
 
 A part is frozen data. `edit` adds objects to an MjSpec, such as a rotor, a stop, or an actuator that acts as friction.
 `fields` yields the fields of the compiled model that the part's numbers set, so that simulations with different numbers
-share one model in a Batch. MuJoCo simulates the parts; no code of ours runs.
+share one model in a Batch. MuJoCo simulates the parts, without any code of this package.
 
 Names: an actuator `passive:<joint>` belongs to a part and takes no command. `rotor:<joint>` is the joint that a
 channel's actuator drives, if it is not the channel's joint itself.
@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import number
-from smc_mujoco.mechanisms.plant import LARGEST, Field
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 PASSIVE, ROTOR = "passive:", "rotor:"
 PLAY = "play:"  # a tendon of length rotor - joint
@@ -36,12 +36,12 @@ class Part:
         """Replace fields by floats. None stays if it is the field's default.
 
         Args:
-          bounds: those of `errors.number`; `most` is LARGEST by default.
+          bounds: those of `errors.number`; `most` is MAX_PARAMETER by default.
 
         Raises:
           ScenarioError: a field is not a number within these bounds.
         """
-        limits: dict[str, Any] = {"most": LARGEST} | bounds
+        limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
         for name in names:
             value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
             if value is not None or not optional:

@@ -1,6 +1,6 @@
 """Acrobot: a double pendulum that is driven at the elbow, with a free shoulder.
 
-The equation, the parameters and their source stand in double_pendulum.py, with u = (0, u). Driven channels come first:
+The equation, the parameters and their source are in double_pendulum.py, with u = (0, u). Driven channels come first:
 channel 0 is the elbow's angle q2; channel 1, which is only measured, the shoulder's angle q1, from hanging. (0, pi) is
 upright. Dry friction is left out of the nominal f and g.
 """

@@ -1,6 +1,6 @@
 """Pendubot: a double pendulum that is driven at the shoulder, with a free elbow.
 
-The equation, the parameters and their source stand in double_pendulum.py, with u = (u, 0). Channel 0 is the shoulder's
+The equation, the parameters and their source are in double_pendulum.py, with u = (u, 0). Channel 0 is the shoulder's
 angle q1, from hanging; channel 1, which is only measured, the elbow's angle q2. (pi, 0) is upright. Dry friction is
 left out of the nominal f and g.
 """

@@ -174,7 +174,7 @@ def leads(findings: "Findings", metric: str) -> str:
     nobody = top.of - sum(row.alone for row in standing)
     return (
         f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
-        f"in {nobody or 'none'} nobody wins."
+        f"in {nobody or 'none'} no law wins."
     )
 
 

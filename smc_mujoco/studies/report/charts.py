@@ -1,6 +1,6 @@
 """Charts of numbers: medians with intervals, fronts of error against effort, margins, curves over time.
 
-A value that cannot stand on an axis (inf, or less than a logarithm shows) stands at its end as a triangle.
+A value that is not on an axis (inf, or less than a logarithm shows) is a triangle at the end of the axis.
 """
 
 import math

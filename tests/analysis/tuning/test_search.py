@@ -5,6 +5,7 @@ import json
 import math
 import re
 import warnings
+from pathlib import Path
 
 import pytest
 
@@ -166,6 +167,7 @@ def test_a_law_without_units_is_tuned_by_the_old_table_with_a_warning(monkeypatc
     assert list(tuned.bounds) == ["k"]
 
 
+@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_an_optimum_at_a_bound_is_told_and_the_bound_moved():
     own = catalogue()["observer_free"]
     odd = dataclasses.replace(own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)})
@@ -306,20 +308,38 @@ def call(tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.filterwarnings("always")
 def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
     code, out, err = call("duffing", "classical", "--budget", "3", "--objective", "tracking", "--out", "k.json")
     tuned = load(tmp_path / "k.json")
-    assert (code, err) == (0, "")
+    assert code == 0
     assert f"{tuned.gains['k']:g}" in out
     assert f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; 3 sets" in out
     assert tuned.definition == Objective(weight=0.0, u_max=6.0)
-    assert ("no set of gains" in out) == (tuned.objective > tuned.before)
+    assert ("no set of gains" in err) == (tuned.objective > tuned.before)
 
 
-def test_the_command_says_when_the_default_gains_are_better(call):
-    _, out, _ = call("duffing", "super_twisting", "--budget", "1")
+@pytest.mark.filterwarnings("always")
+def test_the_command_says_when_the_laws_own_gains_are_better(call):
+    _, out, err = call("duffing", "super_twisting", "--budget", "1")
     assert "1 set of gains" in out
-    assert "no set of gains tried is better than the default ones: give a larger --budget" in out
+    assert re.fullmatch(WORSE.replace("classical", "super_twisting"), err.removeprefix("smc-mujoco: ").rstrip())
+
+
+WORSE = (
+    r"no set of gains tried for classical on duffing is better than the law's own, with an objective of \S+ s² instead "
+    r"of \S+ s²: give a larger budget"
+)
+
+
+def test_warns_if_and_only_if_the_laws_own_gains_are_better():
+    first = tune("duffing", smc.law("classical", k=0.5), budget=20, objective=LEAN)
+    assert first.objective < first.before
+    with pytest.warns(smc.ScenarioWarning, match=WORSE) as caught:
+        again = tune("duffing", first.law, budget=1, objective=LEAN)
+    assert again.objective > again.before
+    assert [Path(one.filename).name for one in caught] == ["test_search.py"]
+    tune("duffing", first.law, budget=20, objective=LEAN)  # as good as its own: a warning would be an error
 
 
 @pytest.mark.parametrize(

@@ -399,7 +399,7 @@ def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
     """Nothing of it changes a number that the trial itself looks at."""
     text = law(body, "#include <stdlib.h>\n#include <string.h>")
     line = text[: text.index(body)].count("\n") + 1
-    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c does harm in line {line}: {words}")) as error:
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")) as error:
         smc.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
     assert "\n" not in str(error.value)
 
@@ -408,7 +408,7 @@ def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
 def test_isolated_harm_is_told_of_the_file_that_does_it(file):
     other = file("int over(const double *a) { return a[3] > 0.0; }", "filter.c")
     text = law("static const double T[3] = {1, 2, 3}; out[0] = over(T);", "int over(const double *);")
-    with pytest.raises(smc.ScenarioError, match=r"^filter\.c does harm in line 1: global-buffer-overflow, READ"):
+    with pytest.raises(smc.ScenarioError, match=r"^filter\.c makes an error in line 1: global-buffer-overflow, READ"):
         smc.law_from_c(file(text), flags=[str(other)], isolate=True, timeout=60.0)
 
 
@@ -448,7 +448,7 @@ ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps),
         ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_TOWARDZERO); }", f"smc_setup {ALTERS}"),
         ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_DOWNWARD); }", f"smc_setup {ALTERS}"),
         ("int feenableexcept(int);\nint smc_setup(void) { feenableexcept(4); return 0; }", "smc_setup died of SIGFPE"),
-        (ENDS, "unloading died of SIGABRT (Aborted): mend where it aborts"),
+        (ENDS, "unloading died of SIGABRT (Aborted): fix where it aborts"),
     ],
 )
 def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
@@ -655,14 +655,14 @@ def test_check_c_names_its_own_options(call, file):
     for words, said in (
         ((), "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory"),
         (("--memory", 21), "reads more gains than the 0 that have names: name them in smc_law_gains, or give --gains"),
-        (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "mend it, or give other --flag"),
+        (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
     ):
         code, out, err = call("check-c", wants, *words)
         assert (code, out) == (2, "")
         assert err.endswith(f"{said}\n")
     assert call("check-c", wants, "--memory", 21, "--gains", "k=2")[0] == 0
     assert (
-        "did not end within 3 s: mend what it waits for, or give --timeout\n"
+        "did not end within 3 s: fix what it waits for, or give --timeout\n"
         in call("check-c", file(WAITS), "--timeout", 3)[2]
     )
     assert "cannot take a law from '.'" in call("check-c", ".")[2]

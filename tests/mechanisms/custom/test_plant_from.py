@@ -569,7 +569,7 @@ def acrobot_alone() -> smc.Plant:
 
 def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
     for law in ("hierarchical", "swing_up"):
-        with pytest.raises(smc.ScenarioError, match=rf"law '{law}' is for .* alone, not for arm") as caught:
+        with pytest.raises(smc.ScenarioError, match=rf"law '{law}' is only for .*, not for arm") as caught:
             smc.Scenario(plant=arm(), law=law)
         assert ("give each channel a partner" in str(caught.value)) == (law == "hierarchical")
     with pytest.raises(
@@ -780,19 +780,19 @@ WRONG = {
     ),
     "broken": (
         {"rest": "<actuator>\n<mtor/></actuator>"},
-        r"MuJoCo cannot read \S*arm.xml \(unrecognized element in <mtor>, line 12\): mend the file$",
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized element in <mtor>, line 12\): fix the file$",
     ),
     "unclosed": (
         {"rest": "<actuator>\n<motor></actuator>"},
-        r"MuJoCo cannot read \S*arm.xml \(mismatched element <motor>, line 12\): mend the file$",
+        r"MuJoCo cannot read \S*arm.xml \(mismatched element <motor>, line 12\): fix the file$",
     ),
     "attribute": (
         {"rest": '<actuator>\n<motor joint="elbow" gaer="1"/></actuator>'},
-        r"MuJoCo cannot read \S*arm.xml \(unrecognized attribute: 'gaer' in <motor>, line 12\): mend the file$",
+        r"MuJoCo cannot read \S*arm.xml \(unrecognized attribute: 'gaer' in <motor>, line 12\): fix the file$",
     ),
     "target": (
         {"rest": '<actuator><motor joint="elbwo"/></actuator>'},
-        r"arm.xml \(unknown transmission target 'elbwo' for actuator id = 0, line 11\): mend the file$",
+        r"arm.xml \(unknown transmission target 'elbwo' for actuator id = 0, line 11\): fix the file$",
     ),
     "compile": ({"bodies": "<body><joint/></body>"}, "MuJoCo cannot read .*mass and inertia of moving bodies"),
 }
@@ -815,7 +815,7 @@ def test_a_mistake_is_one_sentence(arm, name):
 )
 def test_a_broken_file_that_is_included_is_no_line_of_the_file_that_includes_it(arm, tmp_path, text, words):
     (tmp_path / "part.xml").write_text(f"<mujoco>\n\n{text}</mujoco>")
-    with pytest.raises(smc.ScenarioError, match=rf"MuJoCo cannot read \S*arm.xml \({words}\): mend the file$"):
+    with pytest.raises(smc.ScenarioError, match=rf"MuJoCo cannot read \S*arm.xml \({words}\): fix the file$"):
         arm(rest='<include file="part.xml"/>')
 
 
@@ -863,7 +863,8 @@ def test_what_no_channels_or_partners_can_mend_is_not_advised(partner):
 
 def test_a_force_on_a_body_is_refused(arm):
     with pytest.raises(
-        smc.ScenarioError, match=r"pushes a body, and those of arm, a model of yours, act on its joints"
+        smc.ScenarioError,
+        match=r"is a force on a body, but arm is your own model, whose disturb",
     ):
         smc.Scenario(plant=arm(), law="none", disturbance=smc.Gust(amplitude=1.0, time=0.1, width=0.1))
 
@@ -920,7 +921,7 @@ HARM = {  # what the model has, and words of the sentence
     "attaches itself": (
         '<asset><model name="m" file="arm.xml"/></asset>'
         '<worldbody><attach model="m" body="upper" prefix="x"/></worldbody>',
-        "arm.xml ends MuJoCo with SIG.*attaches itself: mend the model",
+        "arm.xml ends MuJoCo with SIG.*attaches itself: fix the model",
     ),
     "slow": (
         '<size nkey="2000000000"/>',
@@ -933,7 +934,7 @@ HARM = {  # what the model has, and words of the sentence
     "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
     "nan": (
         '<default><joint damping="nan"/></default>',
-        r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): mend the file",
+        r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): fix the file",
     ),
     "mass": (
         '<default><geom density="1e300"/></default>'
@@ -975,7 +976,7 @@ def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
 
 def test_a_plugin_that_this_process_alone_may_have_is_left_to_it(arm, tmp_path):
     rest = ACTUATED + '<extension><plugin plugin="no.such"/></extension>'
-    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): mend the file"):
+    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): fix the file"):
         arm(rest=rest)
     path = tmp_path / "arm.xml"
     mjcf.tried(mjcf.source(path), 20.0)  # says nothing of it
@@ -1082,7 +1083,7 @@ LOST = {
     "no file": ((MESHED, None), r"the model names the file 'c.obj', and its text lies in no folder: give assets="),
     "no bytes": ((MESHED, {"c.obj": "text"}), r"assets is {'c.obj': 'text'}: give names of files with their contents"),
     "assets of a file": (("arm.xml", {}), "assets is {}, and the model is no text: leave them out"),
-    "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): mend the file"),
+    "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): fix the file"),
     "unnamed": (("<mujoco/>", None), "unknown joint of model.xml 'j': none has a name there"),
     "empty spec": ((mujoco.MjSpec(), None), "unknown joint of .*xml 'j': none has a name there"),
     "number": ((3, None), r"path is 3: give the path of an MJCF file \(.xml\), its text, an MjSpec or a mjcf.Root"),
@@ -1107,7 +1108,7 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
     assert run_key.key(again.scenario) == run_key.key(trace.scenario)
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     arm(bodies=BALL)
-    words = r"the scenario of \S*a.npz cannot be brought back, its model \S*arm.xml"
+    words = r"the scenario of \S*a.npz cannot be restored, its model \S*arm.xml"
     with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file that .* than in the run: put that one back$"):
         smc.load(path)
     (tmp_path / "arm.xml").unlink()

@@ -450,7 +450,7 @@ def test_times_that_are_no_whole_number_of_steps_are_refused(field):
 
 
 def test_a_period_beyond_all_steps_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"period 1e\+306 s is no whole number of physics steps"):
+    with pytest.raises(smc.ScenarioError, match=r"period 1e\+306 s is not a whole number of physics steps"):
         scenario(smc.Encoder(period=1e306))
 
 

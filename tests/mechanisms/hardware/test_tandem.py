@@ -201,8 +201,8 @@ def test_theory_of_delays_knows_no_drive():
         ),
         (
             (smc.RateLimit(2.0), smc.Lag(0.2)),
-            "actuator has RateLimit(rate=2.0) before Lag(tau=0.2), and of two drives in series the first is a Lag: "
-            "give one drive, or (smc.Lag(0.01), another)",
+            "actuator has RateLimit(rate=2.0) before Lag(tau=0.2), but the first of two drives in series must be "
+            "a Lag: give one drive, or (smc.Lag(0.01), another)",
         ),
         ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice, "),
     ],

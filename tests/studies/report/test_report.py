@@ -331,7 +331,7 @@ def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findi
     assert "no law wins on settling time in all 5 cells" in text
     assert "Observer-free wins on every plant under noise" in text
     assert "Observer-free wins in 3 and loses in 2" in text
-    assert "Classical wins in 2 and loses in 3; in none nobody wins" in text
+    assert "Classical wins in 2 and loses in 3; in none no law wins" in text
     assert "nor in every condition" in text
 
 

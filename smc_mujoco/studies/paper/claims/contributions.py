@@ -20,7 +20,7 @@ from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, ch
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
 PERIODS, DELAYS = (1, 10, 30, 60), (0, 5, 10, 20, 50)  # ms
-SHORTEST, ENDS = 0.1, (0, 50)  # ms; ten times the steps, so with the ends of the delays alone
+MIN_DELAY, ENDS = 0.1, (0, 50)  # ms; ten times the steps, so with the ends of the delays alone
 MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),
     ("robustness", "steady error under d", "steady_error", "constant"),
@@ -58,7 +58,7 @@ def never_chatters(runs: Runs) -> list[Check | Beside]:
     """TV rate of u over control periods of 0.1 (delays 0 and 50 ms only), 1, 10, 30 and 60 ms and delays of 0, 5, 10,
     20 and 50 ms.
     """
-    cells = [(period, delay) for period in PERIODS for delay in DELAYS] + [(SHORTEST, delay) for delay in ENDS]
+    cells = [(period, delay) for period in PERIODS for delay in DELAYS] + [(MIN_DELAY, delay) for delay in ENDS]
     if runs.quick:
         cells = [(period, delay) for period in (PERIODS[0], PERIODS[-1]) for delay in ENDS]
     evidence = []

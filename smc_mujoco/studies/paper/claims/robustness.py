@@ -5,7 +5,7 @@ Noise is the study's, 0.01 m on x and 0.05 m/s on v; the disturbance is the pape
 
 import numpy as np
 
-from smc_mujoco.metrics.catalogue import HIGH, conventions
+from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, command_bound, deviation, scale
@@ -72,8 +72,8 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
     return [
         check(f"{PLANT}: standard deviation of u with noise, {over}", ratio(std, most), "<", 0.1, "small fluctuations"),
         check(f"{PLANT}: largest step of u with noise, {over}", ratio(step, most), "<", 0.1, "smooth"),
-        check(f"{PLANT}: share of u above {HIGH:g} Hz with noise", share, "<", 0.5, "smooth"),
-        Beside(f"{PLANT}: share of u above {HIGH:g} Hz with noise, over the whole run", whole),
+        check(f"{PLANT}: share of u above {HIGH_PASS:g} Hz with noise", share, "<", 0.5, "smooth"),
+        Beside(f"{PLANT}: share of u above {HIGH_PASS:g} Hz with noise, over the whole run", whole),
     ]
 
 
@@ -100,5 +100,5 @@ def fluctuation(trace: Trace) -> tuple[float, float, float]:
     std, step = float(u.std(axis=0).max()), float(np.abs(np.diff(u, axis=0)).max())
     power = (np.abs(np.fft.rfft(u - u.mean(axis=0), axis=0)) ** 2).max(axis=1)
     frequency = np.fft.rfftfreq(len(u), trace.scenario.control_period)
-    share = float(power[frequency > HIGH].sum() / power.sum()) if power.any() else 0.0
+    share = float(power[frequency > HIGH_PASS].sum() / power.sum()) if power.any() else 0.0
     return std, step, share
