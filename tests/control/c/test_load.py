@@ -534,7 +534,7 @@ def test_the_processes_of_a_trial_that_never_ends_are_gone(file, tmp_path):
 
 def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
     told = tmp_path / "pid"
-    with pytest.raises(build.Late):
+    with pytest.raises(build.TimedOut):
         build.timed(["sh", "-c", f"sleep 60 & echo $! > '{told}'"], 0.3)
     for _ in range(200):  # until whoever inherits orphans has taken note
         state = Path(f"/proc/{told.read_text().strip()}/stat")
