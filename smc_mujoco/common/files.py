@@ -68,14 +68,14 @@ def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
         raise ScenarioError(f"cannot read {shown(path)}: {cure}")
     try:
         if (file := Path(path)).exists() and not file.is_file():
-            raise ScenarioError("it is no regular file")
+            raise ScenarioError("it is not a regular file")
         yield file
     except FileNotFoundError:
         raise ScenarioError(f"no {kind} at {path}: {cure}") from None
     except Exception as error:  # damaged bytes raise any exception there is
         own = isinstance(error, ScenarioError)
         why = str(error) if own else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
-        raise ScenarioError(f"{path} is no {kind} ({why}): {cure}") from None
+        raise ScenarioError(f"{path} is not a {kind} ({why}): {cure}") from None
 
 
 def plain(data: Any) -> Any:
@@ -119,7 +119,7 @@ def from_json(text: str) -> Any:
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
-    """Write data as a JSON file, whole or not at all.
+    """Write data as a JSON file, atomically.
 
     Raises:
       ScenarioError: the folder cannot be made or written.
@@ -137,7 +137,7 @@ def read_json(path: Path) -> Any:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary file beside `path`, which replaces it if the block ends well, and else is deleted.
+    """Yield a temporary file beside `path`. It replaces `path` if the block succeeds, and is deleted otherwise.
 
     Raises:
       ScenarioError: the folder cannot be made or written.

@@ -1,11 +1,11 @@
 """The OpenGL backend that pictures are rendered with: EGL, OSMesa, or one that opens a window.
 
-MuJoCo reads MUJOCO_GL when it is imported; where the variable is unset it takes a backend that needs a display.
-Importing smc_mujoco leaves the variable alone. The backend is chosen when the first picture is rendered: the one that
-MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even where MuJoCo took another one.
+MuJoCo reads MUJOCO_GL when it is imported; if the variable is unset it takes a backend that needs a display.
+Importing smc_mujoco does not change it. The backend is chosen when the first picture is rendered: the one that
+MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even if MuJoCo took another one.
 
 `import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load. `choose_gl` prevents that;
-the command line calls it. Only Linux has a choice of backends. This module stays light: it imports mujoco when needed.
+the command line calls it. Only Linux has a choice of backends. This module imports mujoco only when it is needed.
 """
 
 import atexit
@@ -92,7 +92,7 @@ def note() -> str | None:
     chosen = choice()
     if chosen.wish in ("", chosen.backend):
         return None
-    why = "does not load here" if chosen.wish in LIBRARIES else "is no backend of MuJoCo"
+    why = "does not load here" if chosen.wish in LIBRARIES else "is not a backend of MuJoCo"
     then = "films are off" if chosen.backend in OFF else f"{chosen.backend} is used instead"
     return f"MUJOCO_GL={chosen.wish} {why}: {then}"
 
@@ -121,12 +121,12 @@ def missing() -> str | None:
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 
 
-def probe(backend: str) -> str | None:
-    """Return None if a new process can draw an empty model with this backend, else how it failed."""
+def probe(backend: str, code: str = PROBE) -> str | None:
+    """Return None if a new process can draw an empty model with this backend, or run other code, else how it failed."""
     import subprocess
 
     environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
-    command = [sys.executable, "-c", PROBE]
+    command = [sys.executable, "-W", "ignore", "-c", code]
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

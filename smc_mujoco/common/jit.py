@@ -149,7 +149,7 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
 
 
 class Cache(FunctionCache):
-    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is no error."""
+    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)

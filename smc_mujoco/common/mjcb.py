@@ -1,7 +1,7 @@
 """Ownership of MuJoCo's callbacks, and the compiling of models while a callback is installed.
 
 A process has one set of callbacks, eight of them. A run installs the control callback and removes the other seven, so
-that a trace depends on its scenario alone; afterwards all are put back.
+that a trace depends only on its scenario. Afterwards all are restored.
 
 MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
 that Python does not know. The reference loop installs such a function. The compiled callback is native code, with
@@ -52,8 +52,8 @@ def installed(control: Any) -> Iterator[None]:
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile a spec.
 
-    A Python callback is removed meanwhile. The thread that installed it, as of a policy that makes an environment, does
-    so at once; other threads wait until its run is over. Nobody waits for native callbacks.
+    A Python callback is removed meanwhile. The thread that installed it need not wait, as when a policy makes an
+    environment; other threads wait until its run is over. No thread waits for native callbacks.
 
     Raises:
       ValueError: MuJoCo cannot compile it.

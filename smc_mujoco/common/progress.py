@@ -18,7 +18,7 @@ class Bar:
         """Add work that is done."""
 
     def reached(self, done: float, whole: float) -> None:
-        """Set the work done and the whole, where the whole is only known as it goes."""
+        """Set the work done and the whole work, if the whole is an estimate that changes."""
 
     def says(self, text: str) -> None:
         """Change the text beside the bar."""

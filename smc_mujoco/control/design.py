@@ -7,7 +7,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import Law, law
-from smc_mujoco.mechanisms.plant import Plant, plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 
 STEP = 1e-6  # rad or m, and per second: of the central differences, about the cube root of a float's precision
 
@@ -57,5 +57,5 @@ def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0)
     Raises:
       ScenarioError: a weight out of range, or a joint without an actuator.
     """
-    a1, a2, b = linearised(plant(of) if isinstance(of, str) else of)
+    a1, a2, b = linearised(as_plant(of))
     return law("lqr", q1=q[0], q2=q[1], r=r, a1=a1, a2=a2, b=b)

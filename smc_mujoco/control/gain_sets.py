@@ -23,9 +23,8 @@ from smc_mujoco.common.files import read_json
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
-from smc_mujoco.mechanisms.plant import plant as find_plant
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
@@ -100,7 +99,7 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     find("set of gains", gains, dict.fromkeys((*SETS, "default")))
     if gains == "default":
         return base
-    plant = find_plant(plant) if isinstance(plant, str) else plant
+    plant = as_plant(plant)
     if gains == "study":
         values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)])
     else:

@@ -22,11 +22,10 @@ from typing import NamedTuple, Unpack, overload
 from numba import njit, types
 from numba.extending import overload_attribute
 
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control.component import Component, LawOptions, Template, decorated, discover, renamed
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
-from smc_mujoco.mechanisms.plant import plant as find_plant
 
 Law = Component
 OLD_FIELDS = {"surfaced": "has_surface", "eq": "v_eq"}  # fields of the measurement in version 0.1 -> present names
@@ -201,11 +200,9 @@ def laws(plant: Plant | str | None = None) -> list[str]:
     """
     if plant is None:
         return list(catalogue())
-    kind = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(kind, Plant):
-        raise ScenarioError(f"plant is {shown(kind)}: give smc.plant(...) or one of the names smc.plants() lists")
+    plant = as_plant(plant)
     return [
         name
         for name, template in catalogue().items()
-        if fits(template, kind) and (template.plants or name == "none" or not kind.underactuated)
+        if fits(template, plant) and (template.plants or name == "none" or not plant.underactuated)
     ]

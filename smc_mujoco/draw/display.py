@@ -1,8 +1,9 @@
 """Check that a window can be opened, before MuJoCo's viewer, which ends the whole process if it cannot."""
 
 import os
-import subprocess
 import sys
+
+from smc_mujoco.common import gl
 
 PROBE = """
 import glfw
@@ -22,19 +23,7 @@ def missing() -> str | None:
     named = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
     if sys.platform == "linux" and not named:
         return f"no view: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set): {cure}"
-    if error := probe():
+    if error := gl.probe("", PROBE):
         where = ", ".join(f"{name}={os.environ[name]}" for name in named) or "the screen"
         return f"no view: no window opens on {where} ({error}): {cure}"
     return None
-
-
-def probe() -> str | None:
-    """Return None if a window with OpenGL opens, else how it failed."""
-    code = [sys.executable, "-W", "ignore", "-c", PROBE]
-    try:
-        done = subprocess.run(code, capture_output=True, text=True, timeout=60, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return f"a trial failed: {error}"
-    if done.returncode == 0:
-        return None
-    return (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]

@@ -17,8 +17,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.envs.tasks import TASKS, Pair, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
-from smc_mujoco.mechanisms.plant import Plant, ready
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant, ready
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
@@ -69,7 +68,7 @@ class Setting:
         Raises:
           ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
         """
-        plant = find_plant(plant) if isinstance(plant, str) else plant
+        plant = as_plant(plant)
         self.task, known = find("task", task, TASKS), tasks(plant)
         if task not in known:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")

@@ -22,10 +22,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.plant import Plant, Values
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, Values, as_plant
 from smc_mujoco.simulation.signals import Sine
 
 LN10 = math.log(10.0)
@@ -147,10 +145,8 @@ def reward(e: np.ndarray, w: np.ndarray) -> Any:
 
 def tasks(plant: Plant | str) -> list[str]:
     """Return the names of the tasks that a plant has."""
-    found = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(found, Plant):
-        raise ScenarioError(f"plant is {shown(plant)}: give smc.plant(...) or one of the names smc.plants() lists")
-    return [name for name, task in TASKS.items() if task.fits(found)]
+    plant = as_plant(plant)
+    return [name for name, task in TASKS.items() if task.fits(plant)]
 
 
 def starts(task: Task, plant: Plant) -> Pair:

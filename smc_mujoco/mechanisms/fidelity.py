@@ -5,8 +5,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import find, number
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.plant import Plant, write
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant, write
 
 GRID = 41  # positions and velocities of one channel
 STATES = 500  # random states of a network
@@ -24,7 +23,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
       mechanism: one of plant.mechanisms.
       reach: m or rad for x, m/s or rad/s for v. Default: the largest |x| in plant.x0.
     """
-    plant = find_plant(plant) if isinstance(plant, str) else plant
+    plant = as_plant(plant)
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
     most = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
     spec = plant.spec()

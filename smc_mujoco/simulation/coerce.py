@@ -20,7 +20,6 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
 from smc_mujoco.simulation.signals import Signal
@@ -30,14 +29,6 @@ T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
-
-
-def plant(value: Plant | str) -> Plant:
-    """Return a plant, from itself or its name."""
-    made = find_plant(value) if isinstance(value, str) else value
-    if not isinstance(made, Plant):
-        raise ScenarioError(f"plant is {shown(made)}: give smc.plant(...) or one of the names smc.plants() lists")
-    return made
 
 
 def law(value: Law | Template | str) -> Law:

@@ -26,8 +26,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name
-from smc_mujoco.mechanisms.plant import Plant, catalogue
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
@@ -102,7 +101,7 @@ def case(
     Args:
       changes: Scenario field -> value, in place of what the condition sets.
     """
-    plant, condition, seed = _plant(plant), find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
+    plant, condition, seed = as_plant(plant), find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
     fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
@@ -138,7 +137,7 @@ def _check_apart(
     plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
 ) -> None:
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
-    chosen_plants = [_plant(plant) for plant in plants]
+    chosen_plants = [as_plant(plant) for plant in plants]
     chosen_laws = [law if isinstance(law, str) else coerce.law(law) for law in laws]
     # name, thing, and what distinguishes it from others
     for what, cure, things in (
@@ -156,14 +155,6 @@ def _check_apart(
             if first_content != content:
                 both = f"{one_line(str(first))} and {one_line(str(thing))}"
                 raise ScenarioError(f"two {what} have the name {name!r}, {both}: {cure}")
-
-
-def _plant(plant: str | Plant) -> Plant:
-    """Return a plant, or the plant of a name."""
-    plant = find_plant(plant) if isinstance(plant, str) else plant
-    if not isinstance(plant, Plant):
-        raise ScenarioError(f"plant is {shown(plant)}: give a name, smc.plant(...) or smc.plant_from(...)")
-    return plant
 
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:

@@ -28,7 +28,7 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
@@ -116,7 +116,7 @@ class Scenario:
         u_max could.
     """
 
-    plant: Plant = field(converter=coerce.plant)
+    plant: Plant = field(converter=as_plant)
     law: Law = field(converter=coerce.law)
     model: str | None = None
     surface: Surface | None = field(converter=coerce.surface, default=None)

@@ -184,7 +184,7 @@ def _threads() -> int:
         return 1
     try:
         return distributed.get_worker().state.nthreads
-    except ValueError:  # this is no worker of dask's
+    except ValueError:  # not a worker of dask
         return 1
 
 

@@ -76,7 +76,7 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
 
 
 def _codes(s: Scenario) -> list[str]:
-    """Return hashes of the code that a run calls: law, estimator, surface, signals, a user's own plant and parts."""
+    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's plant and parts."""
     functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
     signals = [type(signal) for signal in (s.reference, s.feedforward, *s.disturbance) if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]

@@ -64,7 +64,7 @@ class Scene:
             if len(plants := {s.plant.name for s in runs.values()}) > 1:
                 raise ScenarioError(
                     f"condition {condition!r} of scene {self.title!r} has the plants {', '.join(sorted(plants))}, "
-                    "which share no axes: give each plant a condition of its own"
+                    "which share no axes: give each plant its own condition"
                 )
         files = [(f"{slug(condition)}-{slug(label)}", label) for condition, label, _ in self.runs()]
         for named in ([(slug(condition), condition) for condition in self.conditions], files):
@@ -130,7 +130,7 @@ def find(name: str) -> Path:
     if Path(name).is_file():
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
-        raise ScenarioError(f"no scene file {name}: give the path of one, or a name that smc-mujoco list shows")
+        raise ScenarioError(f"no scene file {name}: give the path of a scene file, or a name from smc-mujoco list")
     return lookup("scene", name, scenes())
 
 

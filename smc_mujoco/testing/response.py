@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.catalogue import score, scores
 from smc_mujoco.metrics.channel_groups import groups
 from smc_mujoco.metrics.conventions import CATALOGUE
@@ -183,7 +182,7 @@ def respond(
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
     chosen = find_condition(condition)
-    plant = find_plant(plant) if isinstance(plant, str) else plant
+    plant = as_plant(plant)
     conditions = chosen.on(plant, number("duration", given.get("duration", scenarios.DURATION)))
     whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | conditions | given
     words = [chosen.name] * (chosen.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]

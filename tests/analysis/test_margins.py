@@ -259,7 +259,7 @@ def test_margins_survive_their_file(found, tmp_path):
 def test_what_holds_no_margins_is_refused(text, tmp_path):
     path = tmp_path / "margins.json"
     path.write_text(text)
-    with pytest.raises(smc.ScenarioError, match="is no file of margins"):
+    with pytest.raises(smc.ScenarioError, match="is not a file of margins"):
         margins.load(path)
     with pytest.raises(smc.ScenarioError, match=r"end the name in .json"):
         margins.save([], tmp_path / "margins.csv")

@@ -194,7 +194,7 @@ def test_a_map_survives_its_file(weak, tmp_path):
 def test_what_is_no_map_is_refused(text, tmp_path):
     path = tmp_path / "map.json"
     path.write_text(text)
-    with pytest.raises(smc.ScenarioError, match="is no map"):
+    with pytest.raises(smc.ScenarioError, match="is not a map"):
         maps.load(path)
 
 

@@ -160,7 +160,7 @@ def test_rows_of_a_study(tmp_path):
 )
 def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
     (tmp_path / "a").write_text("")
-    said = rf"a is no map \({type(error).__name__}.*\): give another$"
+    said = rf"a is not a map \({type(error).__name__}.*\): give another$"
     with pytest.raises(smc.ScenarioError, match=said), reading(tmp_path / "a", "map", "give another"):
         raise error
 
@@ -169,7 +169,7 @@ def test_what_is_no_regular_file_is_not_opened(tmp_path):
     os.mkfifo(tmp_path / "a.json")
     for load in (load_margins, load_map, result.load):
         for path in (tmp_path / "a.json", tmp_path, "/dev/zero"):
-            with pytest.raises(smc.ScenarioError, match="it is no regular file"):
+            with pytest.raises(smc.ScenarioError, match="it is not a regular file"):
                 load(path)
 
 

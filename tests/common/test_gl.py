@@ -65,7 +65,7 @@ def test_unset_renders_where_egl_does(default):
 def test_an_unknown_backend_is_replaced_and_named(default):
     backend, note, missing = report(MUJOCO_GL="nonsense")
     assert (backend, missing == "None") == (default[0], default[2] == "None")
-    assert note.startswith("MUJOCO_GL=nonsense is no backend of MuJoCo: ")
+    assert note.startswith("MUJOCO_GL=nonsense is not a backend of MuJoCo: ")
 
 
 def test_a_backend_that_loads_is_kept_whatever_its_case(default):

@@ -11,6 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
+from smc_mujoco.common import gl
 from smc_mujoco.draw import display
 from smc_mujoco.draw import viewer as live
 from smc_mujoco.simulation import reference
@@ -348,7 +349,7 @@ def test_on_macos_it_needs_mjpython(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco.viewer", types.SimpleNamespace(_MJPYTHON=None))
     assert "mjpython $(which smc-mujoco) view" in str(display.missing())
     monkeypatch.setitem(sys.modules, "mujoco.viewer", types.SimpleNamespace(_MJPYTHON=object()))
-    monkeypatch.setattr(display, "probe", lambda: None)
+    monkeypatch.setattr(gl, "probe", lambda backend, code: None)
     assert display.missing() is None
 
 

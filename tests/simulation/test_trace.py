@@ -448,7 +448,7 @@ def test_a_file_that_is_encrypted_or_packed_in_another_way_is_no_trace(trace, tm
 @pytest.mark.parametrize("name", ["a.npz", "a"])
 def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path):
     os.mkfifo(tmp_path / "a.npz")
-    refused(lambda: smc.load(tmp_path / name), "it is no regular file")
+    refused(lambda: smc.load(tmp_path / name), "it is not a regular file")
 
 
 def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch):

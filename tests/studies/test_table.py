@@ -69,7 +69,7 @@ def test_what_is_no_table_is_one_sentence(tmp_path):
     with pytest.raises(smc.ScenarioError, match="no table at"):
         Table.read(tmp_path)
     (tmp_path / "results.parquet").write_text("nothing")
-    with pytest.raises(smc.ScenarioError, match="is no table"):
+    with pytest.raises(smc.ScenarioError, match="is not a table"):
         Table.read(tmp_path)
 
 
@@ -139,7 +139,7 @@ def test_null_and_nan_are_not_the_same_content():
 
 def test_a_pipe_is_no_table(tmp_path):
     os.mkfifo(tmp_path / "results.parquet")
-    with pytest.raises(smc.ScenarioError, match="it is no regular file"):
+    with pytest.raises(smc.ScenarioError, match="it is not a regular file"):
         Table.read(tmp_path)
 
 

@@ -133,7 +133,7 @@ def bench(
     with held_back():
         from smc_mujoco.cli import tables
         from smc_mujoco.control.gain_sets import general_laws
-        from smc_mujoco.mechanisms.plant import plant as find_plant
+        from smc_mujoco.mechanisms.plant import as_plant
         from smc_mujoco.simulation.conditions import applicable
         from smc_mujoco.simulation.grid import grid
         from smc_mujoco.studies.leaderboard import leaderboard
@@ -142,7 +142,7 @@ def bench(
     terminal, size = Terminal(), QUICK if quick else FULL
     chosen_plants = [options.plant(text) for text in options.names(plants, size.plants)]
     length = size.duration if duration is None else duration
-    found = [find_plant(plant) if isinstance(plant, str) else plant for plant in chosen_plants]
+    found = [as_plant(plant) for plant in chosen_plants]
     usual = () if condition else applicable(size.conditions, found, length)
     chosen = options.names(laws, size.laws)
     chosen = general_laws(chosen_plants, gains) if laws == "all" else [options.law(text) for text in chosen]

@@ -23,7 +23,7 @@ class Channel:
       actuator: name of the motor that drives the joint; None: its only actuator.
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
-        scored as a channel of its own, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
+        scored as a separate channel, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
         y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
       x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of the keyframe, or of
         the model.

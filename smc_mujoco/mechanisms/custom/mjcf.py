@@ -108,7 +108,7 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
     if assets is not None and not text:
-        raise ScenarioError(f"assets is {shown(assets)}, and the model is no text: leave them out")
+        raise ScenarioError(f"assets is {shown(assets)}, and the model is not text: leave them out")
     if isinstance(model, mujoco.MjSpec):
         return _of_spec(model)
     if pymjcf is not None and isinstance(model, pymjcf.RootElement):

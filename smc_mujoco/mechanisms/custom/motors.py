@@ -36,7 +36,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     """Return the motor that drives a joint.
 
     Raises:
-      ScenarioError: the joint has no actuator, has several, or has one that is no motor or pushes one way only.
+      ScenarioError: the joint has no actuator, has several, or has one that is not a motor or pushes only one way.
     """
     number, wanted = model.joint(joint).id, channel.actuator
     bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
@@ -71,9 +71,9 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
         return "is a servo, a damper or a muscle"
     if model.actuator_dyntype[i] != NO_DYNAMICS or model.actuator_delay[i]:
-        return "has dynamics or a delay of its own"
+        return "has dynamics or a delay"
     if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
-        return "has armature or damping of its own"
+        return "has armature or damping"
     if 0 <= model.actuator_group[i] <= 30 and model.opt.disableactuator >> int(model.actuator_group[i]) & 1:
         return "is in a group that actuatorgroupdisable turns off"
     if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
@@ -85,7 +85,7 @@ def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
     """Return the largest force that all ranges allow in both directions, N m or N, because |u| has one bound."""
     low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
     if not low < 0.0 < high:
-        raise ScenarioError(f"{who} {low:g} to {high:g}, and a law pushes both ways: {cure}")
+        raise ScenarioError(f"{who} {low:g} to {high:g}, but a law pushes both ways: {cure}")
     return min(-low, high)
 
 

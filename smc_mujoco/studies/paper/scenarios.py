@@ -15,8 +15,7 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
     DIFFERENCED,
     JUMP_HARD,
@@ -47,7 +46,7 @@ def fields(condition: str | Condition, plant: str | Plant, duration: float = DUR
     Raises:
       ScenarioError: an unknown condition or plant, or a condition that has no numbers for the plant.
     """
-    return find_condition(condition).on(find_plant(plant) if isinstance(plant, str) else plant, duration)
+    return find_condition(condition).on(as_plant(plant), duration)
 
 
 def scenario(

@@ -249,7 +249,7 @@ def test_what_is_no_tuning_is_refused(found, tmp_path):
     broken = tmp_path / "broken.json"
     for text in ("", "[]", "{}", '{"scenario": {}}'):
         broken.write_text(text)
-        with pytest.raises(smc.ScenarioError, match="is no tuning"):
+        with pytest.raises(smc.ScenarioError, match="is not a tuning"):
             load(broken)
     with pytest.raises(smc.ScenarioError, match="no tuning at"):
         load(tmp_path / "none.json")

@@ -754,7 +754,7 @@ WRONG = {
     ),
     "one way": (
         {"channels": ["elbow"], "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>'},
-        "actuator 'm' gives joint 'elbow' of arm.xml 0 to 2, and a law pushes both ways: give smc.Channel",
+        "actuator 'm' gives joint 'elbow' of arm.xml 0 to 2, but a law pushes both ways: give smc.Channel",
     ),
     "off": (
         {"rest": ACTUATED + '<option actuatorgroupdisable="0"/>'},
@@ -1082,7 +1082,7 @@ def test_a_text_with_includes_is_read_with_them(tmp_path):
 LOST = {
     "no file": ((MESHED, None), r"the model names the file 'c.obj', and its text lies in no folder: give assets="),
     "no bytes": ((MESHED, {"c.obj": "text"}), r"assets is {'c.obj': 'text'}: give names of files with their contents"),
-    "assets of a file": (("arm.xml", {}), "assets is {}, and the model is no text: leave them out"),
+    "assets of a file": (("arm.xml", {}), "assets is {}, and the model is not text: leave them out"),
     "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): fix the file"),
     "unnamed": (("<mujoco/>", None), "unknown joint of model.xml 'j': none has a name there"),
     "empty spec": ((mujoco.MjSpec(), None), "unknown joint of .*xml 'j': none has a name there"),
