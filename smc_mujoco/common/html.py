@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-MOST = 12  # lines of a table: chosen, so that a cell's output stays short
+MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
 POINTS = 150  # of a curve, each as a pair of its lowest and highest value there
 WIDTH, HEIGHT = 300, 96  # px of a panel
 _CELL = "padding:2px 10px;vertical-align:top;text-align:"
@@ -37,7 +37,7 @@ def table(
     caption: object = "",
     note: object = "",
     numbers: range = range(0),
-    most: int = MOST,
+    most: int = MAX_ROWS,
 ) -> Html:
     """Return a table.
 

@@ -41,7 +41,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
@@ -113,7 +113,7 @@ def which(
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
-    extent, machine, folder = QUICK if quick else FULL, coerce.plant(plant), Path(out)
+    extent, machine, folder = QUICK if quick else FULL, as_plant(plant), Path(out)
     seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
     duration = extent.duration if duration is None else number("duration", duration, above=0.0)
     compared, properties = _needs(needs, machine)

@@ -27,9 +27,9 @@ def test_text_is_escaped_everywhere():
 
 def test_a_long_table_says_how_many_lines_it_leaves_out():
     rows = [(i, i) for i in range(20)]
-    assert len(parsed(html.table(("a", "b"), rows)).findall(".//tbody/tr")) == html.MOST + 1
+    assert len(parsed(html.table(("a", "b"), rows)).findall(".//tbody/tr")) == html.MAX_ROWS + 1
     assert "and 8 more" in html.table(("a", "b"), rows)
-    assert "more" not in html.table(("a", "b"), rows[: html.MOST])
+    assert "more" not in html.table(("a", "b"), rows[: html.MAX_ROWS])
 
 
 def test_numbers_stand_at_the_right():

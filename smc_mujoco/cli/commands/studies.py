@@ -48,7 +48,7 @@ def which(
     found now, which takes some seconds for each law. A first round with few starts selects the finalists. They run from
     new starts and noises, and are compared by the rules of `bench`: a law is better only if its median is lower by more
     than 3 % and a test over the starts, corrected for all comparisons, confirms it. Where no law is better than
-    another, the answer says so. Stopped and started again, the command goes on.
+    another, the answer says so. If stopped, it continues when started again.
 
     Example: smc-mujoco which duffing --conditions noise,coulomb --needs calm,fast
 
