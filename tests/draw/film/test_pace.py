@@ -90,7 +90,7 @@ def test_what_leaves_the_world_does_not_make_the_others_rest(base):
     arrays["x"][:, 0] = np.exp(40.0 * base.t)
     for array in arrays.values():
         array[2000:] = np.nan
-    bad = dataclasses.replace(base, **arrays, diverged_at=2.0, failure="it left the finite world")
+    bad = dataclasses.replace(base, **arrays, diverged_at=2.0, failure="the plant diverged")
     assert at([good, bad], (0.1,)) == [0.125]
     assert len(pace.clock([bad], FPS).times) > 10
 
