@@ -131,4 +131,4 @@ def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: flo
     path = out / f"{slug(scene.film)}.mp4"
     names, title = _labels(traces[scene.film]), _title(scene, scene.film)
     with bar("film", len(video.clock(runs, video.FPS, speed).times)) as drawn:
-        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed)]
+        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed, camera=scene.camera)]

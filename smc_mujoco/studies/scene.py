@@ -19,6 +19,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped
+from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -40,6 +41,7 @@ class Scene:
       facts: label -> sentence, printed under the answers: what else was measured.
       answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
         default says who settles, and who is first.
+      camera: of the film, as `smc.film` takes it; default: the plant's own.
     """
 
     title: str
@@ -49,6 +51,7 @@ class Scene:
     answers: tuple[str, ...] = ()
     facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
     answer: Callable[[Outcome], str] = summary
+    camera: Camera | None = None
 
     def __post_init__(self):
         if not isinstance(self.conditions, Mapping) or not self.conditions:
@@ -74,6 +77,7 @@ class Scene:
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
         lookup(f"condition to film in scene {self.title!r}", self.film, self.conditions)
         lookup("kind of figure", self.figure, dict.fromkeys(("overview", "signals")))
+        object.__setattr__(self, "camera", checked(self.camera))
         answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
         object.__setattr__(self, "answers", answers)
         for name in answers:

@@ -1,5 +1,6 @@
 """smc-mujoco run, show, view: the runs of a scene, and one of them."""
 
+import dataclasses
 import itertools
 import os
 import sys
@@ -30,6 +31,14 @@ def run(
             " where they rest.",
         ),
     ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]",
+            help="Camera of the film: one of the model, or a direction in degrees and a distance in m; default the"
+            " scene's.",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
     threads: options.Threads = None,
     export: Annotated[
@@ -48,6 +57,7 @@ def run(
     clock = Clock()
     with clock("loading"), held_back():
         from smc_mujoco.cli.scene import perform
+        from smc_mujoco.draw.film.camera import from_text
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
 
@@ -56,8 +66,10 @@ def run(
     scene = scenes.read(path)
     if seed is not None:
         scene = scene.seeded(seed)
-    terminal = Terminal()
-    perform(scene, out or Path("videos") / path.stem, video, threads, clock, terminal, endings, scenes.question(path))
+    if camera is not None:
+        scene = dataclasses.replace(scene, camera=from_text(camera))
+    terminal, folder = Terminal(), out or Path("videos") / path.stem
+    perform(scene, folder, video, threads, clock, terminal, endings, scenes.question(path), speed)
     if timing:
         terminal.note(str(clock), "dim")
 

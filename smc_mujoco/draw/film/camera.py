@@ -3,11 +3,16 @@
 A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.errors import ScenarioError, number, shown, taken
+
 FOVY = 9.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
+USUAL_FOVY = 45.0  # degrees, MuJoCo's default
+Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees, and a distance in m if it is chosen
 
 
 class Room(NamedTuple):
@@ -19,19 +24,69 @@ class Room(NamedTuple):
     bottom: float
 
 
-def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
+def checked(chosen: Camera | None) -> Camera | None:
+    """Return the chosen camera; a name of a camera is checked where the model is at hand.
+
+    Raises:
+      ScenarioError: neither a name nor two or three numbers.
+    """
+    if chosen is None or isinstance(chosen, str):
+        return chosen
+    parts = taken("camera", chosen)
+    if len(parts) not in (2, 3):
+        raise ScenarioError(
+            f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees, "
+            "or (azimuth, elevation, distance) with m"
+        )
+    angles = number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], least=-90.0, most=90.0)
+    return *angles, *(number("camera's distance", each, above=0.0) for each in parts[2:])
+
+
+def from_text(text: str) -> Camera:
+    """Return the camera that a command line names, as "look", "90,-20" or "90,-20,3"."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return text
+
+
+def turn(azimuth: float, elevation: float) -> np.ndarray:
+    """Return the turn of a camera that looks as MuJoCo's free camera does.
+
+    Args:
+      azimuth: direction of the view about the vertical, degrees: 0 along x, 90 along y.
+      elevation: direction of the view above the horizon, degrees: below 0 it looks down.
+    """
+    a, e = np.radians([azimuth, elevation])
+    ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([np.sin(a), -np.cos(a), 0.0])
+    return np.column_stack([right, np.cross(right, ahead), -ahead])
+
+
+def fit(
+    points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room, distance: float | None = None
+) -> np.ndarray:
     """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a picture of `size` px.
 
     With p and z a point's place across and along the view, a camera at c across and at distance D sees it between
     the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's
     width and for its height; D is the least at which both leave room.
+
+    Args:
+      distance: m along the view from the middle of the points, of a lens of USUAL_FOVY that shows as much as this one;
+        default: the nearest.
     """
     across, up, z = points @ turn[:, 0], points @ turn[:, 1], -points @ turn[:, 2]
     x, y = size[0] / 2, size[1] / 2
-    left, right, low, high = np.array([room.left - x, room.right - x, y - room.bottom, y - room.top]) * _pixel(size)
+    left, right, low, high = np.array([room.left - x, room.right - x, y - room.bottom, y - room.top]) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
     bounds = [(np.max(p - b * z), np.min(p - a * z), a, b) for p, a, b in sides]
-    distance = max((least - most) / (b - a) for least, most, a, b in bounds)
+    nearest = max((least - most) / (b - a) for least, most, a, b in bounds)
+    if distance is None:
+        distance = nearest
+    else:
+        zoom = np.tan(np.radians(USUAL_FOVY) / 2) / np.tan(np.radians(FOVY) / 2)
+        distance = float(distance * zoom - (z.min() + z.max()) / 2)
     centre = [(least - b * distance + most - a * distance) / 2 for least, most, a, b in bounds]
     return turn @ np.array([*centre, distance])
 
@@ -39,9 +94,15 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
 def project(points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top left."""
     seen = (points - place) @ turn
-    return np.array(size) / 2 + seen[:, :2] / -seen[:, 2:] / _pixel(size) * (1, -1)
+    return np.array(size) / 2 + seen[:, :2] / -seen[:, 2:] / pixel(size) * (1, -1)
 
 
-def _pixel(size: tuple[int, int]) -> float:
+def pixel(size: tuple[int, int]) -> float:
     """Return the tangent of one px at the picture's middle."""
     return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))
+
+
+def floor_distance(turn: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> float:
+    """Return how far along its view a camera sees the floor z = 0 at the top of its picture, m; inf at the horizon."""
+    ray = turn[:, 1] * pixel(size) * size[1] / 2 - turn[:, 2]
+    return float(-place[2] / ray[2]) if ray[2] < 0.0 else np.inf

@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, scene
+from smc_mujoco.draw.film import camera, scene, shadows
 
 MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 MARGIN = 3  # px around what has changed, for smoothed edges and soft shadows
 HIDDEN = 5  # group of geoms and skins that are left out
-GEOM, DIRECTIONAL = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+GEOM = mujoco.mjtObj.mjOBJ_GEOM
 Add = Callable[[mujoco.MjvScene], None]
 Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bottom
 
@@ -28,8 +28,12 @@ class Canvas:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
         self.model, self.data, self.size = model, data, size
         self.turn, self.place = data.cam("film").xmat.reshape(3, 3).copy(), data.cam("film").xpos.copy()
-        self.lights = shadow_lights(model, data)
+        self.sun = sun(model, data)
+        self.steady = not any(model.light_castshadow & model.light_active)  # where lamps' shadows fall is not foretold
+        middle = (model.stat.center - self.place) @ -self.turn[:, 2]
+        self.casts = shadows.casting(model, middle * camera.pixel(size))
         self.renderer = gl.renderer(model, size[1], size[0])
+        self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
         self.groups = model.geom_group.copy(), model.skin_group.copy()
         self.bounded = np.append(model.geom_type != scene.PLANE, np.ones(model.nskin, bool))
         self.shapes = self.others = np.empty((0, 0, 2))
@@ -51,7 +55,7 @@ class Canvas:
         shapes, others = self.seen_shapes(), self.seen_others()
         whole = 0, 0, *self.size
         first = not self.picture.size
-        area = whole if anew or first or self.lights is None else self.changed(shapes, others)
+        area = whole if anew or first or not self.steady else self.changed(shapes, others)
         if area is None:
             return self.picture
         if area == whole:
@@ -61,6 +65,8 @@ class Canvas:
             self.renderer.update_scene(self.data, camera="film")
             add(self.renderer.scene)
             self.model.geom_group[:], self.model.skin_group[:] = self.groups
+        if self.sun is not None:
+            shadows.draw(self.renderer.scene, self.sun, self.casts, self.model.stat.extent)
         left, top, right, bottom = area
         picture = np.empty((self.size[1], self.size[0], 3), np.uint8) if area == whole else self.picture.copy()
         picture[top:bottom, left:right] = self.render(area)
@@ -92,7 +98,8 @@ class Canvas:
     def seen(self, points: np.ndarray) -> np.ndarray:
         """Return where points (shapes, m, 3) and their shadows on the floor are in the picture, (shapes, k m, 2) px."""
         height = np.maximum(points[..., 2:], 0.0)
-        points = np.concatenate([points, *(points - height / way[2] * way for way in self.lights or ())], axis=1)
+        if self.sun is not None:
+            points = np.concatenate([points, points - height / self.sun[2] * self.sun], axis=1)
         flat = camera.project(points.reshape(-1, 3), self.turn, self.place, self.size)
         return flat.reshape(*points.shape[:2], 2)
 
@@ -101,9 +108,12 @@ class Canvas:
         moved = self.bounded & (np.abs(shapes - self.shapes).max(axis=(1, 2)) > MOVED)
         parts = [around(shapes[moved]), around(self.shapes[moved])]
         self.shapes[moved] = shapes[moved]
-        if others.shape != self.others.shape or np.abs(others - self.others).max(initial=0.0) > MOVED:
-            parts += [around(others), around(self.others)]
-            self.others = others
+        gap = np.full((len(others), len(self.others)), np.inf)
+        if gap.size:
+            gap = np.abs(others[:, None] - self.others[None]).max(axis=(2, 3))
+        new, gone = gap.min(axis=1, initial=np.inf) > MOVED, gap.min(axis=0, initial=np.inf) > MOVED
+        parts += [around(others[new]), around(self.others[gone])]
+        self.others = np.concatenate([self.others[~gone], others[new]]) if gap.size else others
         parts = np.concatenate(parts)
         if not len(parts):
             return None
@@ -129,12 +139,10 @@ class Canvas:
         return out[::-1]
 
 
-def shadow_lights(model: mujoco.MjModel, data: mujoco.MjData) -> list[np.ndarray] | None:
-    """Return the directions, (3,), of the lights that cast shadows; None if their shadows cannot be foretold."""
-    casts = [i for i in range(model.nlight) if model.light_castshadow[i] and model.light_active[i]]
-    steady = all(model.body_weldid[model.light_bodyid[i]] == 0 for i in casts)
-    far = all(model.light_type[i] == DIRECTIONAL and data.light_xdir[i, 2] < -0.1 for i in casts)
-    return [data.light_xdir[i].copy() for i in casts] if steady and far else None
+def sun(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray | None:
+    """Return the direction, (3,), of the light `scene.SUN`, which casts shadows on the floor; None without it."""
+    light = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_LIGHT, scene.SUN)
+    return None if light < 0 else data.light_xdir[light].copy()
 
 
 def around(points: np.ndarray) -> np.ndarray:

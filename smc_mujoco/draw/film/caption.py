@@ -26,6 +26,9 @@ class Caption:
 
     Attributes:
       room: the part of the picture that is free for the machines.
+
+    Args:
+      row: whether the machines stand in a row across the picture, and not behind each other.
     """
 
     def __init__(
@@ -38,6 +41,7 @@ class Caption:
         scale: float,
         scales: Mapping[Group, Scale],
         states: Sequence[Sequence[State | None]] = (),
+        row: bool = True,
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
         self.jumps = style.jumps(traces, names)
@@ -50,8 +54,7 @@ class Caption:
         notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
         self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
         self.key = wrapped(key(traces, scales), inside - self.note_room, KEY * scale)
-        x, y, _ = traces[0].scenario.plant.lane
-        self.beside = abs(y) > abs(x)  # machines behind each other have their labels at the left
+        self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
         badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]
         self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
@@ -144,7 +147,7 @@ class Caption:
         draw, s = ImageDraw.Draw(sheet), self.scale
         draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE * s, bold=True))
         for i, text in enumerate(self.key):
-            draw.text((EDGE * s, (48 + 1.4 * KEY * i) * s), text, style.MUTED, style.font(KEY * s))
+            draw.text((EDGE * s, (48 + 1.4 * KEY * i) * s), text, style.DISTURBANCE, style.font(KEY * s))
         if change is not None:
             self._note(draw, f"{self.jumps[change]} since {change:g} s", news)
         for text, colour, box, gone in zip(self.texts(failed), self.colours, self.pills, failed, strict=True):
@@ -180,7 +183,7 @@ class Caption:
 
 
 def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
-    """Return what the arrows mean, and how much of a network is shown."""
+    """Return what arrows and ghosts mean, and how much of a network is shown."""
 
     def longest(quantity: str) -> str:
         """Return the values of the longest arrows, one a group, such as "6 N"; "" if there are none."""
@@ -200,6 +203,7 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
         words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
+    words.append("translucent: where the reference is")
     most = max(trace.scenario.plant.n for trace in traces)
     if most > MAX_CHANNELS:
         words.append(f"machines: the first {MAX_CHANNELS} of {most} pendulums")

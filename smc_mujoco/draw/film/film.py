@@ -1,8 +1,8 @@
 """Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
 
-pace.py sets the speed, scene.py composes the model, stage.py poses it, canvas.py renders it, arrows.py shows forces,
-caption.py has the text, charts.py the charts, encoder.py writes. Frames are made and written one by one, so that memory
-does not grow with a film's length.
+pace.py sets the speed, scene.py composes the model, puppet.py and stage.py pose it, canvas.py renders it, shadows.py
+and arrows.py add shadows and forces, caption.py has the text, charts.py the charts, encoder.py writes. Frames are made
+and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
@@ -18,7 +18,8 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
-from smc_mujoco.draw.film import arrows, pace
+from smc_mujoco.draw.film import arrows, pace, scene
+from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder
@@ -44,6 +45,7 @@ def film(
     fps: float = FPS,
     report: Report = lambda frames: None,
     speed: float | None = None,
+    camera: Camera | None = None,
 ) -> Path:
     """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
 
@@ -56,6 +58,10 @@ def film(
       size: width and height in px, even.
       report: called with the number of frames written since its last call.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
+      camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera, or
+        (azimuth, elevation, distance), m for a lens of 45 degrees. A name and two angles give the direction of the
+        view, and the camera stands as near as all machines can be seen. Default: the plant's own `look`; of an own
+        model the first camera that stands still.
 
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
@@ -63,7 +69,7 @@ def film(
     path = Path(path)
     if path.suffix != ".mp4":
         raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
-    pictures = frames(traces, clock(traces, fps, speed), labels, title, size)
+    pictures = frames(traces, clock(traces, fps, speed), labels, title, size, camera)
     with replacing(path) as part, contextlib.closing(pictures):
         first = next(pictures)
         with encoder(part, first.shape[:2], fps) as write:
@@ -90,6 +96,7 @@ def clip(
     fps: float = 20.0,
     report: Report = lambda frames: None,
     speed: float | None = None,
+    camera: Camera | None = None,
 ) -> Path:
     """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
     path = Path(path)
@@ -100,7 +107,7 @@ def clip(
     if not 0 < count <= 600:
         raise ScenarioError(f"a clip of {span[0]:g} .. {span[1]:g} s has {count} frames: give a span with 1 to 600")
     pictures = []
-    for picture in frames(traces, shown, labels, title, size):
+    for picture in frames(traces, shown, labels, title, size, camera):
         pictures.append(Image.fromarray(picture))
         report(1)
     ends = [round(1000 / fps)] * (count - 1) + [PAUSE]
@@ -116,13 +123,14 @@ def still(
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
+    camera: Camera | None = None,
 ) -> Path:
     """Write the frame at `time` in s as a .png. Other arguments: as `film`."""
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
     now = Clock(np.array([number("time", time, least=0.0)]), np.ones(1))
-    with contextlib.closing(frames(traces, now, labels, title, size)) as pictures, replacing(path) as part:
+    with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path
 
@@ -138,9 +146,10 @@ def frames(
     labels: Sequence[str] | None,
     title: str | None,
     size: tuple[int, int],
+    chosen: Camera | None = None,
 ) -> Generator[np.ndarray]:
     """Yield the film's pictures at the times of a clock, each (height, width, 3) uint8."""
-    traces = style.same_plant(traces)
+    traces, chosen = style.same_plant(traces), checked(chosen)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
@@ -159,11 +168,13 @@ def frames(
     by_channel = [arrows.by_channel(trace, scales) for trace in traces]
     loads = [arrows.loads(trace, edges) for trace in traces]
     timelines = [states.timeline(trace, times, hold) for trace in traces]
-    caption = Caption(traces, names, colours, title, above, scale, scales, timelines)
+    row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
+    caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row)
     charts = Charts(traces, names, colours, (size[0], below), scale)
-    with Stage(traces, colours, above, caption.room) as stage:
+    with Stage(traces, colours, above, caption.room, chosen) as stage:
         caption.place(stage.boxes)
-        places = [positions(trace, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
+        wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
@@ -171,6 +182,7 @@ def frames(
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame])
+                stage.aim(k, None if failed[k] else wanted[k][frame])
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
                 for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
@@ -180,9 +192,9 @@ def frames(
             yield np.concatenate([over, charts.at(time)])
 
 
-def positions(trace: Trace, times: np.ndarray) -> np.ndarray:
-    """Return x at the times, (times, n), linear between samples; after a failure the last finite one."""
-    return np.stack([np.interp(times, trace.t, x) for x in trace.x.T], axis=1)
+def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return x (K + 1, n) at the times, (times, n), linear between samples; after a failure the last finite one."""
+    return np.stack([np.interp(times, t, each) for each in x.T], axis=1)
 
 
 def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:

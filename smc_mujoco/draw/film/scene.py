@@ -1,7 +1,7 @@
 """The model of a film: one machine a trace, side by side, without their surroundings, and a camera that suits them.
 
-Machines are the scenarios' own mechanisms with all that they touch. They stand `plant.lane` apart, or further if they
-are wider. The camera looks in the direction of the plant's own camera `look`. A user's own model gets one.
+Machines are the scenarios' own mechanisms with all that they touch. The camera looks in the direction of the plant's
+own camera `look`, or of the chosen one. A user's own model keeps its lights and cameras.
 """
 
 import dataclasses
@@ -12,73 +12,139 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
+from smc_mujoco.common.errors import find
 from smc_mujoco.draw.film import camera
+from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plant import model_path
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
 
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
+GAP = 0.15  # between machines in a row, of their width or height; chosen
 AISLE = 0.05  # m between machines, chosen
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
-QUALITY = {"offsamples": 4, "shadowsize": 1024, "numslices": 20, "numstacks": 10, "numquads": 1}  # looks and speed
+QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}  # looks and speed
 LOOK = "look"
+SUN = "sun"  # the light whose shadows lie on the floor, see shadows.py
+CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
+HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
+FADED = 0.9  # part of the haze at the top of the picture, chosen
+HORIZON = 3.0  # distances of the farthest machine, where the haze is as thick if the floor reaches further
 FRONT = (1.0, 0.0, 0.0, 0.0, 0.2, 1.0)  # right and up of a camera before an own model, a little above it
 ABOVE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.35)  # of one above, for joints with vertical axes
-FIXED, PLANE = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtGeom.mjGEOM_PLANE
+EMISSION = 0.13  # of the floor, so that it is nearly as white as the page below
+FIXED, DIRECTIONAL = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
-def compose(scenarios: Sequence[Scenario], size: tuple[int, int]) -> mujoco.MjModel:
-    """Return one model with machine k's names prefixed m<k>/, and a camera `film` for pictures of `size` px."""
+def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, int]) -> mujoco.MjModel:
+    """Return one model with machine k at place k, (3,) m, its names prefixed m<k>/, and a camera `film`.
+
+    A user's own model brings its lights; if it has none, it gets those of the film. Pictures are of `size` px.
+    """
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     for name, value in QUALITY.items():
         setattr(spec.visual.quality, name, value)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    step = lane(scenarios)
-    for k, scenario in enumerate(scenarios):
-        place = step * (k - (len(scenarios) - 1) / 2)
-        if scenario.plant.direct:
-            place = place + np.array([0.0, 0.0, depth(assembly.model([scenario]))])
-            spec.attach(own_machine(scenario, spec), frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
-            continue
+    lit = False
+    for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
         machine = assembly.spec([scenario])
-        strip(machine, machine.geom("floor"), machine.material("floor"), *machine.textures)
+        if k == 0 and scenario.plant.direct and (lit := bool(machine.lights)):
+            take(spec.visual.headlight, machine.visual.headlight)
+            for light in list(spec.lights):
+                spec.delete(light)
+        if scenario.plant.direct:
+            machine = own_machine(machine, spec, lit, first=k == 0)
+            spec.attach(machine, frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
+            continue
+        strip(machine, *machine.lights, machine.geom("floor"), machine.material("floor"), *machine.textures)
         if k == 0:
             spec.option, spec.compiler = machine.option, machine.compiler
         spec.worldbody.add_frame(pos=place).attach_body(machine.body("machine"), f"m{k}/", "")
-    spec.material("floor").emission = 0.13  # nearly the white of the page below
+    spec.material("floor").emission = EMISSION
+    sun = next((light for light in spec.lights if light.castshadow and light.type == DIRECTIONAL), None)
+    if sun:
+        sun.name, sun.castshadow = SUN, False
     spec.worldbody.add_camera(name="film", fovy=camera.FOVY)
-    width = np.linalg.norm(step) * len(scenarios)
-    spec.stat.center, spec.stat.extent, spec.stat.meansize = (0.0, 0.0, 0.5), 0.6 * width + 1.5, 0.1
+    spec.stat.meansize = 0.1
     return mjcb.compiled(spec)
 
 
 def strip(machine: mujoco.MjSpec, *surroundings) -> None:
     """Delete what a picture does not need, as it is posed and not simulated, and the machine's surroundings."""
     acting = [*machine.pairs, *machine.sensors, *machine.actuators, *machine.keys]
-    for item in [*acting, *machine.lights, *surroundings]:
+    for item in [*acting, *surroundings]:
         machine.delete(item)
 
 
-def own_machine(scenario: Scenario, film: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Return a user's mechanism with a camera `look`, without its surroundings, with the film's settings."""
-    spec = assembly.spec([scenario])
-    for each in [each for each in spec.cameras if each.name == LOOK]:
-        spec.delete(each)
-    right, up = np.reshape(view(assembly.model([scenario])), (2, 3))
-    back = np.cross(right, up) / np.linalg.norm(np.cross(right, up))
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, np.column_stack([right, np.cross(back, right), back]).ravel())
-    spec.worldbody.add_camera(name=LOOK, quat=quat)
-    spec.option = film.option  # MuJoCo warns of settings that differ
+def own_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec, lit: bool, first: bool) -> mujoco.MjSpec:
+    """Return a user's mechanism without its surroundings, with the film's settings, and its lights if it is `lit`.
+
+    Light that comes from everywhere is the first machine's.
+    """
+    machine.option = film.option  # MuJoCo warns of settings that differ
     for name in ("global_", "quality", "headlight", "map", "scale", "rgba"):
-        ours, theirs = getattr(spec.visual, name), getattr(film.visual, name)
-        for field in [field for field in dir(ours) if not field.startswith("_")]:
-            setattr(ours, field, getattr(theirs, field))
-    planes = [geom for geom in spec.geoms if geom.type == PLANE]
-    skies = [texture for texture in spec.textures if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
-    strip(spec, *spec.equalities, *spec.texts, *planes, *skies)
-    return spec
+        take(getattr(machine.visual, name), getattr(film.visual, name))
+    planes = [geom for geom in machine.geoms if geom.type == PLANE]
+    skies = [texture for texture in machine.textures if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
+    dark = [light for light in machine.lights if not lit or (light.type == DIRECTIONAL and not first)]
+    strip(machine, *machine.equalities, *machine.texts, *planes, *skies, *dark)
+    return machine
+
+
+def take(ours: object, theirs: object) -> None:
+    """Copy all fields of a group of settings."""
+    for field in [field for field in dir(ours) if not field.startswith("_")]:
+        setattr(ours, field, getattr(theirs, field))
+
+
+def set_floor(
+    model: mujoco.MjModel, turn: np.ndarray, place: np.ndarray, size: tuple[int, int], points: np.ndarray
+) -> None:
+    """Suit the floor to machines whose points are (m, 3) m: its grid, and the haze into which it fades behind them."""
+    model.stat.center[:], model.stat.extent = (
+        (points.min(axis=0) + points.max(axis=0)) / 2,
+        np.ptp(points, axis=0).max(),
+    )
+    cell = min(
+        (step * 10.0**power for power in range(-4, 5) for step in (1.0, 2.0, 5.0)),
+        key=lambda m: abs(np.log(CELLS * m / model.stat.extent)),
+    )
+    model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
+    start = float(((points - place) @ -turn[:, 2]).max())
+    stop = min(camera.floor_distance(turn, place, size), HORIZON * start)
+    model.vis.map.fogstart = start / model.stat.extent
+    model.vis.map.fogend = (start + (stop - start) / FADED) / model.stat.extent
+    model.vis.rgba.fog[:] = (*HAZE, 1.0)
+
+
+def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
+    """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's own.
+
+    Raises:
+      ScenarioError: no camera of that name, or not two or three angles.
+    """
+    if isinstance(chosen, str):
+        return named(scenario, chosen)
+    if chosen is not None:
+        return camera.turn(*chosen[:2])
+    if scenario.plant.direct:
+        right, up = np.reshape(view(assembly.model([scenario])), (2, 3))
+        right, back = right / np.linalg.norm(right), np.cross(right, up) / np.linalg.norm(np.cross(right, up))
+        return np.column_stack([right, np.cross(back, right), back])
+    return named(scenario, LOOK)
+
+
+def named(scenario: Scenario, name: str) -> np.ndarray:
+    """Return the frame of a camera of the scenario's model, (3, 3), at the start of its run."""
+    model = assembly.model([scenario])
+    names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
+    which = find(f"camera of {scenario.plant.name}", name, names)
+    data = mujoco.MjData(model)
+    data.qpos[:] = assembly.start(model, scenario)[0]
+    forward(model, data)
+    return data.cam_xmat[which].reshape(3, 3).copy()
 
 
 def view(model: mujoco.MjModel) -> tuple[float, ...]:
@@ -100,18 +166,36 @@ def depth(model: mujoco.MjModel) -> float:
     return max(0.0, -float(boxes(model, data)[model.geom_type != PLANE][..., 2].min(initial=0.0)))
 
 
-def lane(scenarios: Sequence[Scenario]) -> np.ndarray:
-    """Return the step from one machine to the next, (3,) m: the plant's lane, turned across the picture if it is close.
+def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
+    """Return whether machines stand in a row across the picture, and not behind each other.
 
-    It is longer for realistic machines that would intersect.
+    They do if the plant's lane lies across it, if the camera looks from another side than the plant's own, and if the
+    model is the user's.
     """
-    plant = scenarios[0].plant
-    if plant.direct:
-        return plant.lane[0] * np.array(view(assembly.model(scenarios[:1]))[:3])
-    look = assembly.spec(scenarios[:1]).camera(LOOK)
-    step, across = np.array(plant.lane), np.array(look.alt.xyaxes[:3])
-    length, across = np.linalg.norm(step), across / np.linalg.norm(across)
-    step = length * across if abs(step @ across) > 0.5 * length else step
+    if scenario.plant.direct:
+        return True
+    step = np.array(scenario.plant.lane)
+    return bool(abs(step @ turn[:, 0]) > 0.5 * np.linalg.norm(step))
+
+
+def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
+    """Return the step from one machine to the next, (3,) m.
+
+    Machines in a row stand as close as they can without hiding each other. Others stand the plant's lane apart, or
+    further if they are realistic and would intersect.
+
+    Args:
+      reaches: what must be in the picture of each machine, (points, 3) m from its place.
+      turn: frame of the camera.
+    """
+    step = np.array(scenarios[0].plant.lane)
+    if in_a_row(scenarios[0], turn):
+        right = np.array([*turn[:2, 0], 0.0])
+        right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
+        sides = [points @ right for points in reaches]
+        wide = max((one.max() - other.min() for one, other in itertools.pairwise(sides)), default=0.0)
+        tall = max(float(np.ptp(points[:, 2])) for points in reaches)
+        return (wide + GAP * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
     things = [fixed_boxes(assembly.model([scenario])) for scenario in scenarios]
@@ -139,7 +223,10 @@ def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the corners of each geom's box, (geoms, 8, 3) m."""
     signs = np.array(list(itertools.product((-1, 1), repeat=3)))
-    local = model.geom_aabb[:, None, :3] + signs * model.geom_aabb[:, None, 3:]
+    half = model.geom_aabb[:, 3:].copy()
+    rods = model.geom_type == CAPSULE  # their boxes are those of the compiled sizes, which a run may change
+    half[rods, 2] = model.geom_size[rods, 0] + model.geom_size[rods, 1]
+    local = model.geom_aabb[:, None, :3] + signs * half[:, None]
     return np.einsum("gij,gcj->gci", data.geom_xmat.reshape(-1, 3, 3), local) + data.geom_xpos[:, None]
 
 

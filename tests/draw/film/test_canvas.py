@@ -5,7 +5,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera
+from smc_mujoco.draw.film import camera, shadows
 from smc_mujoco.draw.film.arrows import Arrow
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.stage import Stage
@@ -98,9 +98,39 @@ def test_a_changed_colour_or_shape_is_drawn():
 def test_a_model_with_a_lamp_has_its_pictures_drawn_whole():
     """Where the shadows of a lamp fall is not foretold."""
     with stage("inverted_pendulum") as shown:
-        model, data = shown.model, shown.data
-        model.light("key").type = 0  # a spot
-        assert Canvas(model, data, SIZE).lights is None
+        assert shown.canvas.steady
+        assert shown.canvas.sun is not None
+        assert shown.canvas.sun[2] < -0.5
+        shown.model.light_castshadow[shown.model.light("fill").id] = 1
+        assert not Canvas(shown.model, shown.data, SIZE).steady
+
+
+def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges():
+    way = np.array([0.3, 0.5, -0.8])
+    point = np.array([0.2, -0.1, 1.6])
+    assert shadows.flattening(way) @ point == pytest.approx([0.8, 0.9, 0.0], abs=2e-4)
     with stage("inverted_pendulum") as shown:
-        assert shown.canvas.lights is not None
-        assert [way[2] < -0.5 for way in shown.canvas.lights] == [True]
+        lit = shown.render().astype(int)
+        shown.canvas.sun, shown.changed = None, True
+        bare = shown.render().astype(int)
+    darker = (bare - lit).min(axis=2)
+    shadow = np.median(darker[darker > 10])
+    edge = (darker > 0.2 * shadow) & (darker < 0.8 * shadow)
+    assert (darker > 0.8 * shadow).sum() > 500
+    assert edge.sum() > 50
+
+
+def test_a_ghost_stands_where_the_reference_is_and_inside_a_machine_that_is_there():
+    with stage("van_der_pol") as shown:
+        for k in range(2):
+            shown.pose(k, np.array([1.5]))
+        alone = shown.render().astype(int)
+        shown.aim(0, np.array([-1.0]))
+        ghost = np.abs(shown.render().astype(int) - alone).max(axis=2) > 20
+        columns = np.flatnonzero(ghost.any(axis=0))
+        assert ghost.sum() > 100
+        assert columns.max() < SIZE[0] / 2
+        shown.aim(0, np.array([1.5]))
+        assert (np.abs(shown.render().astype(int) - alone).max(axis=2) > 20).sum() < 0.1 * ghost.sum()
+        shown.aim(0, None)
+        assert (np.abs(shown.render().astype(int) - alone).max(axis=2) > SEEN).mean() < 3e-4

@@ -15,7 +15,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, film, scene
+from smc_mujoco.draw.film import camera, film, puppet, scene
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
 from smc_mujoco.draw.film.pace import Clock
@@ -195,7 +195,8 @@ def test_a_jump_changes_the_machine_and_is_told():
 def test_long_words_stay_in_the_picture(plant):
     bad = [broken(trace, 150) for trace in runs(plant)]
     names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
-    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, {driven(bad): Scale(6.0, 0.2)})
+    scales, row = {driven(bad): Scale(6.0, 0.2)}, plant != "duffing"
+    caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, scales, row=row)
     caption.place(np.array([[300.0 * k, 80.0 * k, 300.0 * k + 290, 80.0 * k + 200] for k in range(4)]))
     assert (caption.pills[:, :2] >= 0).all()
     assert (caption.pills[:, 2:] <= size).all()
@@ -323,11 +324,18 @@ def stuck() -> smc.Trace:
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
     scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
-    model = scene.compose([scenario] * 2, SIZE)
+    model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = [geom.name for geom in assembly.spec([scenario]).geoms if geom.name not in ("", "floor")]
     assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
     assert model.nskin == 2 * len(assembly.spec([scenario]).skins)
+
+
+def stood(scenarios) -> np.ndarray:
+    """Where machines stand."""
+    found = [puppet.Puppet(scenario) for scenario in scenarios]
+    reaches = [each.reach(smc.run(scenario)) for each, scenario in zip(found[:1], scenarios, strict=False)]
+    return puppet.places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
@@ -335,7 +343,7 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
     scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
     corners = scene.fixed_boxes(assembly.model([scenario]))[..., :2]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    step = scene.lane([scenario] * 3)[:2]
+    step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
     for by in (step, 2 * step):
         apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(axis=2)
         assert apart.min() >= 0.0
@@ -343,7 +351,7 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
 
 def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
     (trace,) = runs(laws=LAWS[:1])
-    assert np.linalg.norm(scene.lane([trace.scenario])) == pytest.approx(np.linalg.norm(trace.scenario.plant.lane))
+    assert np.diff(stood([trace.scenario] * 2), axis=0) == pytest.approx(np.array([trace.scenario.plant.lane]))
     assert moods(trace) == [(None, 10)]
     assert scales([trace])[driven([trace])].reaction == 0.0
     assert not any("violet" in words for words in key([trace], scales([trace])))
@@ -498,7 +506,8 @@ def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
     traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
     told = [states.timeline(trace, seconds(trace)) for trace in traces]
     names = style.labels(traces, None)
-    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told)
+    row = plant != "duffing"
+    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told, row)
     with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:
         caption.place(shown.boxes)
     boxes = np.concatenate([caption.pills, caption.badges])

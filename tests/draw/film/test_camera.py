@@ -1,0 +1,113 @@
+"""The film's camera: chosen by name or by angles, or else the plant's own; it sees all machines, as near as it can."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw.film import camera, scene
+from smc_mujoco.draw.film.stage import Stage
+
+SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
+renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+MODEL = """
+<mujoco model="arm">
+  <visual><headlight ambient="0.3 0.2 0.1"/></visual>
+  <worldbody>
+    {lights}
+    <camera name="first" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/>
+    <camera name="side" pos="4 0 1" xyaxes="0 1 0 0 0 1"/>
+    <body name="post" pos="0 0 1">
+      <joint name="j" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .5" rgba=".5 .5 .5 1"/>
+    </body>
+    <body name="ball" pos=".5 0 2"><freejoint name="fall"/><geom size=".1" rgba=".2 .9 .2 1"/></body>
+  </worldbody>
+  <actuator><motor joint="j"/></actuator>
+</mujoco>"""
+LAMPS = """<light name="own" type="directional" dir="0 0.3 -1"/><light name="lamp" pos="0 0 3"/>"""
+
+
+@pytest.fixture(scope="module", params=["", LAMPS], ids=["dark", "lit"])
+def trace(request, tmp_path_factory) -> smc.Trace:
+    path = tmp_path_factory.mktemp("arm") / "arm.xml"
+    path.write_text(MODEL.format(lights=request.param))
+    return smc.run(smc.Scenario(plant=smc.plant_from(path, ["j"]), law="none", x0=0.3, duration=0.4))
+
+
+def test_angles_are_those_of_mujoco_s_free_camera():
+    turn = camera.turn(90.0, -30.0)
+    assert -turn[:, 2] == pytest.approx([0.0, 0.75**0.5, -0.5])
+    assert turn[:, 0] == pytest.approx([1.0, 0.0, 0.0])
+    assert turn.T @ turn == pytest.approx(np.eye(3))
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+def test_a_distance_is_that_of_a_usual_lens():
+    """A point 1 m above the middle, seen from 10 m with a lens of 45 degrees, is where it is in its picture."""
+    turn, points = camera.turn(90.0, 0.0), np.array([[0.0, 0, 1], [0, 0, -1]])
+    place = camera.fit(points, turn, SIZE, camera.Room(0, 0, *SIZE), 10.0)
+    heights = camera.project(points, turn, place, SIZE)[:, 1]
+    assert (heights[1] - heights[0]) / SIZE[1] == pytest.approx(0.1 / np.tan(np.radians(22.5)), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "chosen"), [("look", "look"), ("90,-20", (90.0, -20.0)), ("0,-90,2.5", (0, -90, 2.5))]
+)
+def test_a_command_line_s_camera(text, chosen):
+    assert camera.checked(camera.from_text(text)) == chosen
+
+
+@pytest.mark.parametrize(
+    ("chosen", "sentence"),
+    [
+        ((1.0,), "give the name of a camera"),
+        ((1.0, 2.0, 3.0, 4.0), "give the name of a camera"),
+        ((0.0, 91.0), "camera's elevation is 91"),
+        ((0.0, 0.0, 0.0), "camera's distance"),
+        (("a", 0.0), "camera's azimuth"),
+        (3.0, "give a list"),
+    ],
+)
+def test_what_is_no_camera_is_refused(chosen, sentence):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        camera.checked(chosen)
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        smc.Scene(title="a", conditions={"b": {"c": smc.Scenario(plant="duffing", law="none")}}, camera=chosen)
+
+
+def test_an_own_model_s_camera_is_found_by_its_name(trace):
+    side = scene.turn(trace.scenario, "side")
+    assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
+    assert -scene.turn(trace.scenario)[:, 2] == pytest.approx([0.0, 1.0, 0.0])  # the first that stands still
+    with pytest.raises(smc.ScenarioError, match="sid"):
+        scene.turn(trace.scenario, "sid")
+
+
+@renders
+def test_the_chosen_camera_is_the_picture_s(trace):
+    for chosen in ("side", (20.0, -40.0)):
+        with Stage([trace] * 2, ["#0072B2", "#D55E00"], SIZE, ROOM, chosen) as shown:
+            turn = shown.data.cam("film").xmat.reshape(3, 3)
+            assert turn == pytest.approx(scene.turn(trace.scenario, chosen))
+            assert (shown.boxes[:, :2] >= (19.9, 19.9)).all()
+            assert (shown.boxes[:, 2:] <= (620.1, 210.1)).all()
+            assert shown.boxes[0, 2] < shown.boxes[1, 0]  # side by side, whatever the direction
+
+
+@renders
+def test_an_own_model_keeps_its_lights_and_gets_the_film_s_if_it_has_none(trace):
+    with Stage([trace] * 2, ["#0072B2", "#D55E00"], SIZE, ROOM) as shown:
+        model, lit = shown.model, "lamp" in str(trace.scenario.plant.spec().to_xml())
+        names = {model.light(i).name for i in range(model.nlight)}
+    assert names == ({scene.SUN, "m0/lamp", "m1/lamp"} if lit else {scene.SUN, "fill"})
+    ambient = (0.3, 0.2, 0.1) if lit else (0.42, 0.43, 0.44)
+    assert model.vis.headlight.ambient == pytest.approx(ambient)
+
+
+@renders
+def test_links_of_an_own_model_have_the_law_s_colour_and_other_bodies_their_own(trace):
+    with Stage([trace], ["#0072B2"], SIZE, ROOM) as shown:
+        (link,) = shown.links[0]
+        ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
+        assert shown.model.geom_rgba[link, 2] > 0.6 > 2 * shown.model.geom_rgba[link, 0]
+        assert shown.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
