@@ -14,6 +14,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.draw import page
 from smc_mujoco.draw.film import encoder, film
+from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -42,8 +43,10 @@ class Frames:
         size: tuple[int, int],
         fps: float,
         speed: float | None,
+        camera: Camera | None,
     ):
-        self.traces, self.labels, self.title, self.size, self.speed = traces, labels, title, size, speed
+        self.traces, self.labels, self.title, self.size = traces, labels, title, size
+        self.speed, self.camera = speed, checked(camera)
         self.fps, self._clock = fps, film.clock(traces, fps, speed)
         self.times = self._clock.times
 
@@ -51,7 +54,7 @@ class Frames:
         return len(self.times)
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        return film.frames(self.traces, self._clock, self.labels, self.title, self.size)
+        return film.frames(self.traces, self._clock, self.labels, self.title, self.size, self.camera)
 
     def __repr__(self) -> str:
         return f"Frames({len(self)} of {self.size[0]} x {self.size[1]} px, {self.fps:g} a second)"
@@ -64,7 +67,7 @@ class Frames:
 
     def write(self, path: Path, report: film.Report) -> None:
         """Write an .mp4, see `film.film`."""
-        film.film(self.traces, path, self.labels, self.title, self.size, self.fps, report, self.speed)
+        film.film(self.traces, path, self.labels, self.title, self.size, self.fps, report, self.speed, self.camera)
 
 
 def frames(
@@ -74,13 +77,14 @@ def frames(
     size: tuple[int, int] = SIZE,
     fps: float = film.FPS,
     speed: float | None = None,
+    camera: Camera | None = None,
 ) -> Frames:
     """Return the pictures of a film, as `mediapy.show_video(smc.frames(trace))` takes them. Arguments: as `film`.
 
     Raises:
       ScenarioError: as `film`; what concerns the size or OpenGL when the first picture is made.
     """
-    return Frames(traces, labels, title, size, fps, speed)
+    return Frames(traces, labels, title, size, fps, speed, camera)
 
 
 def show(
@@ -90,6 +94,7 @@ def show(
     size: tuple[int, int] = SIZE,
     fps: float = film.FPS,
     speed: float | None = None,
+    camera: Camera | None = None,
 ) -> None:
     """Show a film of traces, a figure, or the file of one, in a notebook's cell.
 
@@ -97,7 +102,7 @@ def show(
 
     Args:
       what: one or several traces of one plant, which are filmed; `frames`; a figure; or the path of a film or picture.
-      labels, title, size, fps, speed: of a film, as `film`.
+      labels, title, size, fps, speed, camera: of a film, as `film`.
 
     Raises:
       ScenarioError: not in a notebook, no film or picture, or as `film`.
@@ -106,10 +111,10 @@ def show(
         raise ScenarioError("smc.show needs a notebook: elsewhere, write a film with smc.film(traces, 'film.mp4')")
     from IPython.display import HTML, display
 
-    display(HTML(embedded(what, labels, title, size, fps, speed)))
+    display(HTML(embedded(what, labels, title, size, fps, speed, camera)))
 
 
-def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, speed=None) -> html.Html:
+def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, speed=None, camera=None) -> html.Html:
     """Return HTML with the film or picture in it, see `show`."""
     if isinstance(what, Figure | SubFigure):
         return html.embedded(page.png(what), "image/png", page.css_width(what))
@@ -120,7 +125,7 @@ def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, spe
         with reading(what, "film or picture", "give the path of one, such as film.mp4") as path:
             return html.embedded(path.read_bytes(), kind)
     if not isinstance(what, Frames):
-        what = frames(_traces(what), labels, title, size, fps, speed)
+        what = frames(_traces(what), labels, title, size, fps, speed, camera)
     if why := film.missing():
         raise ScenarioError(why)
     with tempfile.TemporaryDirectory() as folder, progress.bar("film", len(what)) as bar:
