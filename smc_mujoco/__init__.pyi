@@ -1,3 +1,4 @@
+import smc_mujoco.studies.boards
 from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.region_of_attraction import basin as basin
 from smc_mujoco.analysis.tuning.result import Tuned as Tuned
@@ -87,6 +88,7 @@ from smc_mujoco.twins.rig import rig as rig
 from smc_mujoco.twins.rig import rigs as rigs
 
 __version__: str
+boards = smc_mujoco.studies.boards
 gym = gymnasium_env
 paper = scenarios
 suite = dm_control_env

@@ -27,6 +27,7 @@ COMMANDS = {
     "which": studies.which,
     "tune": analysis.tune,
     "bench": studies.bench,
+    "board": studies.board,
     "margins": analysis.margins,
     "basin": analysis.basin,
     "claims": studies.claims,

@@ -10,6 +10,7 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.progress import bar
+from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
@@ -120,15 +121,27 @@ def _labels(runs: Mapping[str, Trace]) -> list[str]:
 
 
 def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None = None) -> list[Path]:
-    """Film one condition of the scene, `scene.film`. If nothing can render, print why and return no file."""
+    """Film the scene's filmed condition; where nothing can render, print why and return no file."""
+    runs = traces[scene.film]
+    path = out / f"{slug(scene.film)}.mp4"
+    return filmed(list(runs.values()), path, _labels(runs), _title(scene, scene.film), terminal, speed, scene.camera)
+
+
+def filmed(
+    runs: Sequence[Trace],
+    path: Path,
+    names: Sequence[str] | None,
+    title: str,
+    terminal: Terminal,
+    speed: float | None = None,
+    camera: Camera | None = None,
+) -> list[Path]:
+    """Film runs with a progress bar and return the file; where nothing can render, print why and return no file."""
     from smc_mujoco.draw.film import film as video
 
     if sentence := video.missing() or gl.note():
         terminal.note(sentence, "yellow")
     if video.missing():
         return []
-    runs = list(traces[scene.film].values())
-    path = out / f"{slug(scene.film)}.mp4"
-    names, title = _labels(traces[scene.film]), _title(scene, scene.film)
     with bar("film", len(video.clock(runs, video.FPS, speed).times)) as drawn:
-        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed, camera=scene.camera)]
+        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed, camera=camera)]

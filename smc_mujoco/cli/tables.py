@@ -26,6 +26,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.board_tables import size
+from smc_mujoco.studies.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
 from smc_mujoco.studies.paper.claims.verdict import Claim
@@ -49,6 +50,13 @@ BOARD_KEY = (
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
     "x, u of driven joints, in rad or m, N m or N"
 )
+BOARDS = {  # of RealAIGym -> what it shows, and the headings of its columns
+    "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),
+    "robustness": (
+        "survived",
+        ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
+    ),
+}
 MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
 # Verdicts have a colour beside their mark, from a palette for the colour-blind.
 COLOURS = {
@@ -299,6 +307,20 @@ def _winner_cell(board: Board | None) -> Text:
 
 
 # advice
+
+
+def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: str) -> Table:
+    """Return a simulation or a robustness board as a table, with the row of the name `own` in bold."""
+    tests = isinstance(rows[0], RobustnessRow)
+    title, heads = BOARDS["robustness" if tests else "simulation"]
+    columns = [Column(head, justify="right") for head in heads]
+    table = titled(f"{robot}, {title}, version 2", Column("controller", no_wrap=True), *columns, pad_edge=False)
+    for row in rows:
+        values = row[1:8] if tests else row[1:7]
+        digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
+        cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
+        table.add_row(row.name, *cells, style="bold" if row.name == own else None)
+    return table
 
 
 def advice(found: Advice) -> Table:

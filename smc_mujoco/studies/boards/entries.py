@@ -1,0 +1,122 @@
+"""Sliding-mode entries for the boards: swing-up and balance of acrobot and pendubot along an optimised trajectory.
+
+    s = b' P (z - z*) / R,    u = u* - k tanh(s / phi)
+
+z = (q1, q2, q1', q2') is the state, z*(t) and u*(t) a trajectory from hanging to upright, b(t) the input vector of the
+motion linearised along it, and P(t) the solution of its Riccati equation -P' = A'P + P A - P b b'P / R + Q, which ends
+in that of the upright equilibrium. After the trajectory all of them stay as they are there: the catch is the same law.
+
+To first order V = (z - z*)'P (z - z*) obeys V' = -(z - z*)'Q (z - z*) + R s^2 - 2 R s (k tanh(s / phi) - d) under a
+matched disturbance d. On s = 0, V falls whatever u and d are: the surface is stable, and the law has only to bring s to
+0. Without d, V falls wherever k tanh(s / phi) exceeds s / 2, for the default gains where |s| < 2.9 phi. The motor gives
+6 N m, less than k.
+
+`trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were found; benchmarks/swing_up.py finds them
+again. Velocities are those of a Savitzky-Golay filter of 9 positions, as the rig has encoders and no tachometer.
+Sources: V. I. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 9 (surfaces of least quadratic
+cost); S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE Trans. Automatic Control 24(3):437,
+1979 (the surface b'P z = 0).
+"""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from smc_mujoco.common.errors import find
+from smc_mujoco.common.files import read_json
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.estimator import Estimator, estimator
+from smc_mujoco.control.law import Law, law_function
+from smc_mujoco.control.units import FORCE, Gain
+from smc_mujoco.simulation.scenario import Scenario
+
+FOLDER = Path(__file__).parent / "trajectories"
+PERIOD, DURATION = 2e-3, 10.0  # s, of the boards
+WINDOW = 9  # readings of the velocity's filter
+
+
+def entry(robot: str) -> Scenario:
+    """Return the run of this package's entry on the boards of "acrobot" or "pendubot".
+
+    Raises:
+      ScenarioError: another robot.
+    """
+    law = find("robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up})
+    return on_board(robot, law(), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
+
+
+def on_board(robot: str, law: Law | Template | str, velocity: Estimator | str = "measured") -> Scenario:
+    """Return the run of a law by the rules of the boards: from rest, hanging, 10 s at 2 ms.
+
+    Args:
+      robot: "pendubot" or "acrobot".
+      law: a law, or the name of one.
+      velocity: estimator of the velocities, or the name of one.
+    """
+    return Scenario(
+        plant=robot, law=law, velocity=velocity, x0=0.0, v0=0.0, duration=DURATION, control_period=PERIOD,
+        physics_step=PERIOD, integrator="RK4",
+    )  # fmt: skip
+
+
+@njit
+def hermite(a, b, da, db, h, part):
+    """Return the cubic between a and b with slopes da and db, h apart, at a part of the way."""
+    rest = 1.0 - part
+    return rest * rest * (a * (1.0 + 2.0 * part) + h * part * da) + part * part * (
+        b * (1.0 + 2.0 * rest) - h * rest * db
+    )
+
+
+@njit
+def nearest(angle):
+    """Return an angle less whole turns, in -pi .. pi."""
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def _along(robot: str) -> Template:
+    """Return the law along the trajectory of a robot; (x, v) are the driven joint's, (q, dq) the free one's."""
+    table = read_json(FOLDER / f"{robot}.json")
+    STEP, LAST = float(table["step"]), len(table["u"]) - 1
+    X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = (
+        np.array(table[name]) for name in ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")
+    )
+
+    def law(y, gains, memory):
+        place = y.t / STEP
+        i = min(int(place), LAST - 1)
+        j = i + 1
+        part, middle = min(place - i, 1.0), min((y.t + 0.5 * y.dt) / STEP - i, 1.0)
+        x = nearest(y.x - hermite(X[i], X[j], V[i], V[j], STEP, part))
+        v = y.v - hermite(V[i], V[j], A[i], A[j], STEP, part)
+        q = nearest(y.q - hermite(Q[i], Q[j], DQ[i], DQ[j], STEP, part))
+        dq = y.dq - hermite(DQ[i], DQ[j], DDQ[i], DDQ[j], STEP, part)
+        s = (SX[i] + part * (SX[j] - SX[i])) * x + (SV[i] + part * (SV[j] - SV[i])) * v
+        s += (SQ[i] + part * (SQ[j] - SQ[i])) * q + (SDQ[i] + part * (SDQ[j] - SDQ[i])) * dq
+        return U[i] + middle * (U[j] - U[i]) - gains.k * math.tanh(s / gains.phi), s
+
+    return _named(law, robot)
+
+
+def _named(law: Callable, robot: str) -> Template:
+    """Return the template of a law under the name by which files and other processes find it."""
+    law.__name__ = law.__qualname__ = f"{robot}_swing_up"
+    law.__doc__ = f"Swing-up and balance of the {robot} along an optimised trajectory: u = u* - k tanh(s / phi)."
+    decorate = law_function(
+        gains={"k": Gain(9.0, FORCE, positive=True), "phi": Gain(6.0, FORCE, positive=True)},
+        conditions={"k > phi / 2": lambda g: g.k > g.phi / 2.0},
+        memory=1,
+        plants=(robot,),
+        continuous=True,
+        label="Swing-up on a Riccati surface",
+        short="RS",
+        colour="#D55E00",
+    )
+    return decorate(law)
+
+
+acrobot_swing_up = _along("acrobot")
+pendubot_swing_up = _along("pendubot")
