@@ -33,11 +33,12 @@ def test_the_contents_name_every_page_once():
 
 def test_the_reference_names_every_public_name_where_it_is_defined():
     named = re.findall(r"^::: smc_mujoco\.(\S+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
-    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {smc._MODULES["paper"]}
+    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {smc._MODULES["paper"], smc._MODULES["boards"]}
     homes = {home.removeprefix("smc_mujoco.") for home in homes}
     assert homes <= set(named)
     assert len(named) == len(set(named))
-    assert {name for name in set(named) - homes if not name.startswith(("pytest_plugin.", "testing."))} == set()
+    of_modules = ("pytest_plugin.", "testing.", "studies.boards.")
+    assert {name for name in set(named) - homes if not name.startswith(of_modules)} == set()
 
 
 def test_the_mathematics_define_every_metric_in_the_order_of_tables():
