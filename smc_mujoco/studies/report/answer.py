@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.differences import ROUNDING
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.studies.adviser import LEAST_SETTLED
 from smc_mujoco.studies.paper.claims.verdict import VERDICTS
 from smc_mujoco.studies.report import words
 from smc_mujoco.studies.report.scores import Place, Score
@@ -34,12 +36,35 @@ class Standing(NamedTuple):
     of: int
 
 
+class Pick(NamedTuple):
+    """The law to take for a metric on a plant, or on all plants, over the conditions.
+
+    `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: in how many of the `of` cells it wins,
+    and in how many another law is better. `level`: the other laws that are beaten in no more cells.
+    """
+
+    law: str
+    median: float
+    wins: int
+    losses: int
+    of: int
+    level: tuple[str, ...]
+
+    @property
+    def sure(self) -> str:
+        """How sure the choice is, in words."""
+        if self.wins == self.of:
+            return f"wins in all {self.of}"
+        unbeaten = f"unbeaten in {self.of - self.losses or 'none'} of {self.of}"
+        return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
+
+
 class Loss(NamedTuple):
     """A cell in which another law is better than the paper's.
 
-    `own`, `rival`: medians of the paper's law and of the best law. `times`: own over rival, a lower bound where the
-    rival's is zero but for rounding (`rounded`). `settles`: whether the best law settles there: a law that hardly acts
-    may be calm, and never arrive.
+    `own`, `rival`: medians of the paper's law and of the best law. `times`: own over rival; where the rival's is less
+    than the least difference that counts, own over that difference, a lower bound (`rounded`). `settles`: whether the
+    best law settles there: a law that hardly acts may be calm, and never arrive.
     """
 
     metric: str
@@ -110,6 +135,7 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
             settling = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
+            least = max(best.floor, ROUNDING)
             loss = Loss(
                 metric=metric,
                 plant=plant,
@@ -117,8 +143,8 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
                 own=own.median,
                 rival=best.median,
                 law=best.law,
-                times=own.median / max(best.median, ROUNDING),
-                rounded=best.median < ROUNDING,
+                times=own.median / max(best.median, least),
+                rounded=best.median < least,
                 settles=settling.get(best.law) != math.inf,
             )
             lost.append(loss)
@@ -136,7 +162,38 @@ def overall(findings: "Findings", metric: str) -> list[Place]:
     return sorted((p for p in findings.places if p.metric == metric and not p.plant), key=lambda p: p.mean)
 
 
+def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
+    """Return the law that is beaten in the fewest conditions, by mean rank where several are; "" for all plants.
+
+    Laws that settle in less than half as many runs as the law that settles in the most are left out: to do nothing
+    would be calm. None for a metric without numbers.
+    """
+    here = [place for place in findings.places if place.plant == plant]
+    settled = {place.law: place.median for place in here if place.metric == SETTLES}
+    enough = LEAST_SETTLED * max(settled.values(), default=0.0)
+    rows = [place for place in here if place.metric == metric and settled.get(place.law, 1.0) >= enough]
+    if not rows:
+        return None
+    best = min(rows, key=lambda row: (row.losses, row.mean))
+    level = tuple(row.law for row in sorted(rows, key=lambda row: row.mean) if row.losses == best.losses)
+    others = tuple(law for law in level if law != best.law)
+    return Pick(best.law, best.median, best.wins, best.losses, best.of, others)
+
+
 # sentences
+
+
+def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
+    """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
+    own = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER]
+    parts = []
+    if own:
+        of, lost, alone = (sum(getattr(row, name) for row in own) for name in ("of", "lost", "alone"))
+        parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
+    if findings.claims:
+        found = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
+        parts.append(f"of its {len(findings.claims)} checked claims, {_joined(found)}")
+    return f"The paper: {'; '.join(parts)}." if parts else ""
 
 
 def first(findings: "Findings", metrics: Sequence[str]) -> str:

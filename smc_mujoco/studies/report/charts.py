@@ -30,7 +30,7 @@ def _named(law: str) -> str:
 
 def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> Figure:
     """Draw medians with intervals in one condition: a row per metric, a column per plant, a line per law."""
-    grid = panels(len(metrics), len(plants), (0.028, 0.12))
+    grid = panels(len(metrics), len(plants), (0.028, 0.08))
     known = {(s.metric, s.plant, s.law): s for s in scores}
     data: list[dict] = []
     titles = [title | {"yshift": 17} for title in plant_titles(grid[: len(plants)], plants)]

@@ -13,6 +13,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.leaderboard import Board, leaderboard
 from smc_mujoco.studies.report import words
 
@@ -24,7 +25,7 @@ class Score(NamedTuple):
     """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
 
     `best`: no other law is better there, see `ranking`; several laws may be. `seeds`: of the runs, `runs`: how many of
-    them are distinct, `failed`: how many have no score.
+    them are distinct, `failed`: how many have no score. `floor`: the least difference that counts between small values.
     """
 
     plant: str
@@ -38,6 +39,7 @@ class Score(NamedTuple):
     seeds: int
     failed: int
     runs: int
+    floor: float = 0.0
 
 
 class Place(NamedTuple):
@@ -74,6 +76,7 @@ def scores(table: "Table") -> tuple[Score, ...]:
     found = []
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
+        (ran,) = paired_runs.scenarios(table, group)
         for metric in words.COLUMNS:
             _, by_law, _ = group.scores(by_row[metric])
             for law in sorted(by_law, key=order.index):
@@ -90,6 +93,7 @@ def scores(table: "Table") -> tuple[Score, ...]:
                     seeds=block.seeds,
                     failed=failed[plant, condition, law],
                     runs=block.runs,
+                    floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
                 )
                 found.append(score)
     return tuple(found)

@@ -234,7 +234,8 @@ def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
     forest, here = forest_of(shown), forest_of(findings)
     per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.HEADLINE)
     assert per_law >= 15  # px: a line of text
-    assert all(words.law(law) in page.page(shown) for law in THIRTEEN)
+    text = page.page(shown)
+    assert all(words.law(law) in text for law in THIRTEEN)
 
 
 def test_a_map_is_drawn_as_it_was_found(findings):
@@ -375,6 +376,9 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
     exact = answer.losses(answer.cells(scores(observer_free=3.0, classical=1e-20)), ["settling_time"])
     assert exact[0].times == pytest.approx(3e9)  # over what rounding leaves of zero, not over 1e-20
     assert exact[0].rounded
+    small = [s._replace(floor=0.5) for s in scores(observer_free=3.0, classical=0.1)]
+    (one,) = answer.losses(answer.cells(small), ["settling_time"])
+    assert (one.times, one.rounded) == (6.0, True)  # over the least difference that counts
     never = answer.losses(answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"])
     assert never[0].times == math.inf
 
@@ -390,6 +394,65 @@ def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
     told = sentences(few, [])
     assert "Of Classical’s runs 50 % settle, the fewest" in told
     assert "3 of 40 runs failed" in told
+
+
+def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
+    return Place(plant, metric, law, mean, 1.0, 2.0, not losses, median, wins, losses, 4, "")
+
+
+def picked(findings, *places):
+    one = answer.pick(dataclasses.replace(findings, places=places), "itae", "duffing")
+    assert one
+    return one
+
+
+def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_mean_rank(findings):
+    one = picked(findings, place("a", 2, 2, 1.0), place("b", 1, 0, 3.0), place("c", 1, 0, 2.0), place("d", plant="x"))
+    assert (one.law, one.level) == ("c", ("b",))
+    assert one.sure == "unbeaten in 3 of 4"
+    assert picked(findings, place("a", 4, median=2.0), place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
+    assert picked(findings, place("a", 0, 4)).sure == "wins in all 4"
+    assert picked(findings, place("a", 4)).sure == "unbeaten in none of 4"
+    assert answer.pick(dataclasses.replace(findings, places=()), "itae", "duffing") is None
+
+
+def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
+    def settling(law, share):
+        return place(law, metric="settles", median=share)
+
+    calm, other = place("idle"), place("pid", 3)
+    assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
+    assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
+
+
+def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, findings):
+    table = text.split('id="picks"')[1].split("</table>")[0]
+    (row,) = re.findall(r'<tr><th scope="row">Duffing</th>(.*?)</tr>', table, re.S)
+    cells = re.findall(r"<td>(.*?)</td>", row, re.S)
+    assert len(cells) == len(words.HEADLINE)
+    for metric, cell in zip(words.HEADLINE, cells, strict=True):
+        one = answer.pick(findings, metric, "duffing")
+        assert one
+        assert words.law(one.law) in cell
+        assert one.sure in cell
+        assert words.number(one.median) in cell
+    assert text.index('id="picks"') < text.index("Who wins where")
+
+
+def test_the_papers_verdict_is_one_line_that_counts(findings):
+    cells = [
+        *scores(observer_free=2.0, classical=1.0),
+        *scores("noise", observer_free=1.0, classical=3.0),
+        *scores("sine", observer_free=1.0, classical=1.0),
+    ]
+    claims = [dataclasses.replace(findings.claims[0], verdict=v) for v in ("supported", "refuted", "refuted")]
+    few = dataclasses.replace(findings, scores=tuple(cells), claims=tuple(claims))
+    assert answer.verdict(few, ["settling_time"]) == (
+        "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims, "
+        "1 is supported and 2 are refuted."
+    )
+    none = dataclasses.replace(few, scores=(), claims=())
+    assert answer.verdict(none, ["settling_time"]) == ""
 
 
 def test_the_report_tells_what_was_not_done(text, findings):
@@ -545,9 +608,9 @@ def browser():
 class Seen:
     """A page in the browser, with all that it said and asked for."""
 
-    def __init__(self, browser, url, width=1400):
+    def __init__(self, browser, url, width=1400, scheme="light"):
         self.said, self.asked = [], []
-        self.page = browser.new_page(viewport={"width": width, "height": 900})
+        self.page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
         self.page.on("console", lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None)
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
@@ -659,7 +722,49 @@ def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_
         )
         == 0
     )
+    box = phone.locator(".wide:has(#picks)")
+    assert box.evaluate("a => a.scrollWidth > a.clientWidth + 50")
+    shades = box.evaluate("a => getComputedStyle(a)")["backgroundAttachment"]
+    assert shades == "local, local, scroll, scroll"  # a shadow at the edge, which the end of the table covers
+    name = phone.locator("#picks tbody th").first
+    left = name.evaluate("a => a.getBoundingClientRect().left")
+    box.evaluate("a => a.scrollTo(200, 0)")
+    assert name.evaluate("a => a.getBoundingClientRect().left") == left
     phone.close()
+
+
+def contrast(a, b):
+    """The contrast of two colours, 1 to 21 (WCAG 2.2)."""
+    parts = [np.array(words.style.rgb(colour)) / 255 for colour in (a, b)]
+    linear = [np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722) for c in parts]
+    return (max(linear) + 0.05) / (min(linear) + 0.05)
+
+
+def colours(page, selector, what):
+    """The colours of what a selector finds, "#rrggbb"."""
+    found = page.eval_on_selector_all(selector, f"all => [...new Set(all.map(e => getComputedStyle(e).{what}))]")
+    return {"#{:02x}{:02x}{:02x}".format(*map(int, re.findall(r"\d+", one)[:3])) for one in found if "rgb" in one}
+
+
+def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
+    night = Seen(browser, made.as_uri(), scheme="dark")
+    (back,) = colours(night.page, "body", "backgroundColor")
+    letters = colours(night.page, ".plot text", "fill")
+    assert min(contrast(colour, back) for colour in letters) > 4.5
+    marks = colours(night.page, ".plot .point", "stroke") - {back}  # a ring of the page's colour is about some dots
+    assert min(contrast(colour, back) for colour in marks) > 2.5
+    assert len(marks) >= len(TINY.laws)
+    night.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    printed = colours(night.page, ".plot text", "fill")
+    assert printed != letters
+    assert min(contrast(colour, "#ffffff") for colour in printed) > 2  # laws name their maps in their colours
+    night.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert colours(night.page, ".plot text", "fill") == letters
+    night.page.emulate_media(color_scheme="light")
+    assert colours(night.page, "body", "backgroundColor") == {"#ffffff"}
+    assert colours(night.page, ".plot text", "fill") == printed
+    assert night.said == []
+    night.page.close()
 
 
 def test_it_prints_with_everything_open(seen, tmp_path):

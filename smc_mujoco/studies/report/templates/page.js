@@ -9,12 +9,33 @@
     displaylogo: false, responsive: true, showSendToCloud: false, // no network, not even at a click
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
   };
-  const draw = (plot) => {
-    if (plot.dataset.drawn) return;
-    plot.dataset.drawn = "yes";
-    const figure = JSON.parse(document.querySelector(`script[data-plot="${plot.id}"]`).textContent);
-    Plotly.newPlot(plot, figure.data, figure.layout, config);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  // Colours of the style on a dark page; all others, of laws, become lighter, as in style.css.
+  const NIGHT = { "#1F2429": "#E6E9EC", "#646C75": "#A5ADB5", "#E3E6E9": "#2A3037", "#B9BFC5": "#4F5861", "#FFFFFF": "#15191E" };
+  const lighter = (c) => Math.round(0.65 * c + 0.35 * 255);
+  const shade = (text) => {
+    if (NIGHT[text.toUpperCase()]) return NIGHT[text.toUpperCase()];
+    if (/^#[0-9a-f]{6}$/i.test(text)) {
+      return `#${[1, 3, 5].map((k) => lighter(parseInt(text.slice(k, k + 2), 16)).toString(16).padStart(2, "0")).join("")}`;
+    }
+    const band = text.match(/^rgba\((\d+), (\d+), (\d+), (0\.\d+)\)$/);
+    return band ? `rgba(${band.slice(1, 4).map((c) => lighter(Number(c))).join(", ")}, ${band[4]})` : text;
   };
+  const night = (part) => {
+    if (typeof part === "string") return shade(part);
+    if (Array.isArray(part)) return part.map(night);
+    if (part === null || typeof part !== "object" || ["heatmap", "contour"].includes(part.type)) return part; // maps stay
+    return Object.fromEntries(Object.entries(part).map(([key, its]) => [key, night(its)]));
+  };
+  const draw = (plot, nightly = dark.matches) => {
+    const wanted = nightly ? "night" : "day";
+    if (plot.dataset.drawn === wanted) return;
+    plot.dataset.drawn = wanted;
+    const read = JSON.parse(document.querySelector(`script[data-plot="${plot.id}"]`).textContent);
+    const figure = nightly ? night(read) : read;
+    Plotly.react(plot, figure.data, figure.layout, config);
+  };
+  dark.addEventListener("change", () => plots.filter((plot) => plot.dataset.drawn).forEach((plot) => draw(plot)));
   const next = (k) => {
     if (k === plots.length) {
       document.documentElement.dataset.ready = "yes";
@@ -113,7 +134,7 @@
   // on paper: everything drawn and open, charts as wide as the paper, long tables cut with a line that says so
   let closed = [];
   addEventListener("beforeprint", () => {
-    plots.forEach(draw);
+    plots.forEach((plot) => draw(plot, false));
     closed = all("details:not([open])");
     for (const part of closed) part.open = true;
     for (const plot of plots) Plotly.relayout(plot, { autosize: false, width: PRINTED.width });
@@ -132,5 +153,6 @@
     for (const note of all(".printnote")) note.remove();
     for (const row of all(".unprinted")) row.classList.remove("unprinted");
     for (const plot of plots) Plotly.relayout(plot, { autosize: true, width: null });
+    plots.forEach((plot) => draw(plot));
   });
 })();
