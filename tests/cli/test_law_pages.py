@@ -87,7 +87,7 @@ def test_laws_of_a_family_and_of_a_plant(call):
 
 def test_where_no_law_suits_it_says_so(call):
     out = flat(call("laws", "--needs", "one-gain")[1])
-    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave something out"
+    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, --family or --plant"
     assert 'velocity="levant"' in flat(call("laws", "--needs", "no-velocity")[1])
 
 

@@ -314,7 +314,7 @@ class Lost(smc.Signal):
         (lambda: suite.load("dufing"), "did you mean 'duffing'"),
         (lambda: suite.load("duffing", "swing_up"), "task 'swing_up' is not for duffing: choose from regulate, track"),
         (lambda: suite.load("duffing", "regulat"), "did you mean 'regulate'"),
-        (lambda: suite.load(3), "give smc.plant"),
+        (lambda: suite.load(3), "plant is 3: give a name"),
         (lambda: suite.load("duffing", random="a"), "random is 'a'"),
         (lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}), "unknown field of an environment"),
         (lambda: suite.load("duffing", changes={"u_max": np.inf}), "u_max is inf"),
