@@ -1,6 +1,7 @@
-"""Numbers as text."""
+"""Numbers, lists and tables as text."""
 
 import math
+from collections.abc import Iterable, Sequence
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -13,3 +14,16 @@ def number(value: float, digits: int = 3) -> str:
         return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}" if value else "0"
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{mantissa}e{int(exponent)}"
+
+
+def joined(parts: Iterable[str]) -> str:
+    """Return "a, b and c"; "" for no parts."""
+    *most, last = list(parts) or [""]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as plain text."""
+    lines = [tuple(headings), *map(tuple, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

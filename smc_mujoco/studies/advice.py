@@ -5,12 +5,12 @@ Every sentence is made from the numbers of the comparison, so it changes when th
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank
 from smc_mujoco.common import html
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import joined, number, table
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import Plant
@@ -122,8 +122,8 @@ class Advice:
     @property
     def title(self) -> str:
         """The question in words."""
-        wanted = f", by laws that {_joined(self.wanted)}" if self.wanted else ""
-        return f"{self.plant.name} under {_joined(self.conditions)}: {_joined(self.needs)}{wanted}"
+        wanted = f", by laws that {joined(self.wanted)}" if self.wanted else ""
+        return f"{self.plant.name} under {joined(self.conditions)}: {joined(self.needs)}{wanted}"
 
     @property
     def heads(self) -> list[str]:
@@ -206,7 +206,7 @@ class Advice:
         by_where: dict[str, list[str]] = {}
         for name, conditions in better.items():
             by_where.setdefault(self._where(conditions), []).append(name)
-        rivals = [f"{_joined(names)}{where}" for where, names in by_where.items()]
+        rivals = [f"{joined(names)}{where}" for where, names in by_where.items()]
         return f"{need.capitalize()}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
 
     def _instead(self) -> list[str]:
@@ -224,7 +224,7 @@ class Advice:
             other = known[name]
             changes = [f"{self._value(other, one)} instead of {self._number(first, one)}" for one in (need, *costs)]
             text = f"If only {need} counts: {other.law}, with {changes[0]}"
-            sentences.append(text + f"; it costs {_joined(changes[1:])}." if costs else text + ".")
+            sentences.append(text + f"; it costs {joined(changes[1:])}." if costs else text + ".")
         return sentences
 
     def _second(self) -> str:
@@ -251,9 +251,9 @@ class Advice:
         beaten = [name for name in others if first in self.dominated(name)]
         mixed = [name for name in others if self.wins(name, first)]
         parts = [
-            f"it dominates {_joined(beaten)}: better somewhere, worse nowhere" if beaten else "",
-            f"not to be told from {_joined(self.level)}" if self.level else "",
-            f"a matter of what counts against {_joined(mixed)}, better here and worse there" if mixed else "",
+            f"it dominates {joined(beaten)}: better somewhere, worse nowhere" if beaten else "",
+            f"not to be told from {joined(self.level)}" if self.level else "",
+            f"a matter of what counts against {joined(mixed)}, better here and worse there" if mixed else "",
             f"its place by mean rank is {_range(rank.low, rank.high)} of {len(self.compared)} with 95 % confidence",
         ]
         return f"How sure: {'; '.join(filter(None, parts))}. This holds for these gains, over starts and noise."
@@ -275,7 +275,7 @@ class Advice:
         return number(median) + (f" {NEEDS[need].unit_for(self.plant.unit)}" if math.isfinite(median) else "")
 
     def _where(self, conditions: Sequence[str]) -> str:
-        return "" if len(conditions) == len(self.conditions) else f" under {_joined(conditions)}"
+        return "" if len(conditions) == len(self.conditions) else f" under {joined(conditions)}"
 
     def _on(self, blocks: Sequence[tuple[str, str]]) -> str:
         """Return blocks in words, such as "on calm under noise and sine"."""
@@ -283,16 +283,13 @@ class Advice:
         for need, condition in blocks:
             by_need.setdefault(need, []).append(condition)
         whole = [need for need, its in by_need.items() if len(its) == len(self.conditions)]
-        parts = [f"on {_joined(whole)}"] if whole else []
-        parts += [f"on {need} under {_joined(its)}" for need, its in by_need.items() if need not in whole]
+        parts = [f"on {joined(whole)}"] if whole else []
+        parts += [f"on {need} under {joined(its)}" for need, its in by_need.items() if need not in whole]
         return ", ".join(parts)
 
     def __str__(self) -> str:
-        cells = [self.heads, *self.rows]
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in cells]
         answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
-        return "\n".join([self.title, *(line.rstrip() for line in lines), self.key, "", *answer])
+        return "\n".join([self.title, table(self.heads, self.rows), self.key, "", *answer])
 
     def __repr__(self) -> str:
         return f"Advice({self.plant.name}: {self.law})"
@@ -310,9 +307,3 @@ def _interval(interval: Interval) -> str:
 
 def _range(low: float, high: float) -> str:
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
-
-
-def _joined(parts: Iterable[str]) -> str:
-    """Return "a, b and c"."""
-    *most, last = parts
-    return f"{', '.join(most)} and {last}" if most else last

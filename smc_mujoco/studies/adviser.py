@@ -22,6 +22,7 @@ and worse in none. Laws are ordered by mean rank, but none before a law that dom
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -35,7 +36,7 @@ from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, 
 from smc_mujoco.analysis.tuning import result, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.errors import ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, unknown, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
@@ -190,7 +191,7 @@ def _without_velocity(asked: Condition) -> Condition:
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Component | Template]:
-    """Return the laws to compare; those without gains of their own as templates.
+    """Return the laws to compare; those without given gains as templates.
 
     Raises:
       ScenarioError: an unknown law, or none that has the properties.
@@ -268,16 +269,23 @@ def _tuned(
     goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
     (first, *_) = goal.scenarios(plant, coerce.law(law), 0)
     depends = [serialise.describe(first), goal.describe(), fingerprint.of(coerce.law(law).function)]
+
+    def tuned_anew() -> result.Tuned:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the source says so
+            return search.tune(plant, law, budget, objective=goal, threads=threads)
+
     tuned = cached(
         folder / f"{plant.name}-{law.name}-{budget}.json",
         depends,
-        lambda: search.tune(plant, law, budget, objective=goal, threads=threads),
+        tuned_anew,
         lambda made, path: made.save(path),
         result.load,
     )
-    return Candidate(
-        dataclasses.replace(coerce.law(law), gains=tuned.law.gains), f"tuned here, {budget} sets of gains tried"
-    )
+    source = f"tuned here, {budget} sets of gains tried"
+    if tuned.objective > tuned.before:
+        source += ", none better than its own"
+    return Candidate(dataclasses.replace(coerce.law(law), gains=tuned.law.gains), source)
 
 
 # the comparison

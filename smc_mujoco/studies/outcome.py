@@ -11,12 +11,12 @@ whether another start or noise would change the order.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from smc_mujoco.analysis.differences import exceeds
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time
 from smc_mujoco.simulation.trace import Trace
 
@@ -53,7 +53,7 @@ class Outcome:
     @property
     def named(self) -> str:
         """The labels in a row: "a, b and c", "none"."""
-        return _and(self.labels) if self.labels else "none"
+        return joined(self.labels) if self.labels else "none"
 
     def only(self, *labels: str) -> "Outcome":
         """Return the outcome of the runs with these labels."""
@@ -126,7 +126,7 @@ class Outcome:
         if not first[1]:
             return f"{_one_condition([], self.labels, singular, plural)} in any condition"
         sentence = f"{_all(parts[first], self.labels)} {singular if len(parts[first]) == 1 else plural} {first[0]}"
-        return ", ".join([sentence, *(f"{_and(parts[part])} {part[0]}" for part in others)])
+        return ", ".join([sentence, *(f"{joined(parts[part])} {part[0]}" for part in others)])
 
     def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
         """Return the last condition that each label tolerates, conditions ordered from weak to strong.
@@ -140,7 +140,7 @@ class Outcome:
             good = next((i for i, name in enumerate(tried) if name not in names), len(tried))
             again = [name for name in tried[good:] if name in names]
             text = tried[good - 1] if good else "none"
-            text += f" (and {_and(again)} again)" if again else ""
+            text += f" (and {joined(again)} again)" if again else ""
             words.setdefault((-good, text), []).append(label)
         return ", ".join(f"{_all(words[key], self.labels)} {key[1]}" for key in sorted(words))
 
@@ -201,7 +201,7 @@ class Outcome:
             winners.setdefault(tuple(level), {})[name] = list(level.values())
         parts = []
         for labels, where in winners.items():
-            several = f"{_and(labels)} tied" if len(labels) > 1 else _and(labels) if labels else "none"
+            several = f"{joined(labels)} tied" if len(labels) > 1 else joined(labels) if labels else "none"
             if 1 < len(labels) == len(self.labels):
                 several = f"{_all(labels, self.labels)} tied"
             values = [value for each in where.values() for value in each]
@@ -229,7 +229,7 @@ def _one_condition(yes: Sequence[str], no: Sequence[str], singular: str, plural:
         return f"{no[0]} does not {plural}" if count == 1 else f"none of the {count} {singular}"
     if not no:
         return f"{yes[0]} {singular}" if count == 1 else f"{_all(yes, yes)} {plural}"
-    return f"{_and(yes)} {singular if len(yes) == 1 else plural}, {_and(no)} {'does' if len(no) == 1 else 'do'} not"
+    return f"{joined(yes)} {singular if len(yes) == 1 else plural}, {joined(no)} {'does' if len(no) == 1 else 'do'} not"
 
 
 def _share(names: Sequence[str], tried: Sequence[str]) -> str:
@@ -239,7 +239,7 @@ def _share(names: Sequence[str], tried: Sequence[str]) -> str:
     if not names:
         return "in none"
     missing = [name for name in tried if name not in names]
-    return f"in all but {_and(missing)}" if len(missing) < len(names) else f"only in {_and(names)}"
+    return f"in all but {joined(missing)}" if len(missing) < len(names) else f"only in {joined(names)}"
 
 
 def _everywhere(conditions: int) -> str:
@@ -251,13 +251,7 @@ def _all(some: Sequence[str], labels: Sequence[str]) -> str:
     """Return labels in a row, or that they are all, if there are several."""
     if len(some) == len(labels) > 1:
         return "both" if len(some) == 2 else f"all {len(some)}"
-    return _and(some)
-
-
-def _and(names: Iterable[str]) -> str:
-    """Return names in a row, the last after "and"."""
-    *most, last = names
-    return f"{', '.join(most)} and {last}" if most else last
+    return joined(some)
 
 
 def _exceeds(a: float, b: float, resolution: float) -> bool:

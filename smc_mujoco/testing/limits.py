@@ -2,10 +2,11 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, ParamSpec, TypeVar
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.text import table
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -56,13 +57,6 @@ def quantity(value: float, unit: str = "") -> str:
     if math.isinf(value):
         return "never"
     return f"{value:.6g} {unit}".rstrip() if unit != "1" else f"{value:.6g}"
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as plain text."""
-    lines = [tuple(heads), *map(tuple, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
 
 
 def without_frames(function: Callable[P, R]) -> Callable[P, R]:

@@ -5,6 +5,7 @@ import functools
 from collections.abc import Callable, Iterable, Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.text import table
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.catalogue import score, scores
@@ -16,7 +17,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Step
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.testing.limits import bound, judge, quantity, table, without_frames
+from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
 IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics
 

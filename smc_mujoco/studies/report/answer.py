@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.common.text import joined
 from smc_mujoco.studies.adviser import LEAST_SETTLED
 from smc_mujoco.studies.paper.claims.verdict import VERDICTS
 from smc_mujoco.studies.report import words
@@ -192,7 +193,7 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
         parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
     if findings.claims:
         found = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
-        parts.append(f"of its {len(findings.claims)} checked claims, {_joined(found)}")
+        parts.append(f"of its {len(findings.claims)} checked claims, {joined(found)}")
     return f"The paper: {'; '.join(parts)}." if parts else ""
 
 
@@ -204,7 +205,7 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     if winner := set.intersection(*winners) if winners else set():
         return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
     if common := set.intersection(*unbeaten) if unbeaten else set():
-        names = _joined([words.law(law) for law in sorted(common)])
+        names = joined([words.law(law) for law in sorted(common)])
         return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
     return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
 
@@ -217,10 +218,10 @@ def leads(findings: "Findings", metric: str) -> str:
         return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
     if not top.alone:
         level = [words.law(row.law) for row in standing if not row.lost]
-        unbeaten = f"; none is better than {_joined(level)} in any" if 0 < len(level) <= NAMED else ""
+        unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= NAMED else ""
         return f"no winner on {what} in any of {top.of} cells{unbeaten}."
     plants = [
-        f"{words.law(law)} wins on every plant under {_joined(names)}"
+        f"{words.law(law)} wins on every plant under {joined(names)}"
         for law, names in everywhere(findings, metric).items()
     ]
     wins = [
@@ -275,7 +276,7 @@ def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
     beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
     return (
         "The paper’s observer-free law leads, or is level with what leads, in "
-        f"{_joined([f'{row.best} on {words.metric(metric)}' for metric, row in own.items()])}, "
+        f"{joined([f'{row.best} on {words.metric(metric)}' for metric, row in own.items()])}, "
         f"of {own[metrics[0]].of} cells each{beaten}."
     )
 
@@ -286,8 +287,4 @@ def _claims(findings: "Findings") -> str:
     parts = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
     flips = sum(claim.flips for claim in findings.claims)
     depend = f"; {flips} of these verdicts depend on the gains" if flips else ""
-    return f"Of {len(findings.claims)} claims of the paper that were checked, {_joined(parts)}{depend}."
-
-
-def _joined(parts: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]])) if parts else ""
+    return f"Of {len(findings.claims)} claims of the paper that were checked, {joined(parts)}{depend}."
