@@ -14,7 +14,7 @@ MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
 POINTS = 150  # of a curve, each as a pair of its lowest and highest value there
 WIDTH, HEIGHT = 300, 96  # px of a panel
 _CELL = "padding:2px 10px;vertical-align:top;text-align:"
-_ROOM = 44, 6, 16, 18  # px at the left, right, top and bottom of a panel
+_ROOM = 58, 6, 16, 18  # px at the left, right, top and bottom of a panel
 
 
 class Html(str):

@@ -1,0 +1,108 @@
+"""The tutorial notebooks: they run from top to bottom, show what their text says, and are kept without outputs."""
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+KERNEL = Path(__file__).parent / "helpers" / "notebook_kernel.py"
+
+# What a notebook's text says of its numbers, as a last cell.
+SAID = {
+    "law_in_ten_lines": """
+        assert scores["tv_rate"] < 0.1 < 500 < smc.score(traces[1])["tv_rate"]
+        tv = {(b.group["condition"], e.law): e.interval for b in boards if b.metric == "tv_rate" for e in b.entries}
+        assert tv["noise", "my_law"].low > 1e3 * tv["nominal", "my_law"].high
+        assert any(board.winner for board in boards)
+    """,
+    "your_robot": """
+        largest = [abs(t.x - t.r)[t.t > 2.0].max() for t in (*traces, *worse)]
+        assert max(largest[:2]) < 0.01 < min(largest[2:])
+    """,
+    "audit_a_claim": """
+        assert [claim.verdict for claim in claims] == ["supported", "refuted", "refuted"]
+        s = trace.s[:, 0]
+        assert s[0] > 0.0 and s.min() < -0.1 and 0.05 < rises.mean() < 0.15
+        assert boards[0].verdict.startswith("winner: observer_free")
+        tv = {(b.condition, law): b.medians[law] for b in boards[0].blocks for law in b.medians}
+        assert tv["noise", "observer_free"] > 100 * tv["nominal", "observer_free"]
+    """,
+}
+
+
+def cells(path: Path) -> list[tuple[str, str]]:
+    """The kind and the text of each cell."""
+    return [(cell["cell_type"], "".join(cell["source"])) for cell in json.loads(path.read_text("utf-8"))["cells"]]
+
+
+def code(path: Path) -> list[str]:
+    return [text for kind, text in cells(path) if kind == "code"]
+
+
+def test_there_are_three():
+    assert [path.stem for path in NOTEBOOKS] == sorted(SAID)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
+    text = path.read_text("utf-8")
+    data = json.loads(text)
+    assert text == json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+    assert (data["nbformat"], data["nbformat_minor"], data["metadata"]["kernelspec"]["name"]) == (4, 5, "python3")
+    assert len({cell["id"] for cell in data["cells"]}) == len(data["cells"])
+    for cell in data["cells"]:
+        if cell["cell_type"] == "code":
+            assert (cell["outputs"], cell["execution_count"]) == ([], None)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_text_stands_before_each_cell_and_links_lead_somewhere(path):
+    found = cells(path)
+    assert found[0][1].startswith("# ")
+    assert [i for i, (kind, _) in enumerate(found) if kind == "code" and found[i - 1][0] != "markdown"] == []
+    texts = "\n".join(text for kind, text in found if kind == "markdown")
+    assert [link for link in re.findall(r"\]\(([^)]+)\)", texts) if not (path.parent / link).is_file()] == []
+    assert [page for page in re.findall(r"`(docs/\S+\.md)`", texts) if not (ROOT / page).is_file()] == []
+    assert [name for name in re.findall(r"\bsmc\.(\w+)", texts) if not hasattr(smc, name)] == []
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
+    if any("smc.show(" in text for text in code(path)) and gl.missing():
+        pytest.skip(str(gl.missing()))
+    said = "\n".join(line.strip() for line in SAID[path.stem].strip().splitlines())
+    done = subprocess.run(
+        [sys.executable, "-B", KERNEL, path, said],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    shown = json.loads((tmp_path / "shown.json").read_text())
+    for text, outputs in zip(code(path), shown, strict=False):
+        last = ast.parse(text).body[-1]
+        if not isinstance(last, ast.Expr) or "print(" in text:
+            continue
+        call = ast.unparse(last).partition("(")[0]
+        kinds = {kind for output in outputs for kind in output}
+        if call in ("smc.figure", "smc.plot"):
+            assert "image/png" in kinds, text
+        elif call == "smc.show":
+            assert any(output["text/html"].startswith("<video") for output in outputs), text
+        elif isinstance(last.value, ast.Name | ast.Subscript) and call != "arm":
+            assert "text/html" in kinds, text
+        else:
+            assert outputs, text
