@@ -26,6 +26,7 @@ def main() -> None:
     here = Config(InteractiveShell={"ipython_dir": str(Path.cwd())}, HistoryManager={"enabled": False})
     shell = ZMQInteractiveShell.instance(config=here)
     shell.display_pub = CapturingDisplayPublisher()
+    assert shell.display_formatter is not None
     cells = [cell for cell in json.loads(Path(path).read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
     clock = film.clock
     film.clock = lambda traces, fps, speed: clock(traces, fps, SPEED)
