@@ -55,7 +55,7 @@ STILL = 1e-6  # of X, V and u_max
 LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the distance (x/X)^2 + (v/V)^2: two factors, a size
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
-LEAST_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
+MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 
@@ -152,7 +152,7 @@ def of(
     if base.plant.mixed:
         raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
     horizons = HORIZONS if early else HORIZONS[-1:]
-    least = math.ceil(LEAST_SAMPLES / horizons[0])
+    least = math.ceil(MIN_SAMPLES / horizons[0])
     if base.samples < least:
         raise ScenarioError(
             f"duration {base.duration:g} s is too short to tell what comes to rest: "

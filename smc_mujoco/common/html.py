@@ -1,7 +1,7 @@
 """Short tables, curves, pictures and films as HTML, which notebooks show.
 
-They have no colours of their own: text and lines take the colour of the page, light or dark. All text is escaped, but
-for `Html`.
+They have no colours of their own: text and lines take the colour of the page, light or dark. All text is escaped,
+except `Html`.
 """
 
 import base64
@@ -42,11 +42,11 @@ def table(
     """Return a table.
 
     Args:
-      headings: one a column; none for a table without.
+      headings: one for each column; empty for a table without headings.
       caption: above the table.
       note: below it.
       numbers: the columns that are aligned to the right.
-      most: lines shown; how many are left out is said in a last one.
+      most: number of lines; a further line says how many are left out.
     """
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
@@ -132,11 +132,11 @@ def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
 
 
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
-    """Return a picture or a film that is in the page itself, and no wider than it.
+    """Return a picture or a film, kept in the page itself and no wider than the page.
 
     Args:
       kind: its MIME type, such as "video/mp4".
-      width: px; None for its own.
+      width: px; None for the content's width.
     """
     source = f'src="data:{kind};base64,{base64.b64encode(content).decode()}" style="max-width:100%;height:auto"'
     source += "" if width is None else f' width="{width:.0f}"'

@@ -1,6 +1,6 @@
-"""Controllers that run on real rigs, as laws: what their closed-loop records are replayed with.
+"""Controllers of real rigs, as laws, with which records of their closed loops are replayed.
 
-They are no laws of the catalogue, as their gains belong to one machine each.
+They are not in the catalogue of laws, because the gains of each belong to one machine.
 """
 
 from smc_mujoco.control.law import law_function

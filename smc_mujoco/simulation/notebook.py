@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
 SECONDS = ("duration", "control_period", "physics_step", "input_delay")
-MOST_CHANNELS = 8  # of one unit in a panel
-LONGEST = 200  # characters of a value
+MAX_CHANNELS = 8  # of one unit in a panel
+MAX_VALUE = 200  # characters of a value
 
 
 def scenario(s: "Scenario") -> Html:
@@ -48,7 +48,7 @@ def trace(found: "Trace") -> Html:
     last = np.flatnonzero(np.isfinite(found.x).all(axis=1))
     if found.failure:
         about["failed"] = found.failure
-    elif len(last) and s.plant.n <= MOST_CHANNELS:
+    elif len(last) and s.plant.n <= MAX_CHANNELS:
         ends = (f"{x:.3g} {unit}" for x, unit in zip(found.x[last[-1]], s.plant.units, strict=True))
         about["ends at x"] = ", ".join(ends)
     return Html(f"{fields(about, 'Trace')}<div>{''.join(_panels(found))}</div>")
@@ -58,11 +58,11 @@ def _panels(found: "Trace") -> list[Html]:
     """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
     s, plant, panels = found.scenario, found.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
-        channels = [i for i, own in enumerate(plant.units) if own == unit][:MOST_CHANNELS]
+        channels = [i for i, own in enumerate(plant.units) if own == unit][:MAX_CHANNELS]
         reference = found.r[:, channels[0]] if found.r[:, channels].any() else None
         panels.append(panel(found.t, list(found.x[:, channels].T), f"x ({unit})", reference))
     for unit in dict.fromkeys(s.efforts[: plant.driven]):
-        channels = [i for i, own in enumerate(s.efforts[: plant.driven]) if own == unit][:MOST_CHANNELS]
+        channels = [i for i, own in enumerate(s.efforts[: plant.driven]) if own == unit][:MAX_CHANNELS]
         panels.append(panel(found.t, list(found.u[:, channels].T), f"u ({unit})"))
     return panels
 
@@ -90,7 +90,7 @@ def _words(name: str, value: object, s: "Scenario") -> str:
         text = f"{value:g} {unit}".rstrip()
     else:
         text = str(value).removesuffix("()")
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+    return text if len(text) <= MAX_VALUE else f"{text[: MAX_VALUE - 3]}..."
 
 
 def _state(values: tuple[float, ...], units: tuple[str, ...], rate: str) -> str:

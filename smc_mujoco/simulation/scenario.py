@@ -36,7 +36,7 @@ from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, 
 
 MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
-LARGEST_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
+MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
@@ -327,7 +327,7 @@ class Resolved(Scenario):
 
 def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None."""
-    largest = REALISTIC_STEP if s.realistic else LARGEST_STEP
+    largest = REALISTIC_STEP if s.realistic else MAX_STEP
     in_order = s.contact.kind == "bobs"  # pendulums in a row must not start across each other
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",

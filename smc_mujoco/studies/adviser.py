@@ -57,7 +57,7 @@ USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
 NO_VELOCITY = "no-velocity"
 SHIPPED = "tuned gains of the package"
-LEAST_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
+MIN_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
 
 
 class Extent(NamedTuple):
@@ -348,7 +348,7 @@ def _settled(group: paired_runs.Group, table: Table) -> np.ndarray:
 def _fit(group: paired_runs.Group, table: Table) -> set[str]:
     """Return the laws that settle in enough runs of every condition."""
     share = _settled(group, table)
-    enough = np.all(share >= LEAST_SETTLED * share.max(axis=0), axis=1)
+    enough = np.all(share >= MIN_SETTLED * share.max(axis=0), axis=1)
     return {law for law, one in zip(group.laws, enough.tolist(), strict=True) if one}
 
 

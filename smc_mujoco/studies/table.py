@@ -37,7 +37,7 @@ BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
 BEFORE |= {"seed": "int64", "duration": "float64"}
 AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
 SHOWN = ("plant", "law", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
-MOST_ROWS = 8  # of a table in a notebook
+MAX_ROWS = 8  # of a table in a notebook
 DIGEST = b"digest"  # in a file's metadata
 
 
@@ -147,7 +147,7 @@ class Table:
 
     def _repr_html_(self) -> str:
         names = [name for name in SHOWN if name in self.data.column_names]
-        rows = [list(row.values()) for row in self.data.select(names).slice(0, MOST_ROWS).to_pylist()]
+        rows = [list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()]
         cells = [["" if v is None else number(v) if isinstance(v, float) else v for v in row] for row in rows]
         rest = len(self) - len(rows)
         return table(

@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
-LEAST_SAMPLES = 50  # of a replay; chosen
+MIN_SAMPLES = 50  # of a replay; chosen
 STATE_SAMPLES = 15  # on each side of a sample, of the cubic that gives its velocity; chosen: 30 ms at 500 Hz
 RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ; chosen
 

@@ -1,11 +1,11 @@
-"""A rig: a real machine as data, from which scenarios are made and with which records are repeated.
+"""A rig: a real machine as data, which makes scenarios of that machine and repeats its records in simulation.
 
     rig = smc.rig("qube_servo")
     rig.scenario(law="none", duration=5.0)         # a Scenario of that machine
     rig.fit(record)                                # {"theta": 95.1, ...}, percent
 
 A rig's file states its quantities, each with unit and source, and one function that makes the fields of a Scenario from
-them. Identification changes quantities; everything else is the existing road of scenarios, runs and traces.
+them. Identification changes quantities; everything else is scenarios, runs and traces as elsewhere.
 """
 
 import dataclasses
@@ -63,10 +63,10 @@ class Rig:
       commands: (record, index of the start) -> what the rig adds to its controller's u from there on, (K,). None: only
         the column of the feedforward, if there is one.
       start, score_from: s after a record's first sample: where a replay starts, and from when its fit counts.
-      free: names of the quantities that its records can tell, which `smc.identify` finds by default.
+      free: names of the quantities that its records determine, which `smc.identify` finds by default.
       published: name of a parameter set -> values of quantities in it, with their source under "source".
       ensemble: sets of quantities that fit about as well, each a mapping name -> value.
-      about: licence and history of the data, and what the twin is known to be good for.
+      about: licence and history of the data, and what the twin predicts well and what not.
     """
 
     name: str
@@ -145,19 +145,19 @@ class Rig:
           record: column -> values, (K,); see `columns`.
           start: s after the first sample; None: the rig's.
           duration: s; None: to the end of the record.
-          rounded: whether the encoder rounds to counts. Which sample a count falls on cannot be predicted, so a run
-            without rounding is nearer to what a record can tell.
+          rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be
+            predicted, so `fit` leaves rounding out by default.
         """
         data = records.checked(record, self.columns, self.period, self.name)
         first = round((self.start if start is None else start) / self.period)
         last = len(data[self.columns.time]) - 1
         if duration is not None:
             last = min(last, first + round(duration / self.period))
-        if last - first < records.LEAST_SAMPLES:
+        if last - first < records.MIN_SAMPLES:
             seconds = len(data[self.columns.time]) * self.period
             raise ScenarioError(
                 f"the record of {self.name} lasts {seconds:.3g} s, too short to repeat it from {first * self.period:g} "
-                f"s on: give at least {(first + records.LEAST_SAMPLES) * self.period + self.period:.3g} s"
+                f"s on: give at least {(first + records.MIN_SAMPLES) * self.period + self.period:.3g} s"
             )
         fields = self.machine(Values(**self.values))
         sensor = fields.get("sensor")
@@ -201,8 +201,8 @@ class Rig:
             angles in degrees.
         """
         data = records.checked(record, self.columns, self.period, self.name)
-        least = round(self.score_from / self.period) + records.LEAST_SAMPLES
-        if round(self.start / self.period) + records.LEAST_SAMPLES <= len(data[self.columns.time]) < least:
+        least = round(self.score_from / self.period) + records.MIN_SAMPLES
+        if round(self.start / self.period) + records.MIN_SAMPLES <= len(data[self.columns.time]) < least:
             raise ScenarioError(
                 f"the record of {self.name} lasts {len(data[self.columns.time]) * self.period:.3g} s, too short to "
                 f"score it from {self.score_from:g} s on: give at least {least * self.period:.3g} s"

@@ -18,7 +18,7 @@ from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.study import condition, key, study
-from smc_mujoco.studies.table import MOST_ROWS, Table, content
+from smc_mujoco.studies.table import MAX_ROWS, Table, content
 
 
 def small(seeds: int = 2) -> list[smc.Scenario]:
@@ -157,7 +157,7 @@ def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
 def test_a_notebook_shows_the_first_rows_and_says_how_many_more(tmp_path):
     table = study(grid(["duffing"], ["classical", fails_late()], ["nominal"], 5, "study", duration=0.05), tmp_path)
     shown = table._repr_html_()
-    assert shown.count("<tr>") == 1 + MOST_ROWS + 1
+    assert shown.count("<tr>") == 1 + MAX_ROWS + 1
     assert "Table(10 runs: 1 plant, 2 laws, 1 condition)" in shown
     assert "and 2 more" in shown
     assert f">{number(table.rows()[0]['itae'])}<" in shown

@@ -22,7 +22,7 @@ FAST = 4.0  # times real time, where everything rests
 AROUND = 0.1  # s before and after fast motion that are shown as slowly
 BLOW = 0.04  # s around the start of a contact
 REST = 0.3  # s after motion, and before it, that are not shown faster
-LONGEST = 2.0, 6.0  # duration of a film: in durations of the run, or in s if that is more
+MAX_LENGTH = 2.0, 6.0  # duration of a film: in durations of the run, or in s if that is more
 SPEEDS = 0.01, 100.0
 
 
@@ -80,7 +80,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     for start in blows(runs):
         powers[np.abs(grid + 0.5 / fps - start) <= BLOW] = SLOWEST
     moving = spread((travel > STILL).astype(float), round(REST * fps)) > 0.0
-    longest, most = max(LONGEST[0] * whole, LONGEST[1]), SLOWEST
+    longest, most = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), SLOWEST
 
     def bounded() -> np.ndarray:
         return np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)

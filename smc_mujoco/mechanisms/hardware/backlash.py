@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.hardware.part import (
 from smc_mujoco.mechanisms.plant import Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
-LEAST_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
+MIN_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Backlash(Actuator):
 
     def __post_init__(self) -> None:
         self.check_numbers("gap", least=0.0)
-        self.check_numbers("rotor_inertia", least=LEAST_INERTIA)
+        self.check_numbers("rotor_inertia", least=MIN_INERTIA)
         self.check_numbers("rotor_damping", least=0.0)
 
     def edit(self, spec: mujoco.MjSpec) -> None:

@@ -25,9 +25,9 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 # Where a dcmotor's numbers lie in the compiled model:
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
 SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
-LEAST_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
-LEAST_LAG = 1e-15  # s: a shorter first lag of two counts as this, as in MuJoCo
-LEAST_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
+MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
+MIN_LAG = 1e-15  # s: a shorter first lag of two counts as this, as in MuJoCo
+MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
 COMMANDS = ("torque", "voltage")
 COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
@@ -157,11 +157,11 @@ class DCMotor(Drive):
     def __post_init__(self) -> None:
         if self.command not in COMMANDS:
             raise unknown("command of DCMotor", self.command, COMMANDS)
-        self.check_numbers("resistance", above=0.0, least=LEAST_RESISTANCE)
+        self.check_numbers("resistance", above=0.0, least=MIN_RESISTANCE)
         self.check_numbers("torque_constant", "gear", above=0.0)
         self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", least=0.0)
         self.check_numbers("voltage", "current", above=0.0, most=math.inf, infinite=True)
-        if not self.constant >= LEAST_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
+        if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
                 f"resistance of {self.resistance:g} ohm: give a stronger motor"
@@ -245,7 +245,7 @@ def tandem(actuator: tuple[Actuator, ...], step: float) -> Tandem | None:
     both = [part for part in actuator if part.drives]
     if len(both) < 2:
         return None
-    first, second = (step / max(drive.delay, LEAST_LAG) for drive in both)  # the step, in units of each time constant
+    first, second = (step / max(drive.delay, MIN_LAG) for drive in both)  # the step, in units of each time constant
     apart = abs(second - first)
     mean = -math.expm1(-apart) / apart if apart else 1.0
     held = second * math.exp(-min(first, second)) * mean / -math.expm1(-second)

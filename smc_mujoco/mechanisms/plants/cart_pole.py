@@ -18,7 +18,7 @@ import mujoco
 from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-LEAST = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
+MIN_INERTIA = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
 STOPS = 1.7  # m, |x| at the end stops: chosen, before the posts
 
 
@@ -31,7 +31,7 @@ def fields(model, p):
     yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("body_mass", pole, p.m)
     yield Field("body_ipos", pole, (0.0, 0.0, p.l))
-    yield Field("body_inertia", pole, (across, across, LEAST))
+    yield Field("body_inertia", pole, (across, across, MIN_INERTIA))
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.b)
     yield Field("dof_damping", model.joint("hinge").dofadr[0], p.bq)
     yield Field("opt.gravity", 2, -p.grav)

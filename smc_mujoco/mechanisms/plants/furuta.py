@@ -24,7 +24,7 @@ import mujoco
 
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-LEAST = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
+MIN_INERTIA = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
 STALL = 0.042 * 10.0 / 8.4  # N m
 
 
@@ -36,8 +36,9 @@ def fields(model, p):
     arm, pendulum = model.body("arm").id, model.body("pendulum").id
     dofs = [model.joint(name).dofadr[0] for name in ("arm", "hinge")]
     yield Field("body_mass", pendulum, p.m)
-    yield Field("body_inertia", arm, (p.J, p.J, p.J - LEAST))
-    yield Field("body_inertia", pendulum, (p.Jc + LEAST, p.Jc, LEAST))  # as none about its length, with the arm's
+    yield Field("body_inertia", arm, (p.J, p.J, p.J - MIN_INERTIA))
+    # with the arm's, as if it had none about its length
+    yield Field("body_inertia", pendulum, (p.Jc + MIN_INERTIA, p.Jc, MIN_INERTIA))
     yield Field("body_ipos", pendulum, (0.0, 0.0, p.l))
     yield Field("body_pos", pendulum, (0.0, -p.L, 0.0))
     yield Field("dof_damping", dofs, (p.b, p.bq))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.text import joined
-from smc_mujoco.studies.adviser import LEAST_SETTLED
+from smc_mujoco.studies.adviser import MIN_SETTLED
 from smc_mujoco.studies.paper.claims.verdict import VERDICTS
 from smc_mujoco.studies.report import words
 from smc_mujoco.studies.report.scores import Place, Score
@@ -171,7 +171,7 @@ def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
     """
     here = [place for place in findings.places if place.plant == plant]
     settled = {place.law: place.median for place in here if place.metric == SETTLES}
-    enough = LEAST_SETTLED * max(settled.values(), default=0.0)
+    enough = MIN_SETTLED * max(settled.values(), default=0.0)
     rows = [place for place in here if place.metric == metric and settled.get(place.law, 1.0) >= enough]
     if not rows:
         return None

@@ -1,7 +1,7 @@
 """QUBE-Servo (first version): a rotary pendulum upright, driven by a voltage, as identified from public records.
 
 The records are 20 s at 500 Hz of decargroup/closed_loop_koopman (MIT, 2023). The pendulum's mass is the published one;
-it is the only mass that must be known, as records of motions under a voltage tell all others relative to it.
+one mass must be known, since records of motions under a voltage determine the others only relative to it.
 """
 
 import math
@@ -74,7 +74,7 @@ QUBE_SERVO = Rig(
         "pendulum_length": Quantity(0.119204, "m", FOUND, 0.01, 1.0),
         "arm_length": Quantity(0.0831375, "m", FOUND, 0.01, 1.0),
         "arm_inertia": Quantity(1.07768e-4, "kg m^2", FOUND, 1e-6, 1e-2),
-        "arm_damping": Quantity(0.0, "N m s/rad", "part of back_emf, as records cannot tell them apart", 0.0, 1.0),
+        "arm_damping": Quantity(0.0, "N m s/rad", "part of back_emf: records cannot separate the two", 0.0, 1.0),
         "arm_friction": Quantity(2.69662e-4, "N m", FOUND, 0.0, 0.1),
         "pendulum_damping": Quantity(5.24805e-6, "N m s/rad", FOUND, 0.0, 0.1),
         "torque_per_volt": Quantity(4.66933e-3, "N m/V", FOUND, 1e-4, 1.0),

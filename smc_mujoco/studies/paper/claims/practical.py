@@ -22,7 +22,7 @@ from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, ch
 from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
-LEAST = 1e-9  # N m or N: an actuator's bound if lambda is 0
+MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0
 SERIES, FIXED = "observer_free_series", "observer_free_q15"
 
 
@@ -94,7 +94,7 @@ def saturation_avoided(runs: Runs) -> list[Check]:
     """
     checks = []
     for plant in PLANTS:
-        half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, LEAST)
+        half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
         traces = runs.traces([runs.scenario(plant, OURS, u_max=limit) for limit in (half, math.inf)])
         what = f"{plant}: deviation at u_max = lambda / 2, over |x0|"
         checks.append(check(what, deviation(*traces), "<", 0.01))

@@ -23,7 +23,7 @@ from smc_mujoco.studies.paper.scenarios import CONTROL_PERIOD, PLANTS, U_MAX
 
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 
-LEAST = 1e-3  # N m s or N s: the lambda that stands for "any lambda > 0"
+MIN_LAMBDA = 1e-3  # N m s or N s: the lambda that stands for "any lambda > 0"
 INNER, ROUNDS, QUICK_ROUNDS = 8, 3, 2  # 8 values at once divide a range by 9: three times, and it is known to 1.2 %
 SMALL = 1e-3  # of x0
 
@@ -68,9 +68,9 @@ def critical_delay(runs: Runs, plant: str) -> float:
 
 
 def smallest_stable(runs: Runs) -> dict[str, float]:
-    """Return plant -> the smallest lambda found stable between LEAST and U_MAX; inf if U_MAX is not."""
-    ends = dying(runs, dict.fromkeys(PLANTS, (LEAST, U_MAX)))
-    low, high = dict.fromkeys(PLANTS, LEAST), dict.fromkeys(PLANTS, U_MAX)
+    """Return plant -> the smallest lambda found stable between MIN_LAMBDA and U_MAX; inf if U_MAX is not."""
+    ends = dying(runs, dict.fromkeys(PLANTS, (MIN_LAMBDA, U_MAX)))
+    low, high = dict.fromkeys(PLANTS, MIN_LAMBDA), dict.fromkeys(PLANTS, U_MAX)
     for _ in range(QUICK_ROUNDS if runs.quick else ROUNDS):
         tried = {plant: np.geomspace(low[plant], high[plant], INNER + 2).tolist() for plant in PLANTS}
         inner = dying(runs, {plant: lams[1:-1] for plant, lams in tried.items()})
@@ -78,7 +78,7 @@ def smallest_stable(runs: Runs) -> dict[str, float]:
             last = max((i for i, stable in enumerate([False, *inner[plant]]) if not stable), default=0)
             low[plant], high[plant] = lams[last], lams[last + 1]
     return {
-        plant: LEAST if smallest else high[plant] if largest else math.inf
+        plant: MIN_LAMBDA if smallest else high[plant] if largest else math.inf
         for plant, (smallest, largest) in ends.items()
     }
 

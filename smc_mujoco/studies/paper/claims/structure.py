@@ -9,7 +9,7 @@ from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.lyapunov import input_gain
 from smc_mujoco.studies.paper.claims.runs import OURS, Runs, comes_to_rest
-from smc_mujoco.studies.paper.claims.searches import LEAST, smallest_stable
+from smc_mujoco.studies.paper.claims.searches import MIN_LAMBDA, smallest_stable
 from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS, U_MAX
 
@@ -62,7 +62,7 @@ def no_tuning(runs: Runs) -> list[Check | Beside]:
     theory = {name: smallest_lam(find_plant(name), runs.law(name, OURS).gains["k1"]) for name in PLANTS}
     return [
         *(
-            check(f"{name}: smallest lambda that stabilises it", lam, "<=", LEAST)
+            check(f"{name}: smallest lambda that stabilises it", lam, "<=", MIN_LAMBDA)
             for name, lam in smallest_stable(runs).items()
         ),
         *(Beside(f"{name}: the same by linear theory", lam) for name, lam in theory.items()),
