@@ -667,7 +667,9 @@ def test_a_law_in_the_plain_loop_is_one_line_on_stderr(script):
 def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace):
     code = "\n".join(
         [
+            "from smc_mujoco.cli import scene",
             "from smc_mujoco.cli.main import main",
+            "scene.figures = lambda *_: []",
             "for words in (['list'], ['run', 'mine.py', '--no-video', '--out', 'out'], ['show', 'one.npz']):",
             "    try: main(words)",
             "    except SystemExit as end: assert not end.code, words",

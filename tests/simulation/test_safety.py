@@ -885,26 +885,22 @@ def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integr
 
 # (p) the cache on disk, memory, forks and Ctrl-C
 
-FRESH = """
-from added import added
-from numba import types
-from smc_mujoco.common.jit import compiled
-made = compiled(types.float64(types.float64), added, cache=True)
-assert made.ctypes(1.0) == 3.0
-print(made.cache_hits)
-"""
+
+@pytest.fixture
+def added(tmp_path, monkeypatch):
+    """A function of a module in an empty folder, whose compiled code is kept beside it."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "added.py").write_text("def added(x):\n    return x + 2.0\n")
+    yield importlib.import_module("added").added
+    del sys.modules["added"]
 
 
-def hits(folder: Path) -> str:
-    """How often a new process takes the compiled function from the cache in a folder, "0" or "1"."""
-    (folder / "added.py").write_text("def added(x):\n    return x + 2.0\n")
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    environment["PYTHONPATH"] = os.pathsep.join([str(PACKAGE.parent), str(folder)])
-    done = subprocess.run(
-        [sys.executable, "-c", FRESH], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout.strip()
+def hits(function) -> int:
+    """How often a compiled function is taken from the cache, as a new process would: 0 or 1."""
+    made = compiled(numba.types.float64(numba.types.float64), function, cache=True)
+    assert made.ctypes(1.0) == 3.0
+    return made.cache_hits
 
 
 def flipped(data: bytes) -> bytes:
@@ -913,13 +909,13 @@ def flipped(data: bytes) -> bytes:
     return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
 
 
-def test_a_damaged_cache_is_written_anew(tmp_path):
-    assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+def test_a_damaged_cache_is_written_anew(added, tmp_path):
+    assert [hits(added), hits(added)] == [0, 1]
     damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
     for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
         for path in (tmp_path / "__pycache__").glob(name):
             path.write_bytes(damage(path.read_bytes()))
-        assert [hits(tmp_path), hits(tmp_path)] == ["0", "1"]
+        assert [hits(added), hits(added)] == [0, 1]
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
