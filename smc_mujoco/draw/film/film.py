@@ -24,6 +24,7 @@ from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder
 from smc_mujoco.draw.film.pace import Clock
+from smc_mujoco.draw.film.puppet import motion
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
@@ -171,7 +172,8 @@ def frames(
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row)
     charts = Charts(traces, names, colours, (size[0], below), scale)
-    with Stage(traces, colours, above, caption.room, chosen) as stage:
+    motions = [motion(trace, times) for trace in traces]
+    with Stage(traces, colours, above, caption.room, chosen, motions) as stage:
         caption.place(stage.boxes)
         places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
@@ -181,7 +183,7 @@ def frames(
             drawn = []
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
-                stage.pose(k, places[k][frame], ahead[k][frame])
+                stage.pose(k, places[k][frame], ahead[k][frame], time)
                 stage.aim(k, None if failed[k] else wanted[k][frame])
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
                 for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):

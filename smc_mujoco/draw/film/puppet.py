@@ -1,11 +1,12 @@
 """A machine as a film moves it: from the positions of its channels to the pose of its whole mechanism."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.draw.film import scene
+from smc_mujoco.draw.film import replay, scene
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.simulation import model as assembly
@@ -20,6 +21,17 @@ MAX_FIXED = (
 CLOSE = 0.6  # height of the part of a stand that must be in the picture, in sizes of what moves; chosen
 
 
+class Motion(NamedTuple):
+    """Poses of a mechanism, (times, nq), at times in s."""
+
+    times: np.ndarray
+    poses: np.ndarray
+
+    def at(self, time: float) -> np.ndarray:
+        """Return the pose at a time, (nq,): the one before."""
+        return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
+
+
 class Puppet:
     """The machine of one scenario, with the channels that a film shows.
 
@@ -29,6 +41,7 @@ class Puppet:
       slides: which channels slide, (shown,).
       rail: length of the rail on which a cart stays, m; inf without one.
       links: the bodies that the channels' joints move.
+      whole: whether the channels and their rotors are all of its joints.
     """
 
     def __init__(self, scenario: Scenario):
@@ -47,6 +60,7 @@ class Puppet:
                 moved.add(body)
         self.links = sorted(moved)
         own = self.scenario.plant.direct
+        self.whole = not own or len(self._joints) + len(self._rotors) == model.nq
         self._start = assembly.start(model, self.scenario)[0] if own else model.qpos0
 
     @property
@@ -68,37 +82,51 @@ class Puppet:
             found[place] = x[k] if ahead is None else x[k] + ahead[k]
         return found
 
-    def reach(self, trace: Trace) -> np.ndarray:
+    def reach(self, trace: Trace, motion: Motion | None = None) -> np.ndarray:
         """Return what must be in the picture, (points, 3) m from the machine's place.
 
-        These are the corners of the boxes of all that moves, over the poses of its trace. Of what stands still they are
-        those of the part that is close to it, such as the upper half of a stand.
+        These are the corners of the boxes of all that the channels move, over the poses of its trace. Of other things
+        they are those of the part that is close to them, such as the upper half of a stand.
+
+        Args:
+          motion: of joints without a channel; default: they stay where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
-        model, moved = self.shapes[0].model, []
-        world = np.empty((0, 8, 3))
-        fixed, plane = model.body_weldid[model.geom_bodyid] == 0, model.geom_type == scene.PLANE
+        model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))
+        plane, fixed = model.geom_type == scene.PLANE, model.body_weldid[model.geom_bodyid] == 0
+        links = np.isin(model.geom_bodyid, self.links) & ~plane
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             sample = round(part * (len(trace.t) - 1))
-            now = self.shape(float(trace.t[sample]))
-            data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown])
+            time = float(trace.t[sample])
+            now = self.shape(time)
+            rest = None if motion is None else motion.at(time)
+            data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown], rest=rest)
             scene.forward(self.shapes[now].model, data[now])
             world = scene.boxes(self.shapes[now].model, data[now])
-            moved.append(world[~fixed & ~plane].reshape(-1, 3))
-        points, still = np.concatenate(moved), world[fixed & ~plane]
+            moved.append(world[links].reshape(-1, 3))
+            others.append(world[~links & ~plane & ~fixed])
+        points, near = np.concatenate(moved), np.concatenate([*others, world[~plane & fixed]])
+        still = np.repeat([False, True], [len(near) - (~plane & fixed).sum(), (~plane & fixed).sum()])
         if not len(points):
-            return still.reshape(-1, 3)
+            return near.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
         size = (high - low).max()
         if self.scenario.plant.direct:
-            still = still[np.ptp(still, axis=1).max(axis=1) < MAX_FIXED * size]
-        still = still.reshape(-1, 3)
-        still[:, 2] = still[:, 2].clip(low[2] - CLOSE * size, high[2] + CLOSE * size)
-        return np.concatenate([points, still])
+            close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED * size
+            close &= ((near < high + MAX_FIXED * size) & (near > low - MAX_FIXED * size)).all(axis=(1, 2))
+            near, still = near[close], still[close]
+        near[still, :, 2] = near[still, :, 2].clip(low[2] - CLOSE * size, high[2] + CLOSE * size)
+        return np.concatenate([points, near.reshape(-1, 3)])
 
     def shape(self, time: float) -> int:
         """Return the index of the shape at a time, s."""
         return sum(time >= shape.time for shape in self.shapes) - 1
+
+
+def motion(trace: Trace, times: np.ndarray) -> Motion | None:
+    """Return how joints without a channel move, at times in s; None if there are none, or if that is not known."""
+    poses = None if Puppet(trace.scenario).whole else replay.poses(trace, times)
+    return None if poses is None else Motion(times, poses)
 
 
 def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:

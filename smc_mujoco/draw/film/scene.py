@@ -169,10 +169,10 @@ def depth(model: mujoco.MjModel) -> float:
 def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
     """Return whether machines stand in a row across the picture, and not behind each other.
 
-    They do if the plant's lane lies across it, if the camera looks from another side than the plant's own, and if the
+    They do if the plant's lane lies across it, if they carry something that would hide the machine behind, and if the
     model is the user's.
     """
-    if scenario.plant.direct:
+    if scenario.plant.direct or scenario.plant.free:
         return True
     step = np.array(scenario.plant.lane)
     return bool(abs(step @ turn[:, 0]) > 0.5 * np.linalg.norm(step))

@@ -13,7 +13,7 @@ import numpy as np
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
-from smc_mujoco.draw.film.puppet import Puppet, places
+from smc_mujoco.draw.film.puppet import Motion, Puppet, places
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.trace import Trace
@@ -41,16 +41,20 @@ class Stage:
         size: tuple[int, int],
         room: camera.Room,
         chosen: camera.Camera | None = None,
+        motions: Sequence[Motion | None] = (),
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
         self.shown, self.own = [puppet.shown for puppet in self.puppets], scenarios[0].plant.direct
         turn = scene.turn(scenarios[0], chosen)
-        reaches = [puppet.reach(trace) for puppet, trace in zip(self.puppets, traces, strict=True)]
+        self.motions = motions or [None] * len(traces)
+        runs = zip(self.puppets, traces, self.motions, strict=True)
+        reaches = [puppet.reach(trace, motion) for puppet, trace, motion in runs]
         where = places(self.puppets, reaches, turn)
         self.model = scene.compose(scenarios, where, size)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
+        self.rest: list[np.ndarray | None] = [None] * len(traces)
         ends = np.cumsum([0, *(puppet.shapes[0].model.nq for puppet in self.puppets)]).tolist()
         self.blocks = [slice(*pair) for pair in itertools.pairwise(ends)]
         bodies = np.cumsum([0, *(each.shapes[0].model.nbody - 1 for each in self.puppets)]).tolist()
@@ -117,15 +121,20 @@ class Stage:
         alpha = np.where(material >= 0, self.model.mat_rgba[material, 3], self.model.geom_rgba[:, 3])
         return (self.model.geom_group < GROUPS) & (alpha > 0.0)
 
-    def aim(self, k: int, r: np.ndarray | None, rest: np.ndarray | None = None) -> None:
+    def aim(self, k: int, r: np.ndarray | None) -> None:
         """Show where the reference r, (shown,) rad or m, wants machine k, as a ghost; None: show no ghost."""
         self.aimed[k] = r is not None
         if r is not None:
-            self.goal.qpos[self.blocks[k]] = self.puppets[k].qpos(r, rest=rest)
+            self.goal.qpos[self.blocks[k]] = self.puppets[k].qpos(r, rest=self.rest[k])
 
-    def pose(self, k: int, x: np.ndarray, ahead: np.ndarray | None = None, rest: np.ndarray | None = None) -> None:
-        """Put machine k's channels at x, (shown,) rad or m; other arguments as of Puppet.qpos."""
-        self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, rest)
+    def pose(self, k: int, x: np.ndarray, ahead: np.ndarray | None = None, time: float = 0.0) -> None:
+        """Put machine k's channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their joints.
+
+        Joints without a channel are where they were at that time, s.
+        """
+        motion = self.motions[k]
+        self.rest[k] = None if motion is None else motion.at(time)
+        self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, self.rest[k])
 
     def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
         """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only."""

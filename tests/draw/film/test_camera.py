@@ -1,11 +1,11 @@
-"""The film's camera: chosen by name or by angles, or else the plant's own; it sees all machines, as near as it can."""
+"""The film's camera, chosen by name or by angles; and what it sees of a user's own model."""
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, scene
+from smc_mujoco.draw.film import camera, puppet, scene
 from smc_mujoco.draw.film.stage import Stage
 
 SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
@@ -20,7 +20,7 @@ MODEL = """
     <body name="post" pos="0 0 1">
       <joint name="j" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .5" rgba=".5 .5 .5 1"/>
     </body>
-    <body name="ball" pos=".5 0 2"><freejoint name="fall"/><geom size=".1" rgba=".2 .9 .2 1"/></body>
+    <body name="ball" pos="1 0 2"><freejoint name="fall"/><geom size=".1" rgba=".2 .9 .2 1"/></body>
   </worldbody>
   <actuator><motor joint="j"/></actuator>
 </mujoco>"""
@@ -111,3 +111,23 @@ def test_links_of_an_own_model_have_the_law_s_colour_and_other_bodies_their_own(
         ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
         assert shown.model.geom_rgba[link, 2] > 0.6 > 2 * shown.model.geom_rgba[link, 0]
         assert shown.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
+
+
+def test_joints_without_a_channel_move_as_in_the_run(trace):
+    """The ball falls freely. The run is that of the trace: its channel moves alike."""
+    times = np.array([0.0, 0.1, 0.3, 0.4])
+    motion = puppet.motion(trace, times)
+    assert motion is not None
+    arm = motion.poses[:, 0]
+    assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
+    assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
+    assert motion.at(0.2)[3] == motion.poses[1, 3]
+    shown = puppet.Puppet(trace.scenario)
+    assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx([1.0, motion.poses[2, 3]])
+    low = shown.reach(trace, motion)[:, 2].min()
+    assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)  # the ball is in the picture
+
+
+def test_a_library_plant_has_no_other_joints():
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+    assert puppet.motion(trace, trace.t) is None
