@@ -253,8 +253,9 @@ def jit(function: Callable) -> Callable:
     with global_compiler_lock:
         copies = dict(_shared)
         try:
-            return rebuild(function, _checked, copies)
+            made = rebuild(function, _checked, copies)
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
-        finally:
-            _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})
+        # only now, as copies that were cut short lack functions that they call
+        _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})
+        return made
