@@ -30,6 +30,7 @@ COMMANDS = {
     "board": studies.board,
     "margins": analysis.margins,
     "basin": analysis.basin,
+    "chatter": analysis.chatter,
     "claims": studies.claims,
     "report": studies.report,
     "view": runs.view,

@@ -12,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
+from smc_mujoco.analysis.chattering import Chattering
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
@@ -351,6 +352,30 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
         within = number(margin.resolution) if margin.resolution else ""
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
+    return table
+
+
+def chattering(
+    scenarios: Sequence[Scenario],
+    channel: int,
+    cycles: Sequence[Chattering],
+    measured: Sequence[tuple[float, float]],
+) -> Table:
+    """Return predicted and measured limit cycles, a line for each scenario."""
+    plant = scenarios[0].plant
+    heads = (f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "third", "samples")
+    numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
+    table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
+
+    def digits(value: float) -> str:
+        return "none" if math.isnan(value) else number(value, 3)
+
+    for scenario, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True):
+        third = "" if math.isnan(cycle.third_harmonic) else f"{100 * cycle.third_harmonic:.0f} %"
+        samples = "" if math.isnan(cycle.samples) else number(cycle.samples, 3)
+        law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
+        both = map(digits, (cycle.amplitude, amplitude, cycle.frequency, frequency))
+        table.add_row(law, *both, third, samples)
     return table
 
 

@@ -1,5 +1,6 @@
 """What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
 
+import json
 import os
 import re
 import signal
@@ -722,3 +723,36 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
     assert err == "smc-mujoco: stopped; files already written are complete\n"
     assert "Traceback" not in out
     assert list((tmp_path / "videos" / "long").iterdir()) == []
+
+
+# chatter
+
+
+def test_chatter_prints_predicted_beside_measured_and_writes_what_was_asked_for(call, folder):
+    words = ["--laws", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
+    code, out, _ = call("chatter", "duffing", *words, "--json", "cycles.json", "--out", "chatter.pdf")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    _, predicted, measured, hertz, run = re.search(r"(super_twisting) +(\S+) +(\S+) +(\S+) +(\S+)", out).groups()
+    assert float(predicted) == pytest.approx(float(measured), rel=0.15)
+    assert float(hertz) == pytest.approx(float(run), rel=0.05)
+    assert re.search(r"observer_free +none +none +none +none", out)
+    first, second = json.loads((folder / "cycles.json").read_text())
+    assert first["frequency"] == pytest.approx(float(hertz), rel=0.01)
+    assert second["law"] == "observer_free"
+    assert (folder / "chatter.pdf").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--actuator", "lagg:0.01"], "lag"),
+        (["--actuator", "lag"], "lag:0.01"),
+        (["--actuator", "lag:-1"], "-1"),
+        (["--channel", "3"], "give 0 to 0"),
+        (["--laws", "clasical"], "classical"),
+        (["--out", "chatter.gif"], "chatter.gif"),
+    ],
+)
+def test_chatter_refuses_in_one_sentence(words, said, call):
+    refused(call("chatter", "duffing", *words), said)

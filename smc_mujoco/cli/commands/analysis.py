@@ -194,3 +194,75 @@ def basin(
     if out:
         region.draw([found], out)
         terminal.wrote(out)
+
+
+@errors_as_sentences()
+def chatter(
+    plant: options.PlantName,
+    laws: Annotated[
+        str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {options.OWN_GAINS}")
+    ] = None,
+    actuator: Annotated[
+        str | None,
+        typer.Option(metavar="PART:NUMBERS", help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor."),
+    ] = None,
+    condition: options.Condition = "nominal",
+    gains: options.Gains = "tuned",
+    channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
+    duration: Annotated[float, typer.Option(min=0.1, help="Of the runs beside the prediction, s.")] = 8.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Also draw Nyquist plots and runs, as OUT.svg and OUT.png, or OUT.pdf.")
+    ] = None,
+    json: options.Json = None,
+    threads: options.Threads = None,
+) -> None:
+    """Predict how much laws chatter, by harmonic balance, and measure it in runs.
+
+    A law that switches and an actuator that is slower than it oscillate without end. The frequency and the amplitude
+    follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "third" is the share
+    of the third harmonic in s, and "samples" the control samples in a period. Where third is above 20 %, or samples
+    below 10, the prediction is rough.
+
+    Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
+    """
+    with held_back():
+        from smc_mujoco.analysis.chattering import chattering, save, shared
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.control import gain_sets
+        from smc_mujoco.metrics.limit_cycle import of_trace
+        from smc_mujoco.simulation.grid import case
+        from smc_mujoco.simulation.run import run
+
+    terminal = Terminal()
+    if json:
+        writable(ended(json, ".json"))
+    if out:
+        from smc_mujoco.draw.page import files
+
+        pictures = files(out)
+        for file in pictures:
+            writable(file)
+    else:
+        pictures = []
+    chosen = [options.law(text) for text in options.names(laws, gain_sets.LAWS)]
+    fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
+    cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
+    with bar("chattering") as drawn:
+        cycles = []
+        for done, scenario in enumerate(cases):
+            drawn.reached(done, len(cases) + 1)
+            cycles.append(chattering(scenario, channel))
+        traces = run(cases, threads=threads)
+    measured = [of_trace(trace, channel) for trace in traces]
+    terminal.print(tables.chattering(cases, channel, cycles, measured))
+    terminal.note("assumed: " + "; ".join(shared(cycles)))
+    terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
+    if json:
+        terminal.wrote(save(cases, cycles, measured, json))
+    if pictures:
+        from smc_mujoco.draw.nyquist import nyquist
+
+        nyquist(cases, out, channel, traces)
+        terminal.wrote(*pictures)

@@ -11,6 +11,8 @@ import typer
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
+    from smc_mujoco.mechanisms.hardware.backlash import Backlash
+    from smc_mujoco.mechanisms.hardware.drives import Drive
     from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
@@ -131,3 +133,28 @@ def starts(x0: float | None, spread: float | None) -> "Starts | None":
     if x0 is None and spread is None:
         return None
     return initial_states.starts(x0, initial_states.SPREAD if spread is None else spread)
+
+
+def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
+    """Return a drive or gear from lag:0.01, or several from dcmotor+lag:0.01. Numbers are in the order of its fields.
+
+    Raises:
+      ScenarioError: an unknown part, or numbers that it does not take.
+    """
+    from smc_mujoco.common.errors import ScenarioError, find, shown
+    from smc_mujoco.common.registry import subclasses
+    from smc_mujoco.mechanisms.hardware.backlash import Backlash
+    from smc_mujoco.mechanisms.hardware.drives import Drive
+
+    known: dict[str, type[Drive | Backlash]] = {kind.__name__.lower(): kind for kind in [*subclasses(Drive), Backlash]}
+    parts = []
+    for one in text.split("+"):
+        name, _, numbers = one.partition(":")
+        kind = find("actuator", name.strip().lower().replace("_", ""), known)
+        try:
+            parts.append(kind(*map(float, filter(None, numbers.split(",")))))
+        except (TypeError, ValueError):
+            raise ScenarioError(
+                f"actuator {shown(one)} cannot be read: write it as lag:0.01, with its numbers"
+            ) from None
+    return tuple(parts)

@@ -1,0 +1,289 @@
+"""Chattering, predicted before it is run: the limit cycle of a scenario by harmonic balance.
+
+    cycle = smc.chattering(scenario)
+    cycle = smc.chattering("super_twisting", plant="duffing", actuator=smc.Lag(0.01))
+    cycle.amplitude, cycle.frequency          # of s, in its unit, and Hz; NaN where no limit cycle is predicted
+
+A limit cycle e = a sin(omega t) is where N(a, omega) L(j omega) = 1: N is the first harmonic of what the law returns,
+L the answer of the linearised mechanism (`harmonics`). That is exact if the mechanism filters all other harmonics out;
+`third_harmonic` says how far it does. Cycles that are not stable are left out, by Loeb's criterion.
+Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
+Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
+"""
+
+import dataclasses
+import itertools
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.analysis.harmonics import Loop, Wave
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import ended, write_json
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.drives import RateLimit
+from smc_mujoco.simulation.scenario import Scenario
+
+SLOWEST = 0.5  # Hz: slower oscillations are no chattering
+FREQUENCIES, AMPLITUDES = 60, 28  # of the grid on which cycles are sought
+COARSE = 60  # samples of a period there
+SMALLEST, LARGEST = 1e-9, 3.0  # rad or m, of the error
+SAME = 0.02  # relative: two cycles nearer than that are one
+WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by that
+NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
+DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in so many steps
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Chattering:
+    """A predicted limit cycle of one channel; all numbers are NaN where none is predicted.
+
+    Attributes:
+      amplitude: of the sliding variable s, half its range, in its unit.
+      amplitude_x: of the position, rad or m.
+      amplitude_u: of the command, half its range, N m or N.
+      frequency: Hz.
+      power: mean square of s', (amplitude_s omega)^2 / 2 of its first harmonic: for s' = u + d that of the delivered
+        force, per unit of mass.
+      third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
+        large the law does not see a sine, and the prediction is rough.
+      samples: control samples in a period. Below some ten a cycle locks to the samples, and the prediction is rough.
+      gain: N, complex; response: L, complex, at the cycle.
+      assumptions: sentences, what was left out or is doubtful.
+    """
+
+    amplitude: float = math.nan
+    amplitude_x: float = math.nan
+    amplitude_u: float = math.nan
+    frequency: float = math.nan
+    power: float = math.nan
+    third_harmonic: float = math.nan
+    samples: float = math.nan
+    gain: complex = complex(math.nan)
+    response: complex = complex(math.nan)
+    assumptions: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return not math.isnan(self.frequency)
+
+
+def chattering(law: Scenario | Component | Template | str, channel: int = 0, **fields: object) -> Chattering:
+    """Predict the limit cycle about rest of one driven channel.
+
+    Args:
+      law: a Scenario, or the law of one whose other fields follow.
+      channel: index of a driven channel; the others are at rest.
+      fields: of the Scenario, such as plant, actuator, input_delay, control_period.
+
+    Returns:
+      The stable limit cycle; the fastest, if there are several: that of a mechanism near rest.
+
+    Raises:
+      ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
+    """
+    if isinstance(law, Scenario):
+        if fields:
+            raise ScenarioError(f"a Scenario and {', '.join(fields)}: give one of them")
+        scenario = law
+    else:
+        scenario = Scenario(law=law, **fields)  # type: ignore[arg-type]
+    if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
+        raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
+    loop = Loop(scenario, channel)
+    found = _stable(loop, cycles(loop))
+    said = tuple(_assumptions(scenario))
+    if not found:
+        return Chattering(assumptions=said)
+    return _described(loop, max(found, key=lambda wave: wave.omega), said)
+
+
+def cycles(loop: Loop) -> list[Wave]:
+    """Return all solutions of N L = 1 up to half the sampling frequency."""
+    fastest = math.pi / loop.scenario.control_period
+    omegas = np.geomspace(math.tau * SLOWEST, NYQUIST * fastest, FREQUENCIES)
+    amplitudes = np.geomspace(SMALLEST, LARGEST, AMPLITUDES)
+    found: list[tuple[float, float]] = []
+    for bracket in _brackets(loop, omegas, amplitudes):
+        cycle = _balanced(loop, *bracket)
+        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME for a, w in found):
+            found.append(cycle)
+    return [loop.wave(*one) for one in (found or _of_two_samples(loop, fastest, amplitudes))]
+
+
+Bracket = tuple[tuple[float, float], tuple[float, float]]  # two omegas and the amplitudes there, ends of a search
+
+
+def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterator[Bracket]:
+    """Yield where a cycle lies between: along the curve |N L| = 1 the phase of N L changes its sign."""
+    branches: list[list[tuple[float, float]]] = []  # for each omega: (amplitude, phase) where |N L| = 1
+    for omega in omegas:
+        response = loop.response(omega)
+        products = np.array([loop.gain(a, omega, COARSE) * response for a in amplitudes])
+        sizes = np.log(np.abs(products) + 1e-300)
+        here = []
+        for k in np.flatnonzero(np.diff(np.sign(sizes))):
+            share = sizes[k] / (sizes[k] - sizes[k + 1])
+            amplitude = math.exp(np.interp(share, [0, 1], np.log(amplitudes[k : k + 2])))
+            here.append((amplitude, float(np.angle(products[k] * (1 - share) + products[k + 1] * share))))
+        if not here:  # the curve ends at amplitude 0, or beyond the largest
+            end = 0 if sizes[0] < 0.0 else -1
+            here.append((float(amplitudes[end]), float(np.angle(products[end]))))
+        branches.append(here)
+    for (w0, before), (w1, after) in itertools.pairwise(zip(omegas, branches, strict=True)):
+        for (a0, p0), (a1, p1) in itertools.product(before, after):
+            if p0 * p1 <= 0.0 and abs(p0 - p1) < math.pi:
+                yield (w0, w1), (min(a0, a1), max(a0, a1))
+
+
+def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, float] | None:
+    """Return amplitude and omega of the cycle in a bracket: nested bisections, as N may jump where samples do.
+
+    The bracket is widened by itself to both sides, as few samples shift the phase of a law that switches.
+    """
+    from scipy.optimize import brentq
+
+    low, high = math.log(amplitudes[0]) - WIDER, math.log(amplitudes[1]) + WIDER
+    first, last = np.log(omegas)
+
+    def size(z: float, omega: float, response: complex) -> float:
+        return math.log(abs(loop.gain(math.exp(z), omega) * response) + 1e-300)
+
+    def amplitude(omega: float) -> float:
+        """Return where |N L| = 1, or the end of the range that is nearer to it."""
+        response = loop.response(omega)
+        if size(low, omega, response) <= 0.0:
+            return math.exp(low)
+        if size(high, omega, response) >= 0.0:
+            return math.exp(high)
+        return math.exp(float(brentq(size, low, high, (omega, response), xtol=1e-9)))  # type: ignore[arg-type]
+
+    def phase(w: float) -> float:
+        omega = math.exp(w)
+        return float(np.angle(loop.gain(amplitude(omega), omega) * loop.response(omega)))
+
+    fastest = math.log(NYQUIST * math.pi / loop.scenario.control_period)
+    first, last = 2 * first - last, min(2 * last - first, fastest)
+    if phase(first) * phase(last) > 0.0:
+        return None  # a bracket with few samples that is none with all
+    omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
+    found = amplitude(omega)
+    return (found, omega) if low < math.log(found) < high else None
+
+
+def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[tuple[float, float]]:
+    """Return the cycles of two samples: there N L is real, and 1 for some amplitude."""
+    from scipy.optimize import brentq
+
+    response = loop.response(fastest).real
+
+    def excess(z: float) -> float:
+        product = loop.gain(math.exp(z), fastest).real * response
+        return math.log(product) if product > 0.0 else -50.0
+
+    places = np.log(amplitudes)
+    sizes = [excess(z) for z in places]
+    return [
+        (math.exp(float(brentq(excess, low, high))), fastest)  # type: ignore[arg-type]
+        for (low, a), (high, b) in itertools.pairwise(zip(places, sizes, strict=True))
+        if a > 0.0 >= b
+    ]
+
+
+def _stable(loop: Loop, waves: list[Wave]) -> list[Wave]:
+    """Return the stable cycles.
+
+    A larger one decays (Loeb's criterion), and from no slower cycle that does so N L has turned once around 0: a delay
+    gives such cycles one after the other, and all but the slowest give way to it.
+    """
+    alone = sorted((wave for wave in waves if _decays(loop, wave)), key=lambda wave: wave.omega)
+    if len(alone) < 2:
+        return alone
+    # a little beside the frequencies, so that resonances without damping have a width
+    omegas = np.geomspace(0.9 * alone[0].omega, 1.1 * alone[-1].omega, FINE)
+    phases = np.unwrap([np.angle(loop.response(w * (1.0 - DAMPED * 1j))) for w in omegas])
+    turns = np.interp([wave.omega for wave in alone], omegas, phases) / math.tau
+    return [wave for k, wave in enumerate(alone) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
+
+
+def _decays(loop: Loop, wave: Wave) -> bool:
+    """Return whether an oscillation that is a little larger than the cycle decays."""
+    if wave.omega >= math.pi / loop.scenario.control_period:
+        return True  # see _of_two_samples: the gain falls with the amplitude
+    small = 0.1  # far enough that it does not matter where samples fall
+
+    def product(amplitude: float, omega: float) -> complex:
+        return complex(np.log(loop.gain(amplitude, omega) * loop.response(omega)))
+
+    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (small, -small))
+    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (small, -small))
+    return ((up - down) / (fast - slow)).imag < 0.0
+
+
+def _described(loop: Loop, wave: Wave, said: tuple[str, ...]) -> Chattering:
+    """Return the numbers of a limit cycle."""
+    response = loop.response(wave.omega)
+    samples = math.tau / wave.omega / loop.scenario.control_period
+    passed = abs(loop.response(3.0 * wave.omega) / response)
+    said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
+    if samples < 8.0:
+        said += (f"a period has {samples:.1f} control samples: the cycle locks to them",)
+    if wave.drift > 0.05:
+        said += ("gains or memories of the law drift: the prediction is a snapshot",)
+    return Chattering(
+        amplitude=wave.s,
+        amplitude_x=wave.amplitude,
+        amplitude_u=wave.u,
+        frequency=wave.omega / math.tau,
+        power=wave.rate**2 / 2.0,
+        third_harmonic=wave.third,
+        samples=samples,
+        gain=wave.gain,
+        response=response,
+        assumptions=said,
+    )
+
+
+def _assumptions(scenario: Scenario) -> Iterator[str]:
+    """Yield what is left out of the linear part."""
+    yield "small oscillation about rest at x = 0, without disturbance and noise"
+    if scenario.plant.driven > 1:
+        yield "the other driven channels are at rest"
+    if any(isinstance(part, RateLimit) for part in scenario.actuator):
+        yield "the actuator's rate limit is not reached"
+    if any(isinstance(part, Backlash) for part in scenario.actuator):
+        yield "the gear has no play"
+    if scenario.friction:
+        yield "no dry friction"
+    if scenario.sensor is not None and math.isfinite(scenario.sensor.counts):
+        yield "the encoder's counts are fine"
+
+
+def shared(cycles: Sequence[Chattering]) -> list[str]:
+    """Return the assumptions that all cycles have in common."""
+    first, *others = cycles
+    return [said for said in first.assumptions if all(said in other.assumptions for other in others)]
+
+
+def save(
+    scenarios: Sequence[Scenario],
+    cycles: Sequence[Chattering],
+    measured: Sequence[tuple[float, float]],
+    path: str | os.PathLike,
+) -> Path:
+    """Write predictions, and amplitude and frequency measured beside them, to a .json file. Return its path.
+
+    Raises:
+      ScenarioError: the file cannot be written.
+    """
+    rows = [
+        {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains)}
+        | {name: value for name, value in vars(cycle).items() if name not in ("gain", "response")}
+        | {"gain": [cycle.gain.real, cycle.gain.imag], "response": [cycle.response.real, cycle.response.imag]}
+        | {"measured_amplitude": amplitude, "measured_frequency": frequency}
+        for one, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True)
+    ]
+    return write_json(ended(path, ".json"), rows)

@@ -1,0 +1,302 @@
+"""Harmonic balance: what a compiled law returns for a sinusoidal error, and how the mechanism answers a sinusoidal u.
+
+    loop = Loop(scenario, channel=0)
+    loop.response(omega)                  # x of the channel per N or N m of command: complex, rad or m
+    wave = loop.drive(0.01, omega)        # what the law returns for e = 0.01 sin(omega t)
+    wave.gain                             # complex, N or N m per rad or m
+
+A limit cycle is where gain times response is 1. The response is that of MuJoCo's own model, linearised about rest by
+finite differences, with drives, back-EMF, springs and joints without an actuator. The gain is that of the compiled
+law, with its estimator and its surface, at its control period: there is no approximation but that the error is a sine.
+"""
+
+import copy
+import dataclasses
+import functools
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.jit import NotCompilable, call
+from smc_mujoco.common.mjcb import installed
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import native
+from smc_mujoco.simulation.scenario import Scenario
+
+STEP = 1e-6  # SI units, of finite differences
+FINE = 2e-5  # s, longest step at which a model under RK4 is linearised, by Euler's method
+CHUNK = 50_000  # samples that a law is called for at once
+SAMPLES = 3  # of a drive, about: so many times the finest period's
+PERIODS = (12, 600)  # fewest and most of a drive
+FINEST = 1000  # samples of a period; a law that runs more often is run that often here
+HARMONICS = 9  # of u that are followed through the mechanism
+SETTLING = 0.4  # share of a drive that is left out, while memories settle
+FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
+T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
+LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq"))
+Q, DQ, FQ, GQ = (FIELDS[name] for name in ("q", "dq", "fq", "gq"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Wave:
+    """What a law returns for e = amplitude sin(omega t).
+
+    Attributes:
+      amplitude: of e, rad or m.
+      omega: rad/s.
+      gain: first harmonic of u over that of e, complex, N m/rad or N/m.
+      third: share of the third harmonic in s, over the first.
+      s, u: half the range of the sliding variable and of u, with the harmonics that the mechanism lets through.
+      rate: amplitude of the first harmonic of s, times omega.
+      drift: relative change of the gain from the first to the second half of the drive.
+    """
+
+    amplitude: float
+    omega: float
+    gain: complex
+    third: float
+    s: float
+    u: float
+    rate: float
+    drift: float
+
+
+class Loop:
+    """The law and the linearised mechanism of one driven channel of a scenario."""
+
+    def __init__(self, scenario: Scenario, channel: int = 0):
+        self.scenario, self.channel, s = scenario, channel, scenario.resolved
+        plant = s.plant
+        self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
+        self.controller = Controller(s.velocity, s.surface, s.law)
+        self._linearise()
+
+    def _linearise(self) -> None:
+        """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
+        s = self.scenario.resolved
+        closed = tuple(part for part in s.actuator if part.drives)
+        ideal = dataclasses.replace(self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None)
+        with installed(None):
+            compiled = assembly.model([ideal])
+            made = assembly.with_values(compiled, ideal)
+            flags = mujoco.mjtDisableBit
+            for flag in (flags.mjDSBL_CONTACT, flags.mjDSBL_LIMIT, flags.mjDSBL_FRICTIONLOSS):
+                made.opt.disableflags |= flag.value
+            if s.integrator == "RK4":
+                made.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+                made.opt.timestep = s.control_period / math.ceil(s.control_period / FINE)
+            self.step = float(made.opt.timestep)
+            data = mujoco.MjData(made)
+            key = assembly.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
+            data.qpos[:], data.qvel[:] = key
+            n = 2 * made.nv + made.na
+            self.a, b = np.zeros((n, n)), np.zeros((n, made.nu))
+            mujoco.mjd_transitionFD(made, data, STEP, True, self.a, b, None, None)
+            self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)
+            self.rows, self.nv = dof_ids(made), made.nv
+        rest, p = np.zeros(s.plant.n), copy.copy(s.plant.values({}))
+        self.model = {}
+        for i in (self.channel, *(() if self.partner is None else (self.partner,))):
+            at = functools.partial(_nominal, s.plant, i, p)
+            f, g = at(rest, rest)
+            unit = np.eye(s.plant.n)[i] * STEP
+            fx, fv = ((at(*pair)[0] - f) / STEP for pair in ((unit, rest), (rest, unit)))
+            self.model[i] = f, g, fx, fv
+
+    def response(self, omega: complex) -> complex:
+        """Return the amplitude of x at control samples per unit of sampled and held u, rad or m per N m or N."""
+        return complex(self._answer(omega)[self.rows[self.channel]])
+
+    def _answer(self, omega: complex) -> np.ndarray:
+        """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
+
+        A sampled and held sine has images at omega + 2 pi m / control_period; all that a sample sees are summed.
+        """
+        s = self.scenario.resolved
+        count = round(s.control_period / self.step)
+        z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
+        passed = sum(z**-i for i in range(count)) / count  # by the hold
+        passed = passed * z ** -round(s.input_delay / self.step)
+        tandem = self.scenario.tandem
+        if tandem is not None:  # the first drive, which the callback has: see Tandem
+            passed *= 1.0 - tandem.held + tandem.held * (1.0 - tandem.left) / (z - tandem.left)
+        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[:, :, 0]
+        late = s.sensor.delay if s.sensor else 0.0
+        return passed @ answers * np.exp(-1j * omega * late)
+
+    def gain(self, amplitude: float, omega: float, finest: int = FINEST) -> complex:
+        """Return the first harmonic of u over that of e = amplitude sin(omega t), N m/rad or N/m."""
+        angles, u, _ = self._drive([amplitude], omega, finest)
+        mirrored = 2.0 if self.scenario.control_period * omega == math.pi else 1.0  # two samples: a wave is its image
+        return _harmonic(u, angles) / (1j * amplitude * mirrored)
+
+    def wave(self, amplitude: float, omega: float) -> Wave:
+        """Return what the law returns for e = amplitude sin(omega t), and s with the harmonics that follow from it."""
+        angles, u, _ = self._drive([amplitude], omega, FINEST)
+        first, half = _harmonic(u, angles), len(u) // 2
+        early, late = _harmonic(u[:half], angles[:half]), _harmonic(u[half:], angles[half:])
+        most = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
+        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, most + 1)]
+        # the phase of u's first harmonic is that which the balance gives it
+        turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
+        rest = [x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2)]
+        angles, u, s = self._drive([amplitude, *rest], omega, FINEST)
+        at = _harmonic(s, angles)
+        return Wave(
+            amplitude=amplitude,
+            omega=omega,
+            gain=self.gain(amplitude, omega),
+            third=abs(_harmonic(s, 3.0 * angles) / at) if at and most > 1 else math.nan,
+            s=float(np.ptp(s)) / 2.0,
+            u=float(np.ptp(u)) / 2.0,
+            rate=omega * abs(at),
+            drift=abs(late - early) / (abs(first) or 1.0),
+        )
+
+    def _drive(
+        self, amplitudes: Sequence[complex], omega: float, finest: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
+
+        The error is the sum of Re(amplitude_n exp(j n omega t)): it starts at its largest, so that integrals of odd
+        functions of it have no mean. `finest` is the largest number of samples of a period.
+        """
+        s, turn = self.scenario.resolved, math.tau / omega
+        h = max(s.control_period, turn / finest)
+        periods = min(max(math.ceil(SAMPLES * finest * h / turn), PERIODS[0]), PERIODS[1])
+        count = math.ceil(periods * turn / h)
+        y, turns = np.zeros((count, len(FIELDS))), np.exp(1j * omega * h * np.arange(count))
+
+        def along(i: int) -> tuple[np.ndarray, np.ndarray]:
+            """Return position and velocity of a channel. MuJoCo's velocity is not exactly the rate of its position."""
+            x, v = np.zeros(count), np.zeros(count)
+            for n, amplitude in enumerate(amplitudes, 1):
+                answer, e = self._answer(n * omega), amplitude * turns**n
+                at = answer[self.rows[self.channel]]
+                x += (answer[self.rows[i]] / at * e).real
+                v += (answer[self.nv + self.rows[i]] / at * e).real
+            return x, v
+
+        y[:, T], y[:, DT], y[:, LIMIT] = h * np.arange(count), h, self.scenario.limits[self.channel]
+        y[:, MODEL] = s.model == "nominal"
+        x, v = along(self.channel)
+        f, g, fx, fv = self.model[self.channel]
+        y[:, X], y[:, E], y[:, V], y[:, DE] = x, x, v, v
+        y[:, F], y[:, G] = f + fx * x + fv * v, g
+        if self.partner is not None:
+            q, dq = along(self.partner)
+            f, g, fx, fv = self.model[self.partner]
+            y[:, Q], y[:, DQ], y[:, FQ], y[:, GQ] = q, dq, f + fx * q + fv * dq, g
+        out = self.controller(np.column_stack([np.full(count, h), x, v]), y, self.controller.memories())
+        first, limit = int(SETTLING * count), y[0, LIMIT]
+        return omega * y[first:, T], np.clip(out[first:, 0], -limit, limit), out[first:, 1]
+
+
+class Controller:
+    """Estimator, surface and law in compiled code, called by themselves."""
+
+    def __init__(self, *parts: Component | None):
+        try:
+            functions = [None if one is None else native.component(one) for one in parts]
+        except NotCompilable as error:
+            raise ScenarioError(f"chattering is not predicted for a law that does not compile: {error}") from None
+        self.functions, self.parts = functions, parts  # the functions keep their addresses alive
+        self.addresses = np.array([0 if one is None else one.address for one in functions])
+        self.gains = [np.array([*(one.gains.values() if one else ()), 0.0]) for one in parts]
+
+    def memories(self) -> list[np.ndarray]:
+        """Return memories as they are at the start of a run."""
+        return [np.zeros(one.memory if one else 1) for one in self.parts]
+
+    def __call__(self, readings: np.ndarray, y: np.ndarray, memories: list[np.ndarray]) -> np.ndarray:
+        """Return u and s, (K, 2), for readings (K, 3) and measurements (K, fields), which it completes."""
+        out = np.empty((len(y), 2))
+        (g0, g1, g2), (m0, m1, m2) = self.gains, memories
+        if not _run(self.addresses, g0, g1, g2, m0, m1, m2, readings, y, out):
+            raise ScenarioError("the law raised an exception in the harmonic balance")
+        return out
+
+
+def describing_function(
+    law: Component | Template | str, amplitude: float, omega: float, samples: int = 4_000_000
+) -> complex:
+    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), sampled ever so fast.
+
+    The law has no model and no bound on u. The second of two periods counts.
+
+    Args:
+      law: a law or its name.
+      amplitude: a, rad or m.
+      omega: rad/s.
+      samples: of a period. The result converges as 1 / samples for laws that switch or integrate.
+
+    Returns:
+      N, complex, N m/rad or N/m. For a relay k sign(e): 4 k / (pi a).
+
+    Raises:
+      ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of samples that is not > 0.
+    """
+    amplitude, omega = number("amplitude", amplitude, above=0.0), number("omega", omega, above=0.0)
+    h = math.tau / omega / samples
+    resolved = Scenario(plant="duffing", law=law, model="none").resolved
+    controller = Controller(resolved.velocity, None, resolved.law)
+    memories, total = controller.memories(), 0j
+    for first in range(0, 2 * samples, CHUNK):
+        at = np.arange(first, min(first + CHUNK, 2 * samples))
+        turns = np.exp(1j * math.tau * (at + 0.5) / samples)
+        y, x, v = np.zeros((len(at), len(FIELDS))), amplitude * turns.real, -amplitude * omega * turns.imag
+        y[:, T], y[:, DT], y[:, LIMIT], y[:, G] = h * at, h, math.inf, 1.0
+        y[:, X], y[:, E], y[:, V], y[:, DE] = x, x, v, v
+        u = controller(np.column_stack([np.full(len(at), h), x, v]), y, memories)[:, 0]
+        total += (u[at >= samples] / turns[at >= samples]).sum()
+    return complex(total) * 2.0 / samples / amplitude
+
+
+def _nominal(plant, i, p, x, v):
+    """Return nominal f and g of channel i."""
+    return plant.nominal(x, v, i, p)
+
+
+def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
+    """Return the complex amplitude of sin(angle) in samples, through a Hann window, which leaves out other waves."""
+    weights = _window(len(values)) * values
+    return complex(2j * (weights @ np.exp(-1j * angles)))
+
+
+@functools.lru_cache(maxsize=64)
+def _window(count: int) -> np.ndarray:
+    """Return the Hann window, of sum 1."""
+    window = np.hanning(count)
+    return window / window.sum()
+
+
+@njit(error_model="numpy")
+def _run(addresses, g0, g1, g2, m0, m1, m2, readings, y, out):
+    """Call estimator, surface and law for each row of measurements, (K, fields). Return whether none raised."""
+    estimate, sliding = np.empty(2), np.empty(2)
+    at_reading, at_y, at_out = readings.ctypes.data, y.ctypes.data, out.ctypes.data
+    at_estimate, at_sliding = estimate.ctypes.data, sliding.ctypes.data
+    gains = g0.ctypes.data, g1.ctypes.data, g2.ctypes.data
+    memories = m0.ctypes.data, m1.ctypes.data, m2.ctypes.data
+    for k in range(len(y)):
+        row, here = y[k], at_y + k * y.strides[0]
+        if call(addresses[0], at_reading + k * readings.strides[0], gains[0], memories[0], at_estimate) != 0:
+            return False
+        row[DE] += estimate[0] - row[V]
+        row[V], row[A] = estimate[0], estimate[1]
+        if math.isnan(estimate[1]):
+            row[A] = 0.0
+        if addresses[1] != 0:
+            if call(addresses[1], here, gains[1], memories[1], at_sliding) != 0:
+                return False
+            row[HAS_SURFACE], row[S], row[V_EQ] = 1.0, sliding[0], sliding[1]
+        if call(addresses[2], here, gains[2], memories[2], at_out + 16 * k) != 0:
+            return False
+    return True

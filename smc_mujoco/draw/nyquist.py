@@ -1,0 +1,132 @@
+"""Predicted chattering beside a run: L and 1/N in the complex plane with their crossing, and s with the amplitude.
+
+    nyquist([scenario], "chatter.svg")
+
+L is the answer of the linearised mechanism to u, 1/N the inverse of the law's describing function at the frequency of
+the crossing. Both are divided by their common value there, and turned: they cross at -1. One row for each scenario; s
+is that of the last periods of a run, or of the whole run where no limit cycle is predicted.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from smc_mujoco.analysis.chattering import Chattering, chattering
+from smc_mujoco.analysis.harmonics import Loop
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+ROW = 3.4  # inches on a full page, height of a row
+SPAN = 40.0  # of the frequencies of L about the crossing, and of the amplitudes of N: a factor
+EDGE = 2.5  # of the complex plane
+PERIODS = 6  # of s
+
+
+def nyquist(
+    scenarios: Sequence[Scenario],
+    path: str | os.PathLike | None = None,
+    channel: int = 0,
+    traces: Sequence[Trace] | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw the harmonic balance of scenarios, and their sliding variable, predicted and run.
+
+    Args:
+      scenarios: of one plant and one set of conditions, with different laws.
+      channel: index of a driven channel.
+      traces: of these scenarios; default: they are run.
+      path, size, format, fig: as in `figure`.
+
+    Returns:
+      The figure.
+
+    Raises:
+      ScenarioError: no scenarios, or as `chattering` and `figure`.
+    """
+    if not scenarios:
+        raise ScenarioError("no scenario to draw: give at least one")
+    paths = [] if path is None else pages.files(path, format)
+    cycles = [chattering(scenario, channel) for scenario in scenarios]
+    runs = [run(scenario) for scenario in scenarios] if traces is None else traces
+    width, height = pages.measure(size, fig)
+    with style.page(width):
+        colours = style.law_colours([scenario.law for scenario in scenarios])
+        handles = [
+            Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle))
+            for scenario, cycle, colour in zip(scenarios, cycles, colours, strict=True)
+        ]
+        whole = pages.head(width, handles) + style.points(ROW) * len(scenarios)
+        page = pages.blank(width, height or whole, fig)
+        axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
+        for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
+            plane(row[0], scenario, cycle, channel, colour)
+            last_periods(row[1], trace, cycle, channel, colour)
+        pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles)
+        pages.write(page, paths)
+    return page
+
+
+def _legend(scenario: Scenario, cycle: Chattering) -> str:
+    """Return a law's entry in the legend."""
+    name = style.law_name(scenario.law)
+    if not cycle:
+        return f"{name}: no limit cycle predicted"
+    return f"{name}: {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
+
+
+def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:
+    """Draw L over frequency and 1/N over amplitude, and mark where they cross."""
+    ax.set(
+        xlabel="real part",
+        ylabel="imaginary part",
+        xlim=(-EDGE, 0.2 * EDGE),
+        ylim=(-0.6 * EDGE, 0.6 * EDGE),
+        aspect="equal",
+    )
+    ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
+    ax.axvline(0.0, color=style.RULE, lw=style.points(0.8))
+    if not cycle:
+        ax.text(0.5, 0.5, "no crossing", ha="center", va="center", transform=ax.transAxes)
+        return
+    loop, omega, unit = Loop(scenario, channel), math.tau * cycle.frequency, -cycle.response
+    fastest = math.pi / scenario.control_period
+    omegas = np.geomspace(omega / SPAN, min(omega * SPAN, fastest), 400)
+    response = np.array([loop.response(w) for w in omegas]) / unit
+    inverse = np.array(
+        [1.0 / (loop.gain(cycle.amplitude_x * q, omega) or math.nan) for q in np.geomspace(1 / SPAN, SPAN, 60)]
+    )
+    inverse /= unit
+    ax.plot(response.real, response.imag, color=style.INK, lw=style.points(1.6), label="L, over frequency")
+    ax.plot(inverse.real, inverse.imag, color=colour, lw=style.points(1.6), ls=(0, (4, 2)), label="1/N, over amplitude")
+    ax.plot([-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER)
+    ax.legend(loc="upper right", fontsize=style.points(8.5), frameon=True, framealpha=0.8, handlelength=1.6)
+
+
+def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:
+    """Draw s in the last periods of a run, and the predicted amplitude as a band."""
+    start = trace.t[-1] - PERIODS / cycle.frequency if cycle else trace.t[0]
+    part = trace.t >= start
+    t, s = trace.t[part] - trace.t[part][0], trace.s[part, channel]
+    ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
+    unit = f"{trace.scenario.plant.units[channel]}/s"
+    ax.set(xlabel=f"last {PERIODS} periods predicted (ms)" if cycle else "time (s)", ylabel=f"s ({unit})")
+    ax.ticklabel_format(axis="y", scilimits=(-3, 3))
+    if cycle:
+        mean = float(s.mean())
+        ax.axhspan(mean - cycle.amplitude, mean + cycle.amplitude, color=colour, alpha=0.15, lw=0)
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.18 * (high - low))
+        words = f"band: ±{style.short(cycle.amplitude)} {unit}, predicted"
+        ax.text(0.99, 0.97, words, ha="right", va="top", transform=ax.transAxes, fontsize=style.points(9.5))

@@ -1,0 +1,165 @@
+"""Predicted chattering: describing functions against closed forms, limit cycles against formulas and against runs."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco import chattering, describing_function
+from smc_mujoco.analysis.harmonics import Loop
+from smc_mujoco.analysis.linear_theory import critical_delay
+
+HALF = math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # of sqrt|sin| sign(sin), over 2
+INTEGRATOR = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a free mass
+LAWS = {
+    "classical": smc.law("classical", k=2.0, c=0.01),
+    "super_twisting": smc.law("super_twisting", k1=1.5, k2=1.1, c=0.01),
+}
+
+
+def lagging(law, mu, **fields):
+    """An integrator of s (c is small) behind two equal lags."""
+    given = {"actuator": (smc.Lag(mu), smc.Lag(mu)), "control_period": 1e-4, "x0": 0.0, "v0": 1e-3}
+    return smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=law, **(given | fields))
+
+
+def measured(trace, part=0.4):
+    """Half the range of s within a period, median of all, and the frequency by its crossings, of the last part."""
+    first = int(len(trace.t) * (1 - part))
+    s, t = trace.s[first:, 0], trace.t[first:]
+    z = s - s.mean()
+    up = np.flatnonzero((z[:-1] < 0) & (z[1:] >= 0))
+    at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
+    ranges = [np.ptp(s[a : b + 1]) for a, b in itertools.pairwise(up)]
+    return np.median(ranges) / 2, (len(at) - 1) / (at[-1] - at[0])
+
+
+# describing functions
+
+A, OMEGA, C = 0.03, 7.0, 2.5
+S, TURN = A * abs(C + 1j * OMEGA), np.exp(1j * np.angle(C + 1j * OMEGA))  # s = v + c x, for e = A sin(omega t)
+
+
+def saturated(k, width, a):
+    """Of k sat(s / width)."""
+    share = min(width / a, 1.0)
+    return 2 * k / (math.pi * width) * (math.asin(share) + share * math.sqrt(1 - share**2))
+
+
+CLOSED = {
+    "relay": (smc.law("classical", k=2.0, c=C), -4 * 2.0 / (math.pi * S) * S / A * TURN),
+    "saturation": (smc.law("boundary_layer", k=2.0, c=C, phi=0.1), -saturated(2.0, 0.1, S) * S / A * TURN),
+    "saturation, all linear": (smc.law("boundary_layer", k=2.0, c=C, phi=0.5), -2.0 / 0.5 * S / A * TURN),
+    "power": (smc.law("power_rate", k=2.0, c=C, a=0.5), -2 * 2.0 * HALF / math.sqrt(S) * S / A * TURN),
+    "super-twisting": (
+        smc.law("super_twisting", k1=1.5, k2=1.1, c=C),
+        -(2 * 1.5 * HALF / math.sqrt(S) + 4 * 1.1 / (math.pi * S * 1j * OMEGA)) * S / A * TURN,
+    ),
+    "twisting": (smc.law("twisting", r1=3.0, r2=2.0), -4 / (math.pi * A) * (3.0 + 2.0j)),
+}
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_the_describing_function_of_a_compiled_law_is_its_closed_form(name):
+    law, closed = CLOSED[name]
+    assert describing_function(law, A, OMEGA) == pytest.approx(closed, rel=1e-6)
+
+
+def test_the_describing_function_of_tanh_is_its_integral():
+    from scipy.integrate import quad
+
+    law = smc.law("observer_free", lam=2.0, k1=C)
+    half, _ = quad(lambda angle: math.tanh(S * math.sin(angle)) * math.sin(angle), 0, math.pi, epsabs=1e-12)
+    assert describing_function(law, A, OMEGA, 10_000) == pytest.approx(
+        -2 * 2.0 / (math.pi * S) * half * S / A * TURN, rel=1e-6
+    )
+
+
+# the loop
+
+
+def test_the_response_of_a_free_mass_behind_two_lags_is_that_of_its_equation():
+    loop, mu, h = Loop(lagging("classical", 5e-3)), 5e-3, 1e-4
+    for omega in (50.0, 200.0, 800.0):
+        ideal = 1 / (1j * omega) ** 2 / (1 + 1j * omega * mu) ** 2 * np.exp(-0.5j * omega * h)  # of the hold
+        assert loop.response(omega) == pytest.approx(ideal, rel=1.2 * omega * h)  # a physics step, of MuJoCo's Euler
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
+    """Perez-Ventura & Fridman 2017: s' = u behind 1/(mu s + 1)^2."""
+    lags, found = (1e-3, 5e-3, 2e-2), []
+    for mu in lags:
+        scenario = lagging(LAWS[name], mu, duration=1.0 + 40 * mu)
+        cycle = chattering(scenario)
+        if name == "classical":
+            amplitude, omega = 2 * mu * 2.0 / math.pi, 1 / mu
+        else:
+            a, b = 2 * HALF * 1.5, 16 * 1.1 / math.pi
+            amplitude, omega = mu**2 * (a * a + b) ** 2 / (4 * a * a), a / (mu * math.sqrt(a * a + b))
+        assert (cycle.amplitude, cycle.frequency) == pytest.approx(
+            (amplitude, omega / math.tau), rel=0.1 if mu < 2e-3 else 0.05
+        )
+        assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.05)
+        assert cycle.power == pytest.approx((cycle.amplitude * math.tau * cycle.frequency) ** 2 / 2, rel=0.05)
+        found.append(cycle)
+    # with 100 samples in the lag, so that the sampling's delay counts as little for all
+    fine = [chattering(lagging(LAWS[name], mu, control_period=mu / 100)) for mu in (1e-3, 1e-2)]
+    slope = math.log10(fine[1].amplitude / fine[0].amplitude)
+    assert slope == pytest.approx(1.0 if name == "classical" else 2.0, rel=0.02)
+    assert math.log10(fine[1].frequency / fine[0].frequency) == pytest.approx(-1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("actuator", [{"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}], ids=["lag", "delay"])
+@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
+@pytest.mark.parametrize("law", ["super_twisting", "twisting", "power_rate", "terminal", "quasi_continuous"])
+def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
+    scenario = smc.Scenario(plant=plant, law=law, x0=0.02, duration=6.0, **actuator)
+    cycle = chattering(scenario)
+    assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
+
+
+def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
+    scenario = smc.Scenario(plant="inverted_pendulum", law="power_rate", actuator=smc.DCMotor(), x0=0.02, duration=3.0)
+    cycle = chattering(scenario)
+    assert cycle.samples == pytest.approx(2.0)
+    assert cycle.amplitude == pytest.approx(measured(smc.run(scenario))[0], rel=0.02)
+    assert any("locks" in sentence for sentence in cycle.assumptions)
+
+
+def test_a_smooth_law_is_predicted_to_be_calm_below_its_critical_delay_and_to_oscillate_above():
+    plant = smc.plant("duffing")
+    law = smc.law("observer_free", lam=6.0, k1=2.5)
+    critical = critical_delay(plant, lam=6.0, k1=2.5, control_period=1e-3)
+    calm, above = (chattering(law, plant=plant, input_delay=round(q * critical, 3)) for q in (0.9, 1.15))
+    assert not calm
+    assert math.isnan(calm.frequency)
+    scenario = smc.Scenario(plant=plant, law=law, input_delay=round(1.15 * critical, 3), x0=0.1, duration=40.0)
+    assert above
+    assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
+
+
+def test_a_law_of_the_users_own_is_predicted_with_its_memory():
+    @smc.law_function(gains={"k": 2.0}, memory=1)
+    def mine(y, gain, m):
+        s = y.v + 0.01 * y.x
+        return -gain.k * (1.0 if s > 0 else -1.0), s
+
+    ours, theirs = chattering(lagging(mine(), 5e-3)), chattering(lagging(LAWS["classical"], 5e-3))
+    assert (ours.amplitude, ours.frequency) == pytest.approx((theirs.amplitude, theirs.frequency), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: chattering("classical", plant="duffing", channel=3), "channel is 3: give 0 to 0"),
+        (lambda: chattering(smc.Scenario(plant="duffing", law="classical"), plant="duffing"), "give one of them"),
+        (lambda: chattering("clasical", plant="duffing"), "classical"),
+        (lambda: describing_function("classical", -1.0, 3.0), "amplitude is -1"),
+    ],
+)
+def test_bad_input_is_one_sentence(call, said):
+    with pytest.raises(smc.ScenarioError, match=said):
+        call()

@@ -1,0 +1,39 @@
+"""The figure of predicted chattering: the crossing, the band and a law without a limit cycle."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.draw.nyquist import nyquist
+
+
+@pytest.fixture(scope="module")
+def page():
+    fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
+    return nyquist([smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")], size=(8.0, 5.0))
+
+
+def test_both_curves_pass_minus_one_where_the_mark_is(page):
+    lines = {line.get_label(): line.get_xydata() for line in page.axes[0].lines}
+    for name in ("L, over frequency", "1/N, over amplitude"):
+        assert np.hypot(*(lines[name] - [-1.0, 0.0]).T).min() < 0.1
+    (mark,) = [line for line in page.axes[0].lines if line.get_marker() == "o"]
+    assert mark.get_xydata().tolist() == [[-1.0, 0.0]]
+
+
+def test_s_of_the_run_fills_the_predicted_band(page):
+    (s,) = page.axes[1].lines
+    (band,) = page.axes[1].patches
+    _, low = band.get_xy()
+    assert np.ptp(s.get_ydata()) == pytest.approx(band.get_height(), rel=0.15)
+    assert low < s.get_ydata().mean() < low + band.get_height()
+
+
+def test_a_calm_law_has_no_crossing_and_no_band(page):
+    assert [text.get_text() for text in page.axes[2].texts] == ["no crossing"]
+    assert not page.axes[3].patches
+
+
+def test_no_scenario_is_one_sentence():
+    with pytest.raises(smc.ScenarioError, match="no scenario to draw"):
+        nyquist([])
