@@ -86,6 +86,8 @@ from smc_mujoco.studies.report import report as report
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
+from smc_mujoco.twins.identify import Identified as Identified
+from smc_mujoco.twins.identify import identify as identify
 from smc_mujoco.twins.rig import Rig as Rig
 from smc_mujoco.twins.rig import rig as rig
 from smc_mujoco.twins.rig import rigs as rigs

@@ -3,18 +3,27 @@
 A record is a mapping of columns, each an array over the samples at the rig's control period.
 """
 
+import csv
 import dataclasses
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.simulation import philox
+from smc_mujoco.simulation import trace as traces
+from smc_mujoco.simulation.reference import evaluate
+from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
 MIN_SAMPLES = 50  # of a replay; chosen
 STATE_SAMPLES = 15  # on each side of a sample, of the cubic that gives its velocity; chosen: 30 ms at 500 Hz
 RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ; chosen
+MAX_GAP = 10  # periods that an open-loop record may miss, which are interpolated; chosen
+RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,39 +33,124 @@ class Columns:
     Attributes:
       time: s.
       x: position of each channel, rad or m.
-      v: velocity of each channel; empty if it is not recorded.
+      v: velocity of each channel, for torques.
       u: command, in the unit of the rig's u.
-      reference: of the driven joint; "" for none.
-      feedforward: what is added to the controller's u; "" for none.
+      reference: of the driven joint, where the loop is closed.
+      feedforward: what is added to the controller's u; records may lack it.
       others: further columns with angles that a replay reads.
+      state: position, then velocity of each channel as they are, without noise and offset: of simulated runs.
+      offset: what is subtracted from each channel's column to get the plant's x; empty for 0.
+      torque: of each joint, for records whose torques are predicted from the motion; then x and v are of these joints.
     """
 
     time: str = "t"
     x: tuple[str, ...] = ("x",)
     v: tuple[str, ...] = ()
     u: str = "u"
-    reference: str = ""
-    feedforward: str = ""
+    reference: str = "reference"
+    feedforward: str = "feedforward"
     others: tuple[str, ...] = ()
+    state: tuple[str, ...] = ()
+    offset: tuple[float, ...] = ()
+    torque: tuple[str, ...] = ()
 
-    @property
-    def needed(self) -> tuple[str, ...]:
-        """Columns that every record must have."""
-        return tuple(name for name in (self.time, *self.x, self.u, self.reference) if name)
+    def needed(self, closed: bool) -> tuple[str, ...]:
+        """Return the columns that a record must have; `closed`: that of a closed loop."""
+        command = (*self.v, *self.torque) if self.torque else (self.u, self.reference)[: 1 + closed]
+        return self.time, *self.x, *command
 
     @property
     def angles(self) -> tuple[str, ...]:
         """Columns that may be in degrees."""
-        return tuple(name for name in (*self.x, *self.v, self.reference, *self.others) if name)
+        return *self.x, *self.v, self.reference, *self.others
 
     @property
     def known(self) -> tuple[str, ...]:
         """All columns that a replay may read."""
-        return tuple(dict.fromkeys(name for name in (*self.needed, *self.v, self.feedforward, *self.others) if name))
+        return tuple(
+            dict.fromkeys((*self.needed(True), self.reference, self.feedforward, *self.v, *self.others, *self.state))
+        )
 
 
-def checked(record: Mapping[str, Any], columns: Columns, period: float, rig: str) -> Record:
+def load(path: str | os.PathLike, names: Mapping[str, str] | None = None) -> Record | Trace:
+    """Return the columns of a CSV or npz file, or a saved trace.
+
+    Args:
+      path: a CSV file whose first line names the columns, an npz file with an array a column, or a trace's npz file.
+      names: a rig's name of a column -> its name in the file. Default: they are the same.
+
+    Raises:
+      ScenarioError: no such file, not a file of columns, or an unknown column.
+    """
+    file = Path(path)
+    if not file.exists():
+        raise ScenarioError(f"no file at {path}: give the path of a CSV or npz file")
+    if file.suffix == ".npz":
+        try:
+            with np.load(file) as held:
+                found = {} if "about" in held else {name: held[name] for name in held}
+        except (OSError, ValueError) as error:
+            raise ScenarioError(f"cannot read {str(path)!r} as npz ({error}): give arrays by column") from None
+        if not found:
+            return traces.load(file)
+    else:
+        found = _csv(file)
+    for ours, theirs in (names or {}).items():
+        if theirs not in found:
+            raise ScenarioError(f"{path} has no column {theirs!r} (it has {', '.join(found)}): give one that it has")
+        found[ours] = found[theirs]
+    return found
+
+
+def _csv(file: Path) -> Record:
+    """Return the columns of a CSV file; a cell that is empty or no number is NaN."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as text:
+            rows = [row for row in csv.reader(text) if row]
+    except (OSError, ValueError, csv.Error) as error:
+        raise ScenarioError(f"cannot read {str(file)!r} as CSV ({error}): give cells between commas") from None
+    if len(rows) < 2:
+        raise ScenarioError(f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples")
+    heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
+    if wrong := next((i for i, row in enumerate(rows) if len(row) != len(heads)), None):
+        raise ScenarioError(
+            f"{file}, line {wrong + 1}: {len(rows[wrong])} cells for {len(heads)} columns: give one for each"
+        )
+    values = np.array([[_cell(cell) for cell in row] for row in rows[1:]])
+    return {name: values[:, i] for i, name in enumerate(heads)}
+
+
+def _cell(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def of_trace(trace: Trace, columns: Columns) -> Record:
+    """Return what was measured in a run, with its noise, in a rig's columns."""
+    s, sensor = trace.scenario, trace.scenario.sensor
+    offset = columns.offset or (0.0,) * len(columns.x)
+    record = {columns.time: trace.t, columns.u: trace.u[:, 0]}
+    for i, name in enumerate(columns.x):
+        x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
+        if s.noise.position:
+            kind = philox.MEASUREMENT
+            x = x + s.noise.position * np.array([philox.normals(s.seed, i, kind, k)[0] for k in range(len(x))])
+        if quantum := sensor.quantum(s.plant.units[i] == "rad") if sensor else 0.0:
+            x = quantum * np.floor(x / quantum + 0.5)
+        record[name] = x + offset[i]
+    added = [0.0 if s.feedforward is None else evaluate(s.feedforward, t)[0] for t in trace.t]
+    record |= dict(zip(columns.state, np.column_stack([trace.x, trace.v]).T, strict=False))
+    return record | {columns.reference: trace.r[:, 0], columns.feedforward: np.array(added)}
+
+
+def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
     """Return the record's known columns as float arrays.
+
+    Args:
+      period: s, of the rig's controller, at which a closed loop must be recorded; None for an open loop, whose columns
+        are interpolated at constant steps of their own.
 
     Raises:
       ScenarioError: a missing column, values that are not finite numbers, columns of different lengths, time that runs
@@ -64,7 +158,7 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float, rig: str
     """
     if not isinstance(record, Mapping):
         raise ScenarioError(f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)")
-    missing = [name for name in columns.needed if name not in record]
+    missing = [name for name in columns.needed(period is not None) if name not in record]
     if missing:
         has = ", ".join(map(str, record)) or "none"
         raise ScenarioError(f"the record of {rig} has no column {', '.join(missing)} (it has {has}): add it")
@@ -84,19 +178,29 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float, rig: str
             f"time of {rig} runs backward at sample {back[0] + 1}, from {t[back[0]]:.6g} s to {t[back[0] + 1]:.6g} s: "
             "give times that increase"
         )
-    step = float(np.median(np.diff(t)))
-    if abs(step - period) > RATE_TOLERANCE * period:
+    step = step_of(data, columns)
+    if period is not None and abs(step - period) > RATE_TOLERANCE * period:
         raise ScenarioError(
             f"the record of {rig} is sampled every {step:.4g} s and the rig's controller runs every {period:g} s: "
             "resample it, or record every command"
         )
-    gaps = np.flatnonzero(np.diff(t) > 1.5 * period)
+    gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else 1.5) * step)
     if len(gaps):
         raise ScenarioError(
             f"the record of {rig} has a gap after sample {gaps[0]}, from {t[gaps[0]]:.6g} s to {t[gaps[0] + 1]:.6g} s: "
             "fill it in, or cut the record there"
         )
+    if period is None:
+        even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
+        data = {name: np.interp(even, t, values) for name, values in data.items()}
+    for name, offset in zip(columns.x, columns.offset, strict=False):
+        data[name] = data[name] - offset
     return data
+
+
+def step_of(data: Record, columns: Columns) -> float:
+    """Return the median step of a record's time, s."""
+    return max(RESOLUTION, round(float(np.median(np.diff(data[columns.time]))) / RESOLUTION) * RESOLUTION)
 
 
 def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
@@ -117,7 +221,13 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
 
 
 def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and velocities at a sample, (n,) each, by a cubic through the samples about it."""
+    """Return positions and velocities at a sample, (n,) each.
+
+    They are those of the columns `state`, or without these those of a cubic through the samples about it.
+    """
+    if columns.state:
+        found = np.array([data[name][at] for name in columns.state])
+        return found[: len(columns.x)], found[len(columns.x) :]
     first = max(0, at - STATE_SAMPLES)
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)

@@ -20,14 +20,16 @@ from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import modules
 from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.time_series import TimeSeries
-from smc_mujoco.twins import records
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.twins import inverse, records
 from smc_mujoco.twins.records import Columns, Record
 
 Values = SimpleNamespace  # quantities by name
-FAR_BETTER = 50.0  # percent that a fit must gain to take a record's angles for degrees; chosen
+FAR_BETTER = 50.0  # percent that a fit must gain, and reach, to take a record's angles for degrees; chosen
 UNSCORED = -1e3  # percent, of a replay that fails or leaves the machine's range
 
 
@@ -63,7 +65,10 @@ class Rig:
       commands: (record, index of the start) -> what the rig adds to its controller's u from there on, (K,). None: only
         the column of the feedforward, if there is one.
       start, score_from: s after a record's first sample: where a replay starts, and from when its fit counts.
+      dynamics: quantities by name -> plant with the joints of the record, for records whose torques are predicted from
+        the measured motion; None: records are replayed.
       free: names of the quantities that its records determine, which `smc.identify` finds by default.
+      window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
       published: name of a parameter set -> values of quantities in it, with their source under "source".
       ensemble: sets of quantities that fit about as well, each a mapping name -> value.
       about: licence and history of the data, and what the twin predicts well and what not.
@@ -78,7 +83,9 @@ class Rig:
     commands: Callable[[Record, int], np.ndarray] | None = None
     start: float = 0.0
     score_from: float = 0.0
+    dynamics: Callable[[Values], Plant] | None = None
     free: tuple[str, ...] = ()
+    window: float = 1.0
     published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     ensemble: tuple[Mapping[str, float], ...] = ()
     about: str = ""
@@ -134,7 +141,12 @@ class Rig:
         return Scenario(**self.machine(Values(**self.values)) | own | fields)
 
     def replay(
-        self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None, rounded: bool = True
+        self,
+        record: Mapping[str, Any],
+        start: float | None = None,
+        duration: float | None = None,
+        rounded: bool = True,
+        closed: bool = True,
     ) -> Scenario:
         """Return the scenario that repeats a record from its measured state on.
 
@@ -147,42 +159,51 @@ class Rig:
           duration: s; None: to the end of the record.
           rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be
             predicted, so `fit` leaves rounding out by default.
+          closed: whether to close the loop where the controller is known; else the recorded command is replayed.
         """
-        data = records.checked(record, self.columns, self.period, self.name)
-        first = round((self.start if start is None else start) / self.period)
+        data = self.checked(record)
+        period = self.period or records.step_of(data, self.columns)
+        first = round((self.start if start is None else start) / period)
         last = len(data[self.columns.time]) - 1
         if duration is not None:
-            last = min(last, first + round(duration / self.period))
+            last = min(last, first + round(duration / period))
         if last - first < records.MIN_SAMPLES:
-            seconds = len(data[self.columns.time]) * self.period
             raise ScenarioError(
-                f"the record of {self.name} lasts {seconds:.3g} s, too short to repeat it from {first * self.period:g} "
-                f"s on: give at least {(first + records.MIN_SAMPLES) * self.period + self.period:.3g} s"
+                f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "
+                f"it from {first * period:g} s on: give at least {(first + records.MIN_SAMPLES + 1) * period:.3g} s"
             )
         fields = self.machine(Values(**self.values))
         sensor = fields.get("sensor")
         if sensor is not None and not rounded:
             fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
-        x, v = records.state(data, self.columns, self.period, first)
-        times = self.period * np.arange(last + 1 - first)
+        x, v = records.state(data, self.columns, period, first)
+        times = period * np.arange(last + 1 - first)
 
         def signal(values: np.ndarray) -> TimeSeries:
             return TimeSeries(times.tolist(), values[: len(times)].tolist())
 
-        known: dict[str, Any] = {"law": self.controller or "none", "duration": float(times[-1])}
-        known |= {"x0": tuple(x - (sensor.bias if sensor else 0.0)), "v0": tuple(v)}
-        if self.controller is None:
-            known["feedforward"] = signal(data[self.columns.u][first:])
+        own = self.controller if closed else None
+        known: dict[str, Any] = {"law": own or "none", "duration": float(times[-1])}
+        bias = sensor.bias if sensor and not self.columns.state else 0.0
+        known |= {"x0": tuple(x - bias), "v0": tuple(v)}
+        if own is None:
+            known |= {"feedforward": signal(data[self.columns.u][first:]), "control_period": period}
+            if self.controller is None:
+                fields.pop("physics_step", None)
         else:
             known["reference"] = signal(data[self.columns.reference][first:])
             added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
             known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
         return Scenario(**fields | known)
 
+    def checked(self, record: Mapping[str, Any]) -> Record:
+        """Return the columns of a record that a replay reads, (K,) each. Raise ScenarioError as `fit` does."""
+        return records.checked(record, self.columns, self.period, self.name)
+
     @functools.cached_property
-    def period(self) -> float:
-        """The control period, s."""
-        return self.scenario("none").control_period
+    def period(self) -> float | None:
+        """The control period of closed-loop records, s; None for records of an open loop, which have their own."""
+        return None if self.controller is None else self.scenario().control_period
 
     def fit(self, record: Mapping[str, Any], rounded: bool = False) -> dict[str, float]:
         """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
@@ -194,24 +215,16 @@ class Rig:
           rounded: whether the prediction is rounded to counts of the encoder.
 
         Returns:
-          Percentage of each joint's column, and, in a closed loop, of u.
+          Percentage of each joint's column and, in a closed loop, of "u"; of each torque where torques are predicted.
 
         Raises:
           ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
             angles in degrees.
         """
-        data = records.checked(record, self.columns, self.period, self.name)
-        least = round(self.score_from / self.period) + records.MIN_SAMPLES
-        if round(self.start / self.period) + records.MIN_SAMPLES <= len(data[self.columns.time]) < least:
-            raise ScenarioError(
-                f"the record of {self.name} lasts {len(data[self.columns.time]) * self.period:.3g} s, too short to "
-                f"score it from {self.score_from:g} s on: give at least {least * self.period:.3g} s"
-            )
         found = self.fits([record], rounded)[0]
         if min(found.values()) < 100.0 - FAR_BETTER and "rad" in self.scenario("none").plant.units:
-            radians = records.in_radians(record, self.columns)
-            other = self.fits([radians], rounded)[0]
-            if min(other.values()) > min(found.values()) + FAR_BETTER:
+            other = self.fits([records.in_radians(record, self.columns)], rounded)[0]
+            if min(other.values()) > max(FAR_BETTER, min(found.values()) + FAR_BETTER):
                 raise ScenarioError(
                     f"the angles of the record of {self.name} look like degrees, as it fits by "
                     f"{records.percent(other)} with them in radians and by {records.percent(found)} as they are: "
@@ -221,31 +234,70 @@ class Rig:
 
     def fits(self, many: list[Mapping[str, Any]], rounded: bool = False) -> list[dict[str, float]]:
         """Return `fit` of several records, without the check for degrees; they are simulated at once."""
-        scenarios = [self.replay(record, rounded=rounded) for record in many]
-        return [self._score(record, trace) for record, trace in zip(many, run(scenarios), strict=True)]
+        found = [percentages(*each[:2]) for each in self.predictions(many, rounded)]
+        return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
 
-    def predicted(self, trace: Any) -> dict[str, np.ndarray]:
-        """Return what the columns of the record would be in a replay, (K,) each."""
-        sensor = trace.scenario.sensor
-        bias = sensor.bias if sensor else 0.0
-        found = {name: trace.x[:, i] + bias for i, name in enumerate(self.columns.x)}
-        if sensor is not None:
-            for i, name in enumerate(self.columns.x):
-                if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad"):
-                    found[name] = quantum * np.floor(found[name] / quantum + 0.5)
-        return found | ({self.columns.u: trace.u[:, 0]} if self.controller else {})
-
-    def _score(self, record: Mapping[str, Any], trace: Any) -> dict[str, float]:
-        after = round((self.score_from - self.start) / self.period)
-        first = round(self.score_from / self.period)
-        found = {}
-        for name, values in self.predicted(trace).items():
-            y = np.asarray(record[name], float)[first : first + len(values) - after]
-            residual = np.linalg.norm(y - values[after:]) / np.linalg.norm(y - y.mean())
-            found["u" if name == self.columns.u else name] = (
-                100.0 * (1.0 - float(residual)) if np.isfinite(residual) else UNSCORED
-            )
+    def predictions(
+        self, many: list[Mapping[str, Any]], rounded: bool = False
+    ) -> list[tuple[Record, Record, np.ndarray]]:
+        """Return, of each record, the predicted columns, the measured ones and their times, from `score_from` on."""
+        data, time = [self.checked(record) for record in many], self.columns.time
+        if self.dynamics is not None:
+            return [
+                (self.torques(one), self.measured_torques(one), each[time])
+                for one, each in zip(many, data, strict=True)
+            ]
+        found = []
+        for each, trace in zip(data, run([self.replay(one, rounded=rounded) for one in many]), strict=True):
+            period = trace.scenario.control_period
+            first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
+            if len(trace.t) < after + records.MIN_SAMPLES:
+                seconds = (first + records.MIN_SAMPLES) * period
+                raise ScenarioError(
+                    f"the record of {self.name} lasts {len(each[time]) * period:.3g} s, too short to score it from "
+                    f"{self.score_from:g} s on: give at least {seconds:.3g} s"
+                )
+            predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
+            parts = {name: each[name][first : first + len(values)] for name, values in predicted.items()}
+            found.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
         return found
+
+    def predicted(self, trace: Trace) -> Record:
+        """Return what the columns of the record would be in a replay, (K,) each, without the columns' offset."""
+        sensor = trace.scenario.sensor
+        found = {}
+        for i, name in enumerate(self.columns.x):
+            found[name] = trace.x[:, i] + (sensor.bias if sensor else 0.0)
+            if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad") if sensor else 0.0:
+                found[name] = quantum * np.floor(found[name] / quantum + 0.5)
+        return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
+
+    def torques(self, record: Mapping[str, Any]) -> Record:
+        """Return the torque of each joint that the measured motion of a record takes, (K,), by inverse dynamics.
+
+        Positions, velocities and their slopes are those of a cubic through the samples about each.
+        """
+        return inverse.torques(self._dynamics(), self.checked(record), self.columns)
+
+    def measured_torques(self, record: Mapping[str, Any]) -> Record:
+        """Return the recorded torque of each joint, (K,), smoothed as the motion is in `torques`."""
+        return inverse.smoothed(self.checked(record), self.columns.torque)
+
+    def _dynamics(self) -> Plant:
+        if self.dynamics is None:
+            raise ScenarioError(f"records of {self.name} are repeated, and their torques not predicted: use fit")
+        return self.dynamics(Values(**self.values))
+
+
+def percentages(predicted: Record, measured: Record) -> dict[str, float]:
+    """Return the fit of each column, percent: 100 (1 - |y - yhat| / |y - mean y|)."""
+    found = {}
+    for name, values in predicted.items():
+        y = measured[name]
+        with np.errstate(all="ignore"):
+            share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
+        found[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
+    return found
 
 
 @functools.cache

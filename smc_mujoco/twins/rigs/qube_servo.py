@@ -96,6 +96,7 @@ QUBE_SERVO = Rig(
     commands=commands,
     start=2.0,
     score_from=4.0,
+    window=0.25,
     free=(
         "pendulum_length",
         "arm_length",

@@ -1,0 +1,366 @@
+"""Identification: from records to a rig's quantities, with standard errors, correlations and the fit on each record.
+
+Least squares of what the twin predicts: positions, and in a closed loop u, each relative to its variation in the
+record. A record is first repeated in short pieces, each from its measured state under the recorded command, because
+their cost is smooth; then as a whole, with the loop closed where the controller is known. All runs of a step are one
+batch. The search is scipy's trust region. `mujoco.sysid` was looked at: it rolls recorded controls out in an open loop,
+without controllers, encoders and delays, and needs an extra of ten packages.
+
+Standard errors allow for residuals that depend on their neighbours, and for short events that decide a quantity: they
+are those of a jackknife that leaves out one block of time after the other, at first order.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.files import write_json
+from smc_mujoco.common.progress import bar
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.twins import records as files
+from smc_mujoco.twins.records import Columns, Record
+from smc_mujoco.twins.rig import Quantity, Rig
+from smc_mujoco.twins.rig import rig as find_rig
+
+STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry friction makes shorter ones rough
+SPREAD = 0.2  # standard deviation of the logarithm of other starts of the search; chosen
+LIKE_ONE = 0.98  # correlation from which records cannot tell two quantities apart; chosen
+BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
+SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
+MOST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
+
+
+@dataclasses.dataclass(frozen=True)
+class Identified:
+    """What records tell of a rig.
+
+    Attributes:
+      rig: the rig with the values found.
+      before: the rig before.
+      values, errors: quantity -> value found, and its standard error.
+      correlations: of the errors, (p, p), in the order of `values`.
+      fits, fits_before: percentages of each record, see `Rig.fit`.
+      predictions: of each record, the predicted columns, the measured ones and their times.
+      evaluations: how many sets of values were simulated.
+    """
+
+    rig: Rig
+    before: Rig
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    correlations: np.ndarray
+    fits: tuple[Mapping[str, float], ...]
+    fits_before: tuple[Mapping[str, float], ...]
+    predictions: tuple[tuple[Record, Record, np.ndarray], ...]
+    evaluations: int
+
+    @property
+    def notes(self) -> list[str]:
+        """What the records cannot tell, in sentences."""
+        names, found = list(self.values), []
+        for i, one in enumerate(names):
+            for j, other in enumerate(names[:i]):
+                if abs(self.correlations[i, j]) > LIKE_ONE:
+                    found.append(f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})")
+        for name, value in self.values.items():
+            quantity = self.rig.quantities[name]
+            if value in (quantity.least, quantity.most):
+                found.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
+            elif self.errors[name] > abs(value):
+                found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
+        return found
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items())
+        return f"identified({self.rig.name!r}, {found})"
+
+    def save(self, path: str | Path) -> Path:
+        """Write values, errors, correlations and fits to a JSON file."""
+        quantities = {
+            name: {"value": value, "error": self.errors[name], "unit": self.rig.quantities[name].unit}
+            for name, value in self.values.items()
+        }
+        return write_json(
+            Path(path),
+            {
+                "rig": self.rig.name, "quantities": quantities, "correlations": self.correlations.tolist(),
+                "fits": [dict(fit) for fit in self.fits], "fits_before": [dict(fit) for fit in self.fits_before],
+            },
+        )  # fmt: skip
+
+    def figure(self, path: str | Path, record: int = 0) -> list[Path]:
+        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png."""
+        from smc_mujoco.twins.figure import residual_figure
+
+        return residual_figure(self, path, record)
+
+
+Source = Mapping[str, Any] | Trace
+
+
+def identify(
+    of: Rig | Plant | str,
+    records: Source | Sequence[Source],
+    quantities: Sequence[str] | None = None,
+    *,
+    starts: int = 4,
+    seed: int = 0,
+    most: int = 30,
+    progress: bool = False,
+) -> Identified:
+    """Find a rig's quantities from records.
+
+    Args:
+      of: a Rig or the name of one; or a Plant, whose records are traces or columns named as theirs.
+      records: one record or several: columns by name (see `Rig.columns`), or traces of simulated runs.
+      quantities: names of those to find; None: the rig's `free`, all parameters of a plant.
+      starts: how many sets of values the search may start from: the present one, and others at random about it.
+      seed: of these starts. The same seed gives the same result.
+      most: steps of the search, at most.
+      progress: whether to show a progress bar.
+
+    Raises:
+      ScenarioError: an unknown quantity, records that are none, or records that cannot tell the quantities apart.
+    """
+    many = list(records) if isinstance(records, Sequence) else [records]
+    if not many:
+        raise ScenarioError("there are no records: give at least one")
+    twin, data = _twin(of, many)
+    names = list(twin.free if quantities is None else quantities)
+    for name in names:
+        find(f"quantity of {twin.name}", name, twin.quantities)
+    if not names:
+        raise ScenarioError(f"{twin.name} has no quantities to find: name some, of {', '.join(twin.quantities)}")
+    whole("starts", starts, 1, 1000)
+    whole("seed", seed, 0, 2**53 - 1)
+    checked = [twin.checked(record) for record in data]
+    fits_before = tuple(twin.fits(data))  # also refuses records that are too short
+    with bar(f"identify {twin.name}", most * (2 * len(names) + 1), shown=progress) as drawn:
+        search = Search(twin, names, data, checked, drawn.advance)
+        stages = ("pieces", "whole") if twin.dynamics is None and twin.window else ("whole",)
+        z = search.best_start(stages[0], starts, seed)
+        for stage in stages:
+            z = search.refine(stage, z, most)
+        values, errors, correlations = search.statistics(z)
+    found = twin.with_values(values, "identified from records")
+    return Identified(
+        rig=found, before=twin, values=values, errors=errors, correlations=correlations,
+        fits=tuple(found.fits(data)), fits_before=fits_before, predictions=tuple(found.predictions(data)),
+        evaluations=search.evaluations,
+    )  # fmt: skip
+
+
+class Search:
+    """Least squares over some quantities of a rig, in units of their scales."""
+
+    def __init__(
+        self,
+        twin: Rig,
+        names: list[str],
+        data: list[Mapping[str, Any]],
+        checked: list[Record],
+        report: Callable[[int], None],
+    ):
+        self.twin, self.names, self.data, self.checked, self.report = twin, names, data, checked, report
+        known = [twin.quantities[name] for name in names]
+        self.scales = np.array([_scale(quantity) for quantity in known])
+        self.low = np.array([quantity.least for quantity in known]) / self.scales
+        self.high = np.array([quantity.most for quantity in known]) / self.scales
+        self.evaluations = 0
+
+    def rig(self, z: np.ndarray) -> Rig:
+        """Return the rig at a point of the search, (p,)."""
+        z = np.clip(z, self.low, self.high)
+        return self.twin.with_values({n: float(v) for n, v in zip(self.names, z * self.scales, strict=True)})
+
+    def residuals(self, points: Sequence[np.ndarray], stage: str) -> list[np.ndarray]:
+        """Return the residuals at each point, (N,)."""
+        compared = self.compared(points, stage)
+        return [np.concatenate([self._relative(*each) for each in one]) for one in compared]
+
+    def compared(self, points: Sequence[np.ndarray], stage: str) -> list[list[tuple[Record, Record, Any]]]:
+        """Return what is predicted and what was measured in each piece at each point; all runs are one batch."""
+        self.evaluations += len(points)
+        rigs = [self.rig(z) for z in points]
+        if self.twin.dynamics is not None:
+            found = [rig.predictions(self.data) for rig in rigs]
+        else:
+            plan = [(i, at) for i in range(len(self.data)) for at in self._pieces(i, stage)]
+            scenarios = [
+                rig.replay(self.data[i], *at, rounded=False, closed=stage == "whole") for rig in rigs for i, at in plan
+            ]
+            traces = run(scenarios)
+            size = len(plan)
+            found = [
+                [
+                    self._compared(rig, i, at, trace)
+                    for (i, at), trace in zip(plan, traces[k * size :][:size], strict=True)
+                ]
+                for k, rig in enumerate(rigs)
+            ]
+        self.report(len(points))
+        return found
+
+    def _pieces(self, i: int, stage: str) -> list[tuple[float, float | None]]:
+        """Return start and duration of the pieces of a record, s."""
+        t = self.checked[i][self.twin.columns.time]
+        whole, start = float(t[-1] - t[0]), self.twin.start
+        count = int((whole - start) / self.twin.window) if stage == "pieces" or self.twin.controller is None else 0
+        if count < 2:
+            return [(start, None)]
+        return [(start + k * self.twin.window, self.twin.window) for k in range(count)]
+
+    def _compared(self, rig: Rig, i: int, at: tuple[float, float | None], trace: Trace) -> tuple[Record, Record, int]:
+        first = round(at[0] / trace.scenario.control_period)
+        skipped = 0 if at[1] else round((rig.score_from - rig.start) / trace.scenario.control_period)
+        predicted = {name: values[skipped:] for name, values in rig.predicted(trace).items()}
+        measured = {
+            name: self.checked[i][name][first + skipped : first + skipped + len(values)]
+            for name, values in predicted.items()
+        }
+        return predicted, measured, i
+
+    def _relative(self, predicted: Record, measured: Record, which: Any) -> np.ndarray:
+        """Return the residuals of all columns, one after the other, relative to each column's variation."""
+        found = []
+        for name, values in predicted.items():
+            column = self.checked[which][name] if isinstance(which, int) else measured[name]
+            spread = np.linalg.norm(column - column.mean()) or 1.0
+            residual = (measured[name] - values) / spread
+            found.append(np.clip(np.nan_to_num(residual, nan=MOST, posinf=MOST, neginf=-MOST), -MOST, MOST))
+        return np.concatenate(found)
+
+    def best_start(self, stage: str, starts: int, seed: int) -> np.ndarray:
+        """Return the point of least cost among the present values and random ones about them."""
+        rng = np.random.default_rng(seed)
+        here = np.array([self.twin.values[name] for name in self.names]) / self.scales
+        points = [here] + [
+            np.clip(here * np.exp(SPREAD * rng.standard_normal(len(here))), self.low, self.high)
+            for _ in range(starts - 1)
+        ]
+        costs = [float(np.sum(residual**2)) for residual in self.residuals(points, stage)]
+        return points[int(np.argmin(costs))]
+
+    def refine(self, stage: str, z: np.ndarray, most: int) -> np.ndarray:
+        """Return the point of least squares near z."""
+        inside = np.clip(z, self.low + 1e-9, self.high - 1e-9)
+        found = least_squares(
+            lambda z: self.residuals([z], stage)[0], inside, lambda z: self.jacobian(z, stage),
+            bounds=(self.low, self.high), x_scale=1.0, max_nfev=most, ftol=1e-6, xtol=1e-6,
+        )  # fmt: skip
+        return found.x
+
+    def jacobian(self, z: np.ndarray, stage: str) -> np.ndarray:
+        """Return the slopes of the residuals, (N, p), by differences that stay in range."""
+        ahead = [np.clip(z + STEP * e, self.low, self.high) for e in np.eye(len(z))]
+        back = [np.clip(z - STEP * e, self.low, self.high) for e in np.eye(len(z))]
+        both = self.residuals(ahead + back, stage)
+        return np.column_stack([(both[i] - both[i + len(z)]) / (ahead[i][i] - back[i][i]) for i in range(len(z))])
+
+    def statistics(self, z: np.ndarray) -> tuple[dict[str, float], dict[str, float], np.ndarray]:
+        """Return values, standard errors and correlations at the solution.
+
+        Raises:
+          ScenarioError: records that cannot tell the quantities apart.
+        """
+        J, r = self.jacobian(z, "whole"), self.residuals([z], "whole")[0]
+        sizes = np.linalg.norm(J, axis=0)
+        for name, size in zip(self.names, sizes, strict=True):
+            if size == 0.0:
+                raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
+        _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
+        if singular[-1] < SAME * singular[0]:
+            alike = [self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]]
+            raise ScenarioError(
+                f"the records of {self.twin.name} cannot tell {' and '.join(alike)} apart: leave one out, or give a "
+                "longer record or one of a richer motion"
+            )
+        covariance = self._jackknife(J, r, z)
+        deviation = np.sqrt(np.diag(covariance))
+        with np.errstate(all="ignore"):
+            correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+        values = dict(zip(self.names, (z * self.scales).tolist(), strict=True))
+        errors = dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
+        return values, errors, correlations
+
+    def _jackknife(self, J: np.ndarray, r: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""
+        blocks, count = [], 0
+        pieces = self.compared([z], "whole")[0]
+        parts = max(1, -(-BLOCKS * len(self.data) // len(pieces)))
+        for predicted, _, _ in pieces:
+            blocks += [count + np.arange(len(values)) * parts // len(values) for values in predicted.values()]
+            count += parts
+        which, A = np.concatenate(blocks), J.T @ J
+        moves = np.zeros((count, len(z)))
+        for b in range(count):
+            mine, errors = J[which == b], r[which == b]
+            moves[b] = np.linalg.lstsq(A - mine.T @ mine, mine.T @ errors, rcond=None)[0]
+        return (count - 1) / count * moves.T @ moves
+
+
+def _scale(quantity: Quantity) -> float:
+    """Return the size of a quantity: its value, or for 0 a hundredth of its range."""
+    span = quantity.most - quantity.least
+    return max(abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0))
+
+
+def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
+    """Return the rig to identify, and its records as columns."""
+    if isinstance(of, str):
+        of = find_rig(of)
+    traces = [one for one in many if isinstance(one, Trace)]
+    if isinstance(of, Plant):
+        of = _of_plant(of, traces[0].scenario if traces else None)
+    if not isinstance(of, Rig):
+        raise ScenarioError(f"cannot identify {shown(of)}: give a rig, the name of one, or a smc.Plant")
+    if not traces:
+        return of, list(many)
+    if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
+        raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
+    law = traces[0].scenario.law
+    state = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in of.columns.x)
+    of = dataclasses.replace(
+        of, controller=None if law.name == "none" else law, commands=None, dynamics=None, start=0.0, score_from=0.0,
+        columns=dataclasses.replace(of.columns, state=state, v=(), torque=()),
+    )  # fmt: skip
+    return of, [files.of_trace(trace, of.columns) for trace in traces]
+
+
+def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
+    """Return a rig of a plant's parameters, in the scenario of a run."""
+    own = {}
+    if base is not None:
+        kept = (
+            "control_period",
+            "friction",
+            "contact",
+            "actuator",
+            "sensor",
+            "u_max",
+            "input_delay",
+            "velocity",
+            "model",
+        )
+        own = {name: getattr(base, name) for name in kept if getattr(base, name) is not None}
+    least = {name: 1e-6 if name in plant.positive else -np.inf for name in plant.parameters}
+    ends = [""] if plant.n == 1 else [str(i) for i in range(plant.n)]
+    return Rig(
+        name=plant.name,
+        label=plant.label or plant.name,
+        quantities={
+            name: Quantity(value, "", "nominal value of the plant", least[name])
+            for name, value in plant.parameters.items()
+        },
+        machine=lambda q: own | {"plant": dataclasses.replace(plant, parameters=vars(q))},
+        columns=Columns(x=tuple(f"x{end}" for end in ends), u=f"u{ends[0]}", reference=f"r{ends[0]}"),
+        free=tuple(name for name, value in plant.parameters.items() if value and name != "grav"),
+    )

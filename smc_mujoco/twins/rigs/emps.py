@@ -1,0 +1,54 @@
+"""EMPS: an electro-mechanical positioning system, a carriage on a ball screw that a voltage drives.
+
+The records are closed loops of the published cascade at 1 kHz. The amplifier is current-controlled, so there is no
+back-EMF: the motor here has one too small to notice.
+"""
+
+import math
+
+from smc_mujoco.control.estimator import estimator
+from smc_mujoco.control.rig_controllers import cascade
+from smc_mujoco.mechanisms.hardware.drives import DCMotor
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.twins.records import Columns
+from smc_mujoco.twins.rig import Quantity, Rig
+
+PERIOD = 1e-3  # s
+BACK_EMF = 1e-6  # V s/m: too small to notice
+PUBLISHED = "A. Janot, M. Gautier and M. Brunot, Data set and reference models of EMPS, 2019"
+
+
+def machine(q):
+    """Return the fields of a scenario."""
+    motor = DCMotor(
+        resistance=BACK_EMF / q.force_per_volt, inductance=0.0, torque_constant=BACK_EMF, gear=1.0, rotor_inertia=0.0,
+        voltage=10.0, current=math.inf, command="voltage",
+    )  # fmt: skip
+    return {
+        "plant": plant("servo_axis", M=q.mass, b=q.viscous, cf=q.coulomb, offset=q.offset),
+        "actuator": motor,
+        "sensor": Encoder(counts=round(1.0 / q.count)),
+        "velocity": estimator("filtered_difference", tau=0.0),
+        "control_period": PERIOD,
+        "x0": 0.0,
+    }
+
+
+EMPS = Rig(
+    name="emps",
+    label="EMPS, an electro-mechanical positioning system",
+    quantities={
+        "mass": Quantity(95.1089, "kg", PUBLISHED, 1.0, 1e4),
+        "viscous": Quantity(203.5034, "N s/m", PUBLISHED, 0.0, 1e5),
+        "coulomb": Quantity(20.3935, "N", PUBLISHED, 0.0, 1e4),
+        "offset": Quantity(-3.1648, "N", PUBLISHED, -1e3, 1e3),
+        "force_per_volt": Quantity(35.1507, "N/V", PUBLISHED, 0.1, 1e4),
+        "count": Quantity(5e-8, "m", PUBLISHED, 1e-9, 1e-2),
+    },
+    machine=machine,
+    controller=cascade(),
+    columns=Columns(x=("x",), u="u", reference="r"),
+    free=("mass", "viscous", "coulomb", "offset"),
+    about="No records are at hand here: the numbers are the published ones.",
+)

@@ -1,0 +1,113 @@
+"""Quanser's rigs by their published parameters alone: QUBE-Servo 2 and 3, IP02 cart, SRV02 rotary pendulum.
+
+No records of them are at hand, so nothing here is identified. Their amplifiers' dead band is left out.
+"""
+
+import math
+
+from smc_mujoco.mechanisms.hardware.drives import DCMotor
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.twins.rig import Quantity, Rig
+
+DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
+QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual"
+IP02 = "Quanser, IP02 linear servo, user manual"
+SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals"
+
+
+def motor(q):
+    """Return the motor and gearbox of a rig. Losses of a gearbox count as more resistance, which acts alike."""
+    return DCMotor(
+        resistance=q.resistance / q.efficiency, inductance=q.inductance / q.efficiency,
+        torque_constant=q.torque_constant, gear=q.gear, rotor_inertia=q.rotor_inertia, voltage=q.voltage,
+        current=math.inf, command="voltage",
+    )  # fmt: skip
+
+
+def rotary(q):
+    """Return the fields of a scenario of a rotary pendulum."""
+    furuta = plant(
+        "furuta", J=q.arm_inertia, L=q.arm_length, m=q.pendulum_mass, l=q.pendulum_centre, Jc=q.pendulum_inertia,
+        b=q.arm_damping, bq=q.pendulum_damping,
+    )  # fmt: skip
+    return {
+        "plant": furuta, "actuator": motor(q), "sensor": Encoder(counts=round(q.counts)), "control_period": 2e-3,
+        "x0": (0.0, 0.1),
+    }  # fmt: skip
+
+
+def linear(q):
+    """Return the fields of a scenario of a cart with a pole."""
+    cart = plant("cart_pole", M=q.cart_mass, m=q.pole_mass, l=q.pole_half_length, b=q.cart_damping, bq=q.pole_damping)
+    return {
+        "plant": cart, "actuator": motor(q), "sensor": Encoder(counts=round(q.counts)), "control_period": 1e-3,
+        "x0": (0.0, 0.1),
+    }  # fmt: skip
+
+
+def electric(source, resistance, inductance, torque_constant, rotor, gear=1.0, efficiency=1.0, voltage=10.0):
+    """Return the quantities of a motor and gearbox, (value, unit) of one source."""
+    return {
+        "resistance": Quantity(resistance, "ohm", source, 1e-3),
+        "inductance": Quantity(inductance, "H", source, 0.0),
+        "torque_constant": Quantity(torque_constant, "N m/A", source, 1e-6),
+        "rotor_inertia": Quantity(rotor, "kg m^2", source, 0.0),
+        "gear": Quantity(gear, "", source, 1e-3),
+        "efficiency": Quantity(efficiency, "", source, 0.01, 1.0),
+        "voltage": Quantity(voltage, "V", source, 0.1),
+    }
+
+
+def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia, damping, counts):
+    """Return the quantities of an arm and a pendulum of one source."""
+    return {
+        "arm_inertia": Quantity(arm_inertia, "kg m^2", source, 1e-7),
+        "arm_length": Quantity(arm_length, "m", source, 1e-3),
+        "arm_damping": Quantity(arm_damping, "N m s/rad", source, 0.0),
+        "pendulum_mass": Quantity(mass, "kg", source, 1e-4),
+        "pendulum_centre": Quantity(centre, "m", source, 1e-3),
+        "pendulum_inertia": Quantity(inertia, "kg m^2", source, 1e-8),
+        "pendulum_damping": Quantity(damping, "N m s/rad", source, 0.0),
+        "counts": Quantity(counts, "1/turn", source, 2.0),
+    }
+
+
+QUBE_SERVO_2 = Rig(
+    name="qube_servo_2",
+    label="QUBE-Servo 2 with rotary pendulum, by its published parameters",
+    quantities=electric(DRIVER, 8.4, 1.16e-3, 0.042, 4e-6)
+    | pendulum(DRIVER, 0.095 * 0.085**2 / 12, 0.085, 5e-5, 0.024, 0.129 / 2, 0.024 * 0.129**2 / 12, 2.5e-6, 2048.0),
+    machine=rotary,
+    about="The arm's inertia is m r^2/12: with m r^2/3 a controller that balances the machine lets the twin fall.",
+)
+QUBE_SERVO_3 = Rig(
+    name="qube_servo_3",
+    label="QUBE-Servo 3 with rotary pendulum, by its published parameters",
+    quantities=electric(QUBE_3, 7.5, 1.15e-3, 0.0422, 1.4e-6)
+    | pendulum(QUBE_3, 0.095 * 0.085**2 / 3, 0.085, 1e-3, 0.024, 0.129 / 2, 0.024 * 0.129**2 / 12, 5e-5, 2048.0),
+    machine=rotary,
+    about="As published, with m r^2/3 for the arm, which records of the first QUBE-Servo speak against.",
+)
+SRV02_PENDULUM = Rig(
+    name="srv02",
+    label="SRV02 with rotary pendulum, by its published parameters",
+    quantities=electric(SRV02, 2.6, 0.18e-3, 7.68e-3, 3.9e-7, gear=70.0, efficiency=0.9 * 0.69)
+    | pendulum(SRV02, 2e-3, 0.216, 2.4e-3, 0.127, 0.156, 1.2e-3, 2.4e-3, 4096.0),
+    machine=rotary,
+)
+IP02_CART = Rig(
+    name="ip02",
+    label="IP02 cart with a pendulum, by its published parameters",
+    quantities=electric(IP02, 2.6, 0.18e-3, 7.67e-3, 3.9e-7, gear=3.71 / 6.35e-3)
+    | {
+        "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
+        "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
+        "pole_mass": Quantity(0.23, "kg", "Quanser, linear pendulum of 64 cm, user manual", 1e-3),
+        "pole_half_length": Quantity(0.3302, "m", "Quanser, linear pendulum of 64 cm, user manual", 1e-3),
+        "pole_damping": Quantity(2.4e-3, "N m s/rad", "Quanser, linear pendulum, user manual", 0.0),
+        "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
+    },
+    machine=linear,
+    about="The cart is read with the pendulum's 4096 counts, a metre in place of a turn; the machine's are 22.75 um.",
+)

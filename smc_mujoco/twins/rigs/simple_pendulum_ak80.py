@@ -1,0 +1,47 @@
+"""Torque-limited simple pendulum on an AK80-6 motor, which takes torques.
+
+Its links' masses and lengths count only by the inertia J and the moment m c of their weight. The plant has them as a
+point mass m = (m c)^2 / J at l = J / (m c). Records have the position from hanging, the plant that from upright.
+"""
+
+import math
+
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.twins.records import Columns
+from smc_mujoco.twins.rig import Quantity, Rig
+
+SOURCE = "dfki-ric-underactuated-lab/torque_limited_simple_pendulum (BSD-3)"
+FOUND = f"between the values found in runs of {SOURCE}"
+
+
+def machine(q):
+    """Return the fields of a scenario."""
+    l = q.inertia / q.mass_moment
+    return {
+        "plant": plant("inverted_pendulum", m=q.mass_moment / l, l=l, b=q.viscous),
+        "friction": Coulomb(q.coulomb),
+        "sensor": Encoder(counts=4096),
+        "u_max": q.torque_limit,
+        "control_period": 2e-3,
+        "x0": -math.pi,
+    }
+
+
+SIMPLE_PENDULUM = Rig(
+    name="simple_pendulum_ak80",
+    label="Torque-limited simple pendulum with an AK80-6 motor",
+    quantities={
+        "inertia": Quantity(0.1635, "kg m^2", FOUND, 1e-3, 10.0),
+        "mass_moment": Quantity(0.33, "kg m", FOUND, 1e-3, 10.0),
+        "viscous": Quantity(0.0, "N m s/rad", "part of coulomb in the published values", 0.0, 10.0),
+        "coulomb": Quantity(0.21, "N m", FOUND, 0.0, 10.0),
+        "torque_limit": Quantity(12.0, "N m", f"AK80-6, in {SOURCE}", 0.1, 100.0),
+    },
+    machine=machine,
+    columns=Columns(time="time", x=("position",), u="torque", offset=(math.pi,)),
+    free=("inertia", "mass_moment", "viscous", "coulomb"),
+    window=1.0,
+    about="Open-loop records at several rates: the recorded torque is replayed in pieces.",
+)

@@ -1,0 +1,145 @@
+"""Identification returns what made the records, and says what records cannot tell."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.twins import records
+
+AXIS = smc.rig("emps")
+PENDULUM = smc.rig("simple_pendulum_ak80")
+WRONG = {"mass": 80.0, "viscous": 150.0, "coulomb": 30.0, "offset": 0.0}
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """2 s of the axis on a sine, read by its encoder."""
+    return smc.run(AXIS.scenario(duration=2.0, reference=smc.Sine(0.05, 4.0), x0=0.0))
+
+
+@pytest.fixture(scope="module")
+def found(moved):
+    return smc.identify(AXIS.with_values(WRONG), moved, starts=1)
+
+
+@pytest.fixture(scope="module")
+def swung():
+    """4 s of the pendulum under a torque, with noise."""
+    return smc.run(
+        PENDULUM.scenario(
+            "none", feedforward=smc.Sine(2.0, 4.5), duration=4.0, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
+        )
+    )
+
+
+def test_the_published_axis_is_found_within_two_percent(found):
+    assert set(found.values) == set(AXIS.free)
+    for name, value in found.values.items():
+        assert value == pytest.approx(AXIS.values[name], rel=0.02)
+    assert min(found.fits[0].values()) > 99.0
+    assert found.fits_before[0]["u"] < 60.0
+    assert found.rig.quantities["mass"].source == "identified from records"
+
+
+def test_the_same_seed_gives_the_same_result(moved, found):
+    again = smc.identify(AXIS.with_values(WRONG), moved, starts=1)
+    assert again.values == found.values
+    assert again.errors == found.errors
+
+
+def test_several_starts_end_where_one_does(moved, found):
+    several = smc.identify(AXIS.with_values(WRONG), moved, starts=3, seed=5)
+    for name, value in several.values.items():
+        assert value == pytest.approx(found.values[name], rel=0.01)
+
+
+def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
+    free = ("inertia", "mass_moment", "coulomb")
+    result = smc.identify(PENDULUM.with_values({"inertia": 0.15, "coulomb": 0.15}), swung, free, starts=1)
+    for name in free:
+        assert abs(result.values[name] - PENDULUM.values[name]) < 3.0 * result.errors[name]
+        assert result.errors[name] < 0.05 * PENDULUM.values[name]
+
+
+def test_what_cannot_be_told_apart_is_said(swung):
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
+    assert str(error.value) == "nothing in the records depends on torque_limit: leave it out, or give other records"
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.identify(AXIS, smc.run(AXIS.scenario(duration=0.06, x0=0.0)), starts=1)
+    assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(error.value)
+
+
+def test_a_plants_own_parameters_are_found_from_a_run():
+    plant = smc.plant("duffing")
+    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=4.0))
+    wrong = smc.plant("duffing", M=1.2, delta=0.1)
+    result = smc.identify(wrong, run, ("M", "delta"), starts=1)
+    assert result.values == pytest.approx({name: plant.parameters[name] for name in ("M", "delta")}, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda run: smc.identify("emps", []), "there are no records: give at least one"),
+        (lambda run: smc.identify("emps", run, ["weight"]), "unknown quantity of emps 'weight': "),
+        (lambda run: smc.identify("emps", run, []), "emps has no quantities to find: name some, of mass"),
+        (lambda run: smc.identify("ip02", run), "ip02 has no quantities to find: name some, of resistance"),
+        (lambda run: smc.identify(3, run), "cannot identify 3: give a rig, the name of one, or a smc.Plant"),
+        (lambda run: smc.identify("emps", run, starts=0), "starts is 0: give a whole number from 1 to 1000"),
+        (lambda run: smc.identify("emps", [run, {"t": [0]}]), "records are traces of one law, or columns"),
+    ],
+)
+def test_bad_questions_get_one_sentence(make, sentence, moved):
+    with pytest.raises(smc.ScenarioError) as error:
+        make(moved)
+    assert sentence in str(error.value)
+
+
+def test_results_are_saved_and_drawn(found, tmp_path):
+    data = json.loads(found.save(tmp_path / "a.json").read_text())
+    assert data["quantities"]["mass"]["unit"] == "kg"
+    assert len(data["correlations"]) == 4
+    assert [path.suffix for path in found.figure(tmp_path / "fit")] == [".svg", ".png"]
+    assert all(path.stat().st_size > 1000 for path in tmp_path.glob("fit.*"))
+
+
+def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
+    columns = records.of_trace(moved, AXIS.columns)
+    np.savez(tmp_path / "a.npz", **columns)
+    with (tmp_path / "a.csv").open("w") as file:
+        writer = csv.writer(file)
+        writer.writerow([f"{name} [s]" if name == "t" else name for name in columns])
+        writer.writerows(zip(*columns.values(), strict=True))
+    moved.save(tmp_path / "trace.npz")
+    for name in ("a.npz", "a.csv"):
+        read = records.load(tmp_path / name)
+        assert all(np.array_equal(read[key], columns[key]) for key in columns)
+    np.testing.assert_array_equal(records.load(tmp_path / "trace.npz").x, moved.x)
+    renamed = records.load(tmp_path / "a.csv", {"position": "x"})
+    np.testing.assert_array_equal(renamed["position"], columns["x"])
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("t,x\n0,1\n1\n", "line 3: 1 cells for 2 columns: give one for each"),
+        ("t,x\n", "has 1 lines: give a first line with the columns' names, and samples"),
+    ],
+)
+def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path):
+    (tmp_path / "a.csv").write_text(content)
+    with pytest.raises(smc.ScenarioError) as error:
+        records.load(tmp_path / "a.csv")
+    assert sentence in str(error.value)
+    with pytest.raises(smc.ScenarioError, match="no file at"):
+        records.load(tmp_path / "b.csv")
+
+
+def test_noise_of_a_run_is_in_its_record(swung):
+    noise = records.of_trace(swung, PENDULUM.columns)["position"] - math.pi - swung.x[:, 0]
+    assert np.std(noise) == pytest.approx(math.hypot(1e-3, 2 * math.pi / 4096 / math.sqrt(12)), rel=0.1)
