@@ -252,9 +252,10 @@ class Search:
     def refine(self, stage: str, z: np.ndarray, most: int) -> np.ndarray:
         """Return the point of least squares near z."""
         inside = np.clip(z, self.low + 1e-9, self.high - 1e-9)
+        slopes: Any = lambda z: self.jacobian(z, stage)  # noqa: E731  # scipy's stub takes names alone
         found = least_squares(
-            lambda z: self.residuals([z], stage)[0], inside, lambda z: self.jacobian(z, stage),
-            bounds=(self.low, self.high), x_scale=1.0, max_nfev=most, ftol=1e-6, xtol=1e-6,
+            lambda z: self.residuals([z], stage)[0], inside, slopes, bounds=(self.low, self.high), max_nfev=most,
+            ftol=1e-6, xtol=1e-6,
         )  # fmt: skip
         return found.x
 
@@ -323,7 +324,7 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
     if not isinstance(of, Rig):
         raise ScenarioError(f"cannot identify {shown(of)}: give a rig, the name of one, or a smc.Plant")
     if not traces:
-        return of, list(many)
+        return of, [one for one in many if not isinstance(one, Trace)]
     if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
         raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
     law = traces[0].scenario.law

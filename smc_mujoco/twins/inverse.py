@@ -13,7 +13,7 @@ SAMPLES, ORDER = 21, 3  # of the cubic about each sample; chosen: 42 ms at 500 H
 
 def smoothed(data: Record, names: tuple[str, ...]) -> Record:
     """Return columns, each sample replaced by the cubic through the samples about it, (K,)."""
-    return {name: savgol_filter(data[name], SAMPLES, ORDER) for name in names}
+    return {name: np.asarray(savgol_filter(data[name], SAMPLES, ORDER)) for name in names}
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:
@@ -23,7 +23,9 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     step = step_of(data, columns)
     x = np.column_stack(list(smoothed(data, columns.x).values()))
     v = np.column_stack(list(smoothed(data, columns.v).values()))
-    a = np.column_stack([savgol_filter(data[name], SAMPLES, ORDER, deriv=1, delta=step) for name in columns.v])
+    a = np.column_stack(
+        [np.asarray(savgol_filter(data[name], SAMPLES, ORDER, deriv=1, delta=step)) for name in columns.v]
+    )
     found = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):

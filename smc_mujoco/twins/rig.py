@@ -194,7 +194,7 @@ class Rig:
             known["reference"] = signal(data[self.columns.reference][first:])
             added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
             known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
-        return Scenario(**fields | known)
+        return Scenario.recorded(**fields | known)
 
     def checked(self, record: Mapping[str, Any]) -> Record:
         """Return the columns of a record that a replay reads, (K,) each. Raise ScenarioError as `fit` does."""
