@@ -163,7 +163,8 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     """
     if isinstance(needs, str):
         needs = [name.strip() for name in needs.split(",") if name.strip()]
-    names = list(dict.fromkeys(listed("needs", needs))) if needs else []
+    nothing = isinstance(needs, list | tuple) and not needs
+    names = [] if nothing else list(dict.fromkeys(listed("needs", needs)))
     for name in names:
         if name not in NEEDS and name not in PROPERTIES:
             raise unknown("need", name, [*NEEDS, *PROPERTIES])

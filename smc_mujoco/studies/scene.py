@@ -50,7 +50,7 @@ class Scene:
     figure: str = "overview"
     answers: tuple[str, ...] = ()
     facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    answer: Callable[[Outcome], str] = summary
+    answer: Callable[[Outcome], str] = dataclasses.field(default_factory=lambda: summary)
     camera: Camera | None = None
 
     def __post_init__(self):
