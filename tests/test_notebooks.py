@@ -35,7 +35,8 @@ SAID = {
         assert s[0] > 0.0 and s.min() < -0.1 and 0.05 < rises.mean() < 0.15
         assert boards[0].verdict.startswith("winner: observer_free")
         tv = {(b.condition, law): b.medians[law] for b in boards[0].blocks for law in b.medians}
-        assert tv["noise", "observer_free"] > 100 * tv["nominal", "observer_free"]
+        gain = {at: tv[at, "classical"] / tv[at, "observer_free"] for at in ("nominal", "noise")}
+        assert gain["nominal"] > 1000.0 and 1.0 < gain["noise"] < 20.0
     """,
 }
 

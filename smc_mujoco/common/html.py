@@ -107,7 +107,9 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
     words = [
         f'<text x="{left}" y="11" {letters} font-weight="bold">{text(heading)}</text>',
         f'<text x="{left - 4}" y="{top + 8}" {letters} text-anchor="end">{high:.3g}</text>',
-        f'<text x="{left - 4}" y="{end}" {letters} text-anchor="end">{low:.3g}</text>' if high > low else "",
+        f'<text x="{left - 4}" y="{end}" {letters} text-anchor="end">{low:.3g}</text>'
+        if f"{low:.3g}" != f"{high:.3g}"
+        else "",
         f'<text x="{left}" y="{HEIGHT - 5}" {letters}>{t[0]:.3g}</text>',
         f'<text x="{WIDTH - right}" y="{HEIGHT - 5}" {letters} text-anchor="end">{t[-1]:.3g} s</text>',
     ]

@@ -59,7 +59,7 @@ def _panels(found: "Trace") -> list[Html]:
     s, plant, panels = found.scenario, found.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
         channels = [i for i, own in enumerate(plant.units) if own == unit][:MAX_CHANNELS]
-        reference = found.r[:, channels[0]] if found.r[:, channels].any() else None
+        reference = found.r[:, channels[0]] if np.nan_to_num(found.r[:, channels]).any() else None
         panels.append(panel(found.t, list(found.x[:, channels].T), f"x ({unit})", reference))
     for unit in dict.fromkeys(s.efforts[: plant.driven]):
         channels = [i for i, own in enumerate(s.efforts[: plant.driven]) if own == unit][:MAX_CHANNELS]

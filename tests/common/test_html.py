@@ -67,6 +67,14 @@ def test_larger_values_stand_higher_and_the_reference_is_dashed():
     assert svg.count("stroke-dasharray") == 1
 
 
+def test_a_range_is_labelled_once_where_its_ends_read_alike():
+    for y, labels in ((np.array([1.5, 1.4999]), ["1.5"]), (np.ones(2), ["1"]), (np.array([1.5, 1.4]), ["1.5", "1.4"])):
+        words = [
+            node.text for node in parsed(html.panel(np.arange(2.0), [y], "x")).iter() if node.tag.endswith("}text")
+        ]
+        assert words == ["x", *labels, "0", "1 s"]
+
+
 def test_what_is_not_finite_is_left_out():
     t = np.arange(5.0)
     (curve,) = points(html.panel(t, [np.array([0.0, 1.0, np.nan, np.inf, 2.0])[[0, 1, 2, 2, 4]]], "x"))

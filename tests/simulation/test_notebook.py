@@ -84,6 +84,8 @@ def test_a_trace_that_failed_says_how():
     failed = smc.run(smc.Scenario(plant="duffing", law=sour(), duration=0.05))
     assert cells(failed)["failed"] == failed.failure
     assert "&lt;sour&gt;" in failed._repr_html_()
+    assert np.isnan(failed.r[-1, 0])
+    assert "stroke-dasharray" not in failed._repr_html_()  # it has no reference
 
 
 def test_a_voltage_is_in_volts():
