@@ -1,8 +1,9 @@
 """Arrows in the scene: control, disturbance, and friction with contact, at each driven joint.
 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
-swings that switches faster than the film. Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above
-the cart, or before it if it carries something.
+swings that switches faster than the film. Behind a drive they are those of its force, and a pale arrow is the command.
+Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above the cart, or before it if it carries
+something.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 SLENDER = 0.2  # thickest shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 DRAWN = 0.5  # MuJoCo draws an arrow, but not a capsule, in this part of the length between its points: measured, 3.17.0
+PALE = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
@@ -77,11 +79,12 @@ class Loads(NamedTuple):
     control: Envelope
     disturbance: Envelope
     reaction: Envelope
+    force: Envelope
 
 
 def loads(trace: Trace, edges: np.ndarray) -> Loads:
     """Return ranges and means between consecutive edges, s."""
-    return Loads(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction)))
+    return Loads(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction, trace.force)))
 
 
 class Scale(NamedTuple):
@@ -94,6 +97,7 @@ class Scale(NamedTuple):
     disturbance: float
     reaction: float = 0.0
     blows: bool = False  # whether a reaction is larger than its longest arrow
+    drive: bool = False  # whether the control passes a drive, such as a motor, whose force is then shown
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
@@ -104,7 +108,9 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         longest = min(reaction, control) if control and same else reaction
         if group.driven:
-            found[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest)
+            drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
+            control = max(control, *map(abs, panels.span(parts, "force"))) if drive else control
+            found[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest, drive)
     return found
 
 
@@ -119,17 +125,24 @@ def arrows(loads: Loads, frame: int, channel: int, scale: Scale, colour: str) ->
     """Return the arrows of one channel in one frame."""
     law, grey, violet = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION))
     drawn = []
+    layer = 1
     if scale.control:
-        low, mean, high = (float(part[frame, channel]) / scale.control for part in loads.control[1:])
+        shown = loads.force if scale.drive else loads.control
+        low, mean, high = (float(part[frame, channel]) / scale.control for part in shown[1:])
         drawn.append(Arrow(0.0, mean, (*law, 1.0)))
         if high - low > MIN_BAR:
             drawn.append(Arrow(low, high, (*law, 0.4), head=False))
+    if scale.control and scale.drive:
+        command = float(loads.control.mean[frame, channel]) / scale.control
+        drawn.append(Arrow(0.0, command, (*law, PALE), layer=layer, size=0.65))
+        layer += 1
     if scale.disturbance:
         mean = float(loads.disturbance.mean[frame, channel]) / scale.disturbance
-        drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=1, size=0.65))
+        drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=layer, size=0.65))
+        layer += 1
     if scale.reaction:
         mean = float(loads.reaction.mean[frame, channel]) / scale.reaction
-        drawn.append(Arrow(0.0, mean, (*violet, 1.0), layer=2 if scale.disturbance else 1, size=0.8))
+        drawn.append(Arrow(0.0, mean, (*violet, 1.0), layer=layer, size=0.8))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 

@@ -1,6 +1,7 @@
 """Text on a film's frames: title, key to the arrows, the label and state of each machine, the clock; with Pillow."""
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -13,11 +14,13 @@ from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State, backlash_gap, has_contact, has_dry_friction
 from smc_mujoco.metrics.channel_groups import Group
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 LABEL, TITLE, KEY, BADGE = 15, 24, 13, 13  # px, height of letters in a film of full size
 EDGE = 24  # px, from the picture's edge to text
 MAX_LABEL = 0.3  # width of a label beside its machine, of the picture's width
+STRIP, COUNTS = 110, 6  # of an encoder's strip: px, and counts in it
 NEWS = 1.5  # s for which a change of the plant is highlighted
 
 
@@ -57,6 +60,8 @@ class Caption:
         self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
         badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]
+        self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
+        badges = [max(wide, STRIP * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
         side, below = 40 * scale, 52 * scale
         self.max_label = (size[0] - side) / len(traces) - 0.8 * LABEL * scale  # width of a label
@@ -121,6 +126,9 @@ class Caption:
         image = Image.fromarray(picture)
         sheet = self.sheet(failed, states, past, past is not None and time < past + NEWS)
         image.paste(sheet, mask=sheet)
+        for k in np.flatnonzero(self.gauges):
+            if not failed[k]:
+                self._strip(ImageDraw.Draw(image), int(k), time)
         self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace.words(speed))
         return np.asarray(image)
 
@@ -170,6 +178,24 @@ class Caption:
         )
         draw.text(middle, state.words, style.letters_on(fill), style.font(size, bold=True), anchor="mm")
 
+    def _strip(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
+        """Draw the counts of machine k's encoder around its position at a time, s, and which of them is read."""
+        (left, top, right, bottom), trace, s = self.badges[k], self.traces[k], self.scale
+        sensor = trace.scenario.sensor
+        assert sensor is not None
+        count = sensor.quantum(trace.scenario.plant.unit == "rad")
+        now, then = np.interp([time, time - sensor.delay], trace.t, trace.x[:, 0]) / count
+        middle, step = (left + right) / 2, (right - left) / COUNTS
+        draw.rounded_rectangle((left, top, right, bottom), 5 * s, style.PAPER, style.MUTED, max(1, round(s)))
+        for tick in range(math.ceil(now - COUNTS / 2), math.floor(now + COUNTS / 2) + 1):
+            x = middle + (tick - now) * step
+            if left + 3 * s < x < right - 3 * s:
+                draw.line((x, top + 0.62 * (bottom - top), x, bottom - 2 * s), style.INK, max(1, round(1.5 * s)))
+        read = np.clip(middle + (round(then + sensor.bias / count) - now) * step, left + 5 * s, right - 5 * s)
+        draw.line((middle, top + 2 * s, middle, bottom - 2 * s), style.MUTED, max(1, round(s)))
+        place, r = top + 0.35 * (bottom - top), 3.5 * s
+        draw.ellipse((read - r, place - r, read + r, place + r), fill=self.colours[k])
+
     def _note(self, draw: ImageDraw.ImageDraw, text: str, news: bool) -> None:
         """Draw what has changed, under the clock; in a dark box while it is news."""
         s = self.scale
@@ -198,16 +224,26 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
 
     words = []
     if sizes := longest("control"):
-        words += [f"coloured arrow: mean control, longest {sizes}", "bar: the range over which it switches"]
+        drive = any(scale.drive for scale in scales.values())
+        what = "force of the drive" if drive else "mean control"
+        words += [f"coloured arrow: {what}, longest {sizes}", "bar: the range over which it switches"]
+        words += ["pale arrow: command"] * drive
     if sizes := longest("disturbance"):
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
         words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
     words.append("translucent: where the reference is")
+    if any(gauges(trace.scenario) for trace in traces):
+        words.append("strip: counts of the encoder, the line is the position, the dot what is read")
     most = max(trace.scenario.plant.n for trace in traces)
-    if most > MAX_CHANNELS:
+    if most > MAX_CHANNELS and not traces[0].scenario.plant.direct:
         words.append(f"machines: the first {MAX_CHANNELS} of {most} pendulums")
     return words
+
+
+def gauges(scenario: Scenario) -> bool:
+    """Return whether a strip shows the counts of a scenario's encoder: for one channel."""
+    return scenario.sensor is not None and scenario.sensor.counts < math.inf and scenario.plant.n == 1
 
 
 def reaction_words(traces: Sequence[Trace]) -> str:

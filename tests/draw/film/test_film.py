@@ -519,3 +519,41 @@ def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
     left, top, right, bottom = caption.badges[0].round().astype(int)
     assert early[top + 4 : bottom - 4, left + 4 : right - 4].mean() > 170  # pale: it slides
     assert late[top + 4 : bottom - 4, left + 4 : right - 4].mean() < 120  # dark: it is held
+
+
+def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
+    slow = realistic(plant="inverted_pendulum", actuator=smc.Lag(0.2), duration=0.2)
+    found = scales([slow])
+    assert found[driven([slow])].drive
+    both = arrows(loads(slow, np.array([0.05, 0.06])), 0, 0, found[driven([slow])], "#0072B2")
+    solid, pale = (arrow for arrow in both if arrow.head)
+    assert abs(solid.high) < 0.5 * abs(pale.high)  # a quarter of the lag's time constant
+    assert (solid.rgba[3], pale.rgba[3]) == (1.0, 0.45)
+    assert "pale arrow: command" in key([slow], found)
+    assert not any("pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))))
+
+
+def test_a_strip_shows_which_count_an_encoder_reads():
+    (trace,) = runs("inverted_pendulum", laws=LAWS[:1])
+    coarse = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, sensor=smc.Encoder(counts=64)))
+    places = []
+    for x in (0.0, 0.03, 0.06, 0.09):  # a count is 0.098 rad
+        still = dataclasses.replace(coarse, x=np.full((301, 1), x))
+        caption = Caption([still], ["a"], ["#0072B2"], None, (1280, 460), 1.0, scales([still]), [[None]])
+        caption.place(np.array([[400.0, 100, 800, 380]]))
+        picture = caption.over(np.full((460, 1280, 3), 255, np.uint8), 0.1, (False,), (None,))
+        left, top, right, bottom = caption.badges[0].round().astype(int)
+        strip = picture[top:bottom, left:right].astype(int)
+        blue = (strip[..., 2] - strip[..., 0]) > 100
+        places.append((np.flatnonzero(blue.any(axis=0)).mean() - strip.shape[1] / 2) / (strip.shape[1] / 6))
+    assert places == pytest.approx([0.0, -0.31, 0.39, 0.08], abs=0.06)  # (reading - position) / count
+    assert caption.pills[0, 3] <= caption.badges[0, 1] + 1e-9
+    assert any("counts of the encoder" in words for words in key([coarse], scales([coarse])))
+
+
+def test_an_arm_of_many_joints_is_shown_whole():
+    (trace,) = smc.run([smc.Scenario(plant=smc.plant("pendulum_network", n=8), law="none", duration=0.01)])
+    assert any("first 6 of 8 pendulums" in words for words in key([trace], scales([trace])))
+    arm = dataclasses.replace(trace.scenario.plant, direct=True)
+    mine = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, plant=arm))
+    assert not any("first 6" in words for words in key([mine], scales([mine])))
