@@ -1,6 +1,7 @@
 """Finding the modules of a catalogue, such as the laws: one file, one entry."""
 
 import importlib
+import operator
 import pkgutil
 from collections.abc import Iterator
 from types import ModuleType
@@ -13,6 +14,13 @@ def modules(package: str) -> Iterator[ModuleType]:
     """Import and yield every module of a package."""
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         yield importlib.import_module(f"{package}.{info.name}")
+
+
+def discover(package: str, kind: type[T]) -> dict[str, T]:
+    """Return every object of a kind at the top level of a package's modules, by its name, in alphabetical order."""
+    values = [value for module in modules(package) for value in vars(module).values() if isinstance(value, kind)]
+    name = operator.attrgetter("name")
+    return {name(value): value for value in sorted(values, key=name)}
 
 
 def subclasses(base: type[T]) -> list[type[T]]:

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple, TypedDict
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import modules
 from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
@@ -360,9 +359,3 @@ def template(
         )
 
     return decorate
-
-
-def discover(package: str) -> dict[str, Template]:
-    """Return every Template at the top level of a package's modules, by name."""
-    values = [value for module in modules(package) for value in vars(module).values()]
-    return dict(sorted((value.name, value) for value in values if isinstance(value, Template)))

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from typing import NamedTuple, Unpack, overload
 
 from smc_mujoco.common.errors import find
-from smc_mujoco.control.component import Component, Options, Template, decorated, discover
+from smc_mujoco.common.registry import discover
+from smc_mujoco.control.component import Component, Options, Template, decorated
 
 Estimator = Component
 
@@ -35,7 +36,7 @@ def estimator_function(
 @functools.cache
 def catalogue() -> dict[str, Template]:
     """Return every estimator of smc_mujoco.control.estimators, by name."""
-    return discover("smc_mujoco.control.estimators")
+    return discover("smc_mujoco.control.estimators", Template)
 
 
 def estimator(name: str, **gains: float) -> Estimator:

@@ -23,7 +23,8 @@ from numba import njit, types
 from numba.extending import overload_attribute
 
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.control.component import Component, LawOptions, Template, decorated, discover, renamed
+from smc_mujoco.common.registry import discover
+from smc_mujoco.control.component import Component, LawOptions, Template, decorated, renamed
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
@@ -161,7 +162,7 @@ def law_function(
 @functools.cache
 def catalogue() -> dict[str, Template]:
     """Return every law of smc_mujoco.control.laws, by name."""
-    return discover("smc_mujoco.control.laws")
+    return discover("smc_mujoco.control.laws", Template)
 
 
 def checked_name(law: Law) -> Law:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Unpack, overload
 
 from smc_mujoco.common.errors import find
-from smc_mujoco.control.component import Component, SurfaceOptions, Template, decorated, discover
+from smc_mujoco.common.registry import discover
+from smc_mujoco.control.component import Component, SurfaceOptions, Template, decorated
 
 Surface = Component
 
@@ -31,7 +32,7 @@ def surface_function(
 @functools.cache
 def catalogue() -> dict[str, Template]:
     """Return every surface of smc_mujoco.control.surfaces, by name."""
-    return discover("smc_mujoco.control.surfaces")
+    return discover("smc_mujoco.control.surfaces", Template)
 
 
 def surface(name: str, **gains: float) -> Surface:

@@ -21,7 +21,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, sho
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.common.registry import modules
+from smc_mujoco.common.registry import discover
 
 DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
@@ -243,8 +243,7 @@ def model_path(name: str) -> Path:
 @functools.cache
 def catalogue() -> dict[str, Plant]:
     """Return every plant found in smc_mujoco.mechanisms.plants, by name."""
-    values = [value for module in modules("smc_mujoco.mechanisms.plants") for value in vars(module).values()]
-    return {p.name: p for p in sorted((p for p in values if isinstance(p, Plant)), key=lambda p: p.name)}
+    return discover("smc_mujoco.mechanisms.plants", Plant)
 
 
 def plant(name: str, **parameters: float) -> Plant:

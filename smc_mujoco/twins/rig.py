@@ -18,7 +18,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import modules
+from smc_mujoco.common.registry import discover
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
@@ -303,8 +303,7 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
 @functools.cache
 def catalogue() -> dict[str, Rig]:
     """Return every rig of smc_mujoco.twins.rigs, by name."""
-    values = [value for module in modules("smc_mujoco.twins.rigs") for value in vars(module).values()]
-    return {r.name: r for r in sorted((r for r in values if isinstance(r, Rig)), key=lambda r: r.name)}
+    return discover("smc_mujoco.twins.rigs", Rig)
 
 
 def rig(name: str, **values: float) -> Rig:
