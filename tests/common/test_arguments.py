@@ -111,7 +111,7 @@ def test_an_error_that_no_argument_explains_stays_as_it_is(trace):
 
 def test_a_sentence_of_the_functions_own_stays_as_it_is():
     assert refused(smc.Sine, "a", 1.0) == "Sine's amplitude is 'a': give a number"
-    assert refused(smc.laws, 3).startswith("plant is 3: give smc.plant(...)")
+    assert refused(smc.laws, 3).startswith("plant is 3: give a name that smc.plants() lists, or smc.plant(...)")
 
 
 @pytest.mark.parametrize(

@@ -139,7 +139,7 @@ def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
     for name in _files(element for one in texts for element in _elements(one)):
         if PurePosixPath(name).name not in given:
             raise ScenarioError(
-                f"the model names the file {shown(name)}, and its text lies in no folder: give "
+                f"the model names the file {shown(name)}, and a text has no folder to find it in: give "
                 f"assets={{{name!r}: its bytes}}, or the path of the model's file"
             )
     pairs = tuple(sorted(assets.items()))
