@@ -1080,7 +1080,7 @@ def test_a_text_with_includes_is_read_with_them(tmp_path):
 
 
 LOST = {
-    "no file": ((MESHED, None), r"the model names the file 'c.obj', and a text has no folder to find it in: give assets="),
+    "no file": ((MESHED, None), "and a text has no folder to find it in: give assets="),
     "no bytes": ((MESHED, {"c.obj": "text"}), r"assets is {'c.obj': 'text'}: give names of files with their contents"),
     "assets of a file": (("arm.xml", {}), "assets is {}, and the model is not text: leave them out"),
     "broken": (("<mujoco>", None), r"MuJoCo cannot read model.xml \(.*\): fix the file"),
