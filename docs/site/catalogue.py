@@ -4,6 +4,7 @@ A page of a law has its formula, its figure, its properties and gains, what is k
 page of a plant its equation, picture, figure, parameters, obstacles, builds and MJCF.
 """
 
+import contextlib
 import dataclasses
 import inspect
 import re
@@ -14,6 +15,8 @@ import figures
 import notation
 
 from smc_mujoco.cli.law_pages import DEGREES, SOURCE, entry
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control import gain_sets
 from smc_mujoco.control.c.export import law_to_c
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -92,17 +95,27 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
         f"# {parts.title}",
         f"`{name}`" + f" · {template.family}",
         _display(parts.formula, template.gains),
+        _symbols(parts.formula),
         f'<div class="figures">{shown}</div>\n<p class="key">{KEY}</p>',
         "With [tuned gains](../run_study.md#gains-by-the-same-rule), from the plant's own start. $u$ is held between "
         "samples of 1 ms; where it chatters, the line is its mean and the band its range.",
         f"## Use it\n\n```python\n{_call(template)}\n```",
         _gain_table(template),
+        _tuned_gains(template),
         _properties(template),
         f"## What is known\n\n{body(template)}",
         f"## Source\n\n{_prose(parts.source, None)}" * bool(parts.source),
         _c_form(name),
     ]
     return Page(f"laws/{name}", style.law_name(name), _front(parts.formula) + "\n\n".join(filter(None, text)) + "\n")
+
+
+def _symbols(formula: str) -> str:
+    """Return where the symbols of a formula are explained, and what its brackets mean."""
+    brackets = (
+        r" $\lfloor s \rceil^p$ is $\left| s \right|^p \, \mathrm{sgn}(s)$." if re.search(r"\]\^", formula) else ""
+    )
+    return f"$e$ is the error, $s$ the sliding variable: see [the mathematics](../mathematics.md).{brackets}"
 
 
 def _front(description: str) -> str:
@@ -152,6 +165,22 @@ def _gain_table(template: Template) -> str:
     return f"## Gains\n\n{head}" + "\n".join(rows) + f"\n\n{unit}"
 
 
+def _tuned_gains(template: Template) -> str:
+    """Return a table of the gains tuned for each plant, without those that no tuning changes."""
+    names = [name for name, gain in template.gains.items() if not gain.held]
+    rows = []
+    for plant in plants():
+        with contextlib.suppress(ScenarioError):  # no gains for this plant
+            values = gain_sets.law(plant, template.name).gains
+            numbers = " | ".join(f"{values[name]:.4g}" for name in names)
+            rows.append(f"| [`{plant}`](../plants/{plant}.md) | {numbers} |")
+    if not (rows and names):
+        return ""
+    head = f"| plant | {' | '.join(f'`{name}`' for name in names)} |\n|---|{'---|' * len(names)}\n"
+    note = "Found by [the same rule for every law](../run_study.md#gains-by-the-same-rule)."
+    return f"### Tuned\n\n{head}" + "\n".join(rows) + f"\n\n{note}"
+
+
 def meanings(template: Template) -> dict[str, tuple[str, str]]:
     """Return gain -> what it is, and its unit, from the docstring's `Gains: ...`."""
     parts = GAINS.split(SOURCE.split(template.doc)[0])
@@ -198,7 +227,7 @@ def _properties(template: Template) -> str:
         "relative degree": f"{degree}: acts on {notation.sentence(DEGREES[degree])}",
         "command": "$u$ is continuous" if template.continuous else "$u$ jumps",
         "arrives": arrives[template.finite_time],
-        "conditions on the gains": conditions or "none",
+        "conditions on the gains": conditions or "none on the gains alone",
         "gains to choose": ", ".join(f"`{gain}`" for gain in searched(template)) or "none",
         "measures": measured or "nothing",
         "nominal model": "needed" if template.requires_model else 'optional, with `model="nominal"`',

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 GALLERY = "videos/gallery"
 HERE = "<!-- README's first screen -->"
 CATALOGUE = "catalogue.md"  # its tables name all plants and laws
+BOOST = {"questions.md": 2.0, "mathematics.md": 2.0, "run_study.md": 1.5, "api.md": 0.3}  # in search
 GROUP = "Catalogue"  # where the contents show their pages
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -49,7 +50,10 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Put README's first screen where the page asks for it, and make the names of laws and plants in tables links."""
+    """Put README's first screen where the page asks for it, link names of laws and plants in tables, and weigh the page
+    for the search."""
+    if boost := BOOST.get(page.file.src_uri):
+        page.meta["search"] = {"boost": boost}
     first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n<!-- end of the first screen -->")
     markdown = markdown.replace(HERE, first.replace("](docs/", "](")).replace(f"](../{GALLERY}/", f"]({GALLERY}/")
     return linked(markdown) if page.file.src_uri == CATALOGUE else markdown

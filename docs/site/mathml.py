@@ -18,6 +18,10 @@ from latex2mathml.converter import convert
 PRIMED = re.compile(r"<msup>(<mi>[^<]*</mi>|<mrow>(?:(?!<msup>).)*?</mrow>)<mi>(&#x0203[234];|&#x02057;)</mi></msup>")
 FUNCTION = re.compile(r"\\(sin|cos|tanh|cosh|max|min)(?![A-Za-z])((?:[_^](?:\w|\{\w+\}))*)\s*(?P<bracket>\(?)")
 MATH = re.compile(r'<(span|div) class="arithmatex">\s*\\([(\[])(.*?)\\[)\]]\s*</\1>', re.DOTALL)
+# a minus after a relation, a comma or an opening bracket is a sign; else it would have the space of a difference
+SIGN = re.compile(
+    r"(<mo[^>]*>(?:&#x0003D;|&#x0226[45];|&#x0003[CE];|&#x02192;|&#x0002C;|&#x00028;)</mo>)<mo>&#x02212;</mo>"
+)
 LETTERS = [  # Unicode ranges that equations use: Latin, Greek, punctuation, operators, arrows, brackets, italics
     (0x20, 0x7E), (0xA0, 0xFF), (0x2C6, 0x2DC), (0x300, 0x308), (0x391, 0x3F5), (0x2010, 0x2057), (0x210E, 0x210F),
     (0x2190, 0x21D4), (0x2200, 0x22EF), (0x2308, 0x230B), (0x23B0, 0x23E1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B),
@@ -39,17 +43,22 @@ def font() -> bytes:
     return file.getvalue()
 
 
+REPAIRS = [  # pattern, replacement: what browsers space or raise wrongly
+    (PRIMED, r"<mrow>\1<mi>\2</mi></mrow>"),  # fonts raise a prime already
+    (SIGN, r'\1<mo form="prefix">&#x02212;</mo>'),
+    (re.compile("<mo>&#x0002F;</mo>"), '<mo lspace="0" rspace="0">/</mo>'),
+    (re.compile("<mo>&#x0221E;</mo>"), "<mi>&#x0221E;</mi>"),
+]
+
+
 @functools.cache
 def mathml(latex: str, block: bool = False) -> str:
-    """Return MathML. A prime stands beside its letter, as fonts raise it already; a slash has no space around
-    it, a function has."""
-    latex = latex.replace(r"\lvert", r"\left|").replace(
-        r"\rvert", r"\right|"
-    )  # else the second bar has space before it
+    """Return LaTeX as MathML; a long equation is in an element that scrolls."""
+    latex = latex.replace(r"\lvert", r"\left|").replace(r"\rvert", r"\right|")  # else there is space before the second
     latex = FUNCTION.sub(lambda f: rf"\,\mathrm{{{f[1]}}}{f[2]}" + (f["bracket"] or r"\,"), latex)
     text = convert(latex, display="block" if block else "inline")
-    text = PRIMED.sub(r"<mrow>\1<mi>\2</mi></mrow>", text)
-    text = text.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
+    for pattern, replacement in REPAIRS:
+        text = pattern.sub(replacement, text)
     if block:
         return f'<div class="equation">{text}</div>'
     return f'<span class="long equation">{text}</span>' if len(latex) > LONG else text

@@ -109,9 +109,11 @@ def sentence(text: str, gains: Collection[str] = ()) -> str:
 
 
 def _is_unit(before: Token | None, token: Token, after: Token | None) -> bool:
-    """Return whether a letter is a unit: after a number or the word "in", with a space."""
+    """Return whether a letter is a unit: after a number or the word "in", with a space; so is the m of N m."""
     if token.text not in ("m", "N", "s") or token.mark or before is None or not token.space:
         return False
+    if (before.text, token.text) == ("N", "m"):
+        return True
     alone = after is None or after.kind != "operator" or after.text in ".,;:)" or after.text == "/"
     return alone and (before.kind == "number" or (before.text == "in" and token.text != "s"))
 
