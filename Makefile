@@ -36,8 +36,8 @@ check: ## lint, format and types
 
 docs: ## the documentation as a site, site/index.html
 	@./setup.sh requirements-docs.lock
-	@# this variable leaves out the theme's notice that it is maintained until May 2027
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict -f docs/site/mkdocs.yml
+	@# this variable leaves out the theme's notice that it is maintained until May 2027; --quiet would hide warnings from --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
 
 report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
 	$(BIN)/smc-mujoco report

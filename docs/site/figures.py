@@ -1,7 +1,7 @@
 """Figures of the catalogue's pages, kept from one build to the next in .cache/site.
 
-A figure is drawn again if anything changes that it may depend on: the package, the models, this file. SVGs are written
-into the pages, so that their ink is that of the page, light or dark.
+A figure is drawn again if anything changes that it may depend on: the rooms of the package up to draw, the
+models, this file. SVGs are written into the pages, so that their ink is that of the page, light or dark.
 """
 
 import hashlib
@@ -18,6 +18,8 @@ CACHE = ROOT / ".cache" / "site"
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
 CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}  # condition -> colour, seen on white and on slate
 PAPER_LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
+# Rooms of the package that figures may depend on: those up to draw, as imports point down
+ROOMS = ("common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw")
 DURATION = 4.0  # s, chosen: most laws settle in 2
 PAGE_COLOURS = {  # colour of smc_mujoco.draw.style -> that of the page, lighter or not
     "INK": "", "DISTURBANCE": "", "MUTED": "--light", "RULE": "--lighter", "BAND": "--lightest", "GRID": "--lightest",
@@ -127,7 +129,9 @@ def _rounded(path: re.Match[str]) -> str:
 
 def _version() -> str:
     """Return a hash of all that figures depend on."""
-    files = [*(ROOT / "smc_mujoco").rglob("*.py"), *(ROOT / "models").rglob("*.xml"), Path(__file__)]
+    files = [*(ROOT / "models").rglob("*.xml"), Path(__file__)]
+    for room in ROOMS:
+        files += (ROOT / "smc_mujoco" / room).rglob("*.py")
     files += (ROOT / "smc_mujoco" / "control" / "tuned_gains").rglob("*.json")
     seen = hashlib.sha256()
     for file in sorted(files):

@@ -27,7 +27,7 @@ class StepResponse:
     """The response of a law to a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
 
     If some joints have no actuator, `r.scores` has the metrics of each group of channels, as `smc.scores` does. For the
-    pole on a cart: r.scores["free"]["ultimate_bound"]. In `check` that metric is named "free ultimate_bound".
+    pole on a cart: `r.scores["free"]["ultimate_bound"]`. In `check` that metric is named "free ultimate_bound".
 
     A failed run has no metrics: reading one raises a ScenarioError that says when and why the run failed.
 
