@@ -369,9 +369,10 @@ def described(plant: Plant) -> str:
 
 
 def explained_by(plant: Plant) -> Plant | None:
-    """Return the plant whose module has the equation and parameters of this one: `... stand in NAME.py`."""
-    found = re.search(r"\bstand\s+in\s+(\w+)\.py", described(plant))
-    return plants()[found[1]] if found else None
+    """Return the plant whose module has the equation and parameters of this one, named as NAME.py, if there is one."""
+    doc = described(plant)
+    named = [name for name in re.findall(r"\b(\w+)\.py\b", doc) if name in plants()]
+    return plants()[named[0]] if named and not equation(doc)[1] else None
 
 
 def equation(doc: str) -> tuple[str, list[str], str]:
