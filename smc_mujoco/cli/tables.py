@@ -328,12 +328,18 @@ def advice(found: Advice) -> Table:
     """Return a line for each finalist: its place, how often it settles, its median on each need."""
     law, *others = found.heads
     columns = [Column(head.replace(": ", "\n").replace(", ", "\n"), justify="right") for head in others]
-    table = titled(found.title, law, *columns)
+    table = titled(found.title, Column(law, no_wrap=True), *columns, pad_edge=False)  # 80 columns hold three needs
     for name, *cells in found.rows:
-        label = Text(_folded(name, 22), style=style.law_colour(name))
-        table.add_row(label, *(cell.replace(" (", "\n(").replace(") *", ")*") for cell in cells))
+        table.add_row(Text(_folded(name, 15), style=style.law_colour(name)), *map(_two_lines, cells))
     table.caption, table.caption_justify = found.key, "left"
     return table
+
+
+def _two_lines(cell: str) -> str:
+    """Return "1.2 (1.1 to 1.3) *" with its interval on a second line."""
+    middle, _, rest = cell.partition(" (")
+    interval, _, star = rest.partition(")")
+    return f"{middle}{star}\n{interval.replace(' to ', '–')}" if rest else cell
 
 
 # margins and tunings

@@ -150,10 +150,9 @@ class Advice:
     def key(self) -> str:
         """The meaning of the table's signs."""
         seeds = int(self.comparison.seeds.max())
-        text = (
-            f"place by mean rank, and medians of {len(self.conditions)} condition{'s' * (len(self.conditions) > 1)}, "
-        )
-        text += f"with 95 % intervals over {seeds} seeds. *: no finalist is better in any condition."
+        of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
+        text = f"place by mean rank, and medians{of}, with 95 % intervals over {seeds} seeds. "
+        text += f"*: no finalist is better{' in any condition' if of else ''}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         return text + " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)

@@ -8,7 +8,8 @@ What is asked is a metric to compare (fast, accurate, calm ...) or a property th
 two-gains ...). With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
 1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
-   with the same bound on u, the same starts and as many evaluations as those of the package.
+   with the same bound on u, the same starts and as many evaluations as those of the package. A law's own gains are one
+   more set that is tried.
 2. Screening: each law runs in each condition from a few seeds. The finalists are those with the best mean ranks, and
    the best one on each need.
 3. The finalists run from further seeds, which the screening has not seen, so that a law which was lucky there has no
@@ -283,10 +284,10 @@ def _tuned(
         lambda made, path: made.save(path),
         result.load,
     )
-    source = f"tuned here, {budget} sets of gains tried"
-    if tuned.objective > tuned.before:
-        source += ", none better than its own"
-    return Candidate(dataclasses.replace(coerce.law(law), gains=tuned.law.gains), source)
+    if tuned.before < tuned.objective:
+        return Candidate(coerce.law(law), f"its own gains, better than the {budget} sets tried here")
+    gains = tuned.law.gains
+    return Candidate(dataclasses.replace(coerce.law(law), gains=gains), f"tuned here, {budget} sets of gains tried")
 
 
 # the comparison

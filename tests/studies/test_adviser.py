@@ -1,20 +1,24 @@
 """The adviser: what it advises follows from its runs, what it says follows from its numbers, and it can say "no"."""
 
 import dataclasses
+import io
 import math
+import types
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.cli import main
+from smc_mujoco.cli import main, tables
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
+from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.studies import adviser
 from smc_mujoco.studies.advice import NEEDS
 
@@ -224,30 +228,35 @@ def test_gains_of_the_package_are_taken_where_there_are_some(folder):
     assert found.choices[0].source == "tuned gains of the package"
 
 
-def test_gains_are_tuned_for_other_parameters_once_and_kept(folder, monkeypatch):
-    heavy = smc.plant("duffing", M=2.0)
-    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=4))
-    options = {"laws": ["classical"], "out": folder} | COMMON | {"seeds": 2, "conditions": "nominal"}
-    found = smc.which(heavy, **options)
-    assert found.choices[0].source == "tuned here, 4 sets of gains tried, none better than its own"
-    with pytest.warns(smc.ScenarioWarning, match="no set of gains tried for classical"):
-        assert found.law.gains == search.tune(heavy, "classical", 4).law.gains
-    monkeypatch.setattr(search, "tune", None)
-    assert smc.which(heavy, **options).law == found.law
+def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder, monkeypatch):
+    gains = {"kp": Gain(0.01, FORCE_PER_POSITION), "kd": Gain(0.01, FORCE_PER_SPEED)}  # next to nothing
 
-
-def test_a_law_of_a_user_is_tuned_too(folder, monkeypatch):
-    from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
-
-    @law_function(gains={"kp": Gain(10.0, FORCE_PER_POSITION), "kd": Gain(5.0, FORCE_PER_SPEED)}, continuous=True)
+    @law_function(gains=gains, continuous=True)
     def my_pd(y, gains, memory):
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
+    heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
+    monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
     monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=4))
-    found = smc.which("duffing", "nominal", "fast,continuous", [my_pd], seeds=2, duration=1.0, out=folder)
-    assert found.law.name == "my_pd"
+    options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
+    options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
+    found = smc.which(heavy, **options)
+    assert found.choices[0].source == "tuned here, 4 sets of gains tried"
     assert found.law.function is my_pd.function
-    assert found.law.gains != my_pd.defaults
+    assert found.law.gains == tuned[0].law.gains != my_pd.defaults
+    assert (tuned[0].budget, tuned[0].plant) == (4, heavy)
+    assert smc.which(heavy, **options).law == found.law
+    assert len(tuned) == 1
+
+
+def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
+    tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
+    monkeypatch.setattr(adviser, "cached", lambda *rest: tuned)
+    own = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    assert own == (smc.law("observer_free"), "its own gains, better than the 4 sets tried here")
+    tuned.before = 3.0
+    found = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    assert found == (FAST, "tuned here, 4 sets of gains tried")
 
 
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
@@ -319,6 +328,19 @@ def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch
     assert "Second choice: slow(lam=6, k1=4) (gains as given); worse on fast." in printed
     assert "How sure: it dominates slow: better somewhere, worse nowhere; its place" in printed
     assert math.isfinite(float(printed.partition("results.parquet; ")[2].split()[0]))
+
+
+def test_its_table_fits_into_80_columns_with_three_needs(advice, folder):
+    capture = io.StringIO()
+    laws = [choice.law for choice in advice.choices]
+    many = smc.which("duffing", needs="fast,accurate,calm", laws=laws, out=folder, **COMMON)
+    Console(file=capture, width=80).print(tables.advice(many))
+    lines = capture.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert any(line.split()[:3] == ["observer_free", "1", "100"] for line in lines)
+    assert not any("…" in line for line in lines)
+    interval = advice.choices[0].medians["fast"]
+    assert f"{number(interval.low)}–{number(interval.high)}" in capture.getvalue()
 
 
 def test_the_command_says_in_one_sentence_what_is_wrong(capsys):
