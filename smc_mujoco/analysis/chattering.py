@@ -28,14 +28,14 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.simulation.scenario import Scenario
 
-SLOWEST = 0.5  # Hz: slower oscillations are no chattering
+MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
 FREQUENCIES, AMPLITUDES = 60, 28  # of the grid on which cycles are sought
 COARSE = 60  # samples of a period there
-SMALLEST, LARGEST = 1e-9, 3.0  # rad or m, of the error
+MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-9, 3.0  # rad or m, of the error
 SAME = 0.02  # relative: two cycles nearer than that are one
-WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by that
+WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
 NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
-DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in so many steps
+DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in this many steps
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -51,9 +51,9 @@ class Chattering:
         force, per unit of mass.
       third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
         large the law does not see a sine, and the prediction is rough.
-      samples: control samples in a period. Below some ten a cycle locks to the samples, and the prediction is rough.
+      samples: control samples in a period. Below about ten a cycle locks to the samples, and the prediction is rough.
       gain: N, complex; response: L, complex, at the cycle.
-      assumptions: sentences, what was left out or is doubtful.
+      assumptions: what was left out or is doubtful, in sentences.
     """
 
     amplitude: float = math.nan
@@ -104,8 +104,8 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 def cycles(loop: Loop) -> list[Wave]:
     """Return all solutions of N L = 1 up to half the sampling frequency."""
     fastest = math.pi / loop.scenario.control_period
-    omegas = np.geomspace(math.tau * SLOWEST, NYQUIST * fastest, FREQUENCIES)
-    amplitudes = np.geomspace(SMALLEST, LARGEST, AMPLITUDES)
+    omegas = np.geomspace(math.tau * MIN_FREQUENCY, NYQUIST * fastest, FREQUENCIES)
+    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, AMPLITUDES)
     found: list[tuple[float, float]] = []
     for bracket in _brackets(loop, omegas, amplitudes):
         cycle = _balanced(loop, *bracket)
@@ -168,7 +168,7 @@ def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, 
     fastest = math.log(NYQUIST * math.pi / loop.scenario.control_period)
     first, last = 2 * first - last, min(2 * last - first, fastest)
     if phase(first) * phase(last) > 0.0:
-        return None  # a bracket with few samples that is none with all
+        return None  # found with few samples, and not confirmed with all
     omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
     found = amplitude(omega)
     return (found, omega) if low < math.log(found) < high else None

@@ -3,8 +3,8 @@
 Least squares of what the twin predicts: positions, and in a closed loop u, each relative to its variation in the
 record. A record is first repeated in short pieces, each from its measured state under the recorded command, because
 their cost is smooth; then as a whole, with the loop closed where the controller is known. All runs of a step are one
-batch. The search is scipy's trust region. `mujoco.sysid` was looked at: it rolls recorded controls out in an open loop,
-without controllers, encoders and delays, and needs an extra of ten packages.
+batch. The search is scipy's trust region. `mujoco.sysid` is not used: it replays recorded controls in an open loop,
+without controllers, encoders and delays, and needs ten more packages.
 
 Standard errors allow for residuals that depend on their neighbours, and for short events that decide a quantity: they
 are those of a jackknife that leaves out one block of time after the other, at first order.
@@ -32,15 +32,15 @@ from smc_mujoco.twins.rig import rig as find_rig
 
 STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry friction makes shorter ones rough
 SPREAD = 0.2  # standard deviation of the logarithm of other starts of the search; chosen
-LIKE_ONE = 0.98  # correlation from which records cannot tell two quantities apart; chosen
+MAX_CORRELATION = 0.98  # correlation from which records cannot tell two quantities apart; chosen
 BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
 SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
-MOST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
+WORST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
 
 
 @dataclasses.dataclass(frozen=True)
 class Identified:
-    """What records tell of a rig.
+    """What records determine of a rig.
 
     Attributes:
       rig: the rig with the values found.
@@ -64,11 +64,11 @@ class Identified:
 
     @property
     def notes(self) -> list[str]:
-        """What the records cannot tell, in sentences."""
+        """What the records cannot determine, in sentences."""
         names, found = list(self.values), []
         for i, one in enumerate(names):
             for j, other in enumerate(names[:i]):
-                if abs(self.correlations[i, j]) > LIKE_ONE:
+                if abs(self.correlations[i, j]) > MAX_CORRELATION:
                     found.append(f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})")
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
@@ -124,11 +124,11 @@ def identify(
       quantities: names of those to find; None: the rig's `free`, all parameters of a plant.
       starts: how many sets of values the search may start from: the present one, and others at random about it.
       seed: of these starts. The same seed gives the same result.
-      most: steps of the search, at most.
+      most: largest number of steps of the search.
       progress: whether to show a progress bar.
 
     Raises:
-      ScenarioError: an unknown quantity, records that are none, or records that cannot tell the quantities apart.
+      ScenarioError: an unknown quantity, not a record, or records that cannot tell the quantities apart.
     """
     many = list(records) if isinstance(records, Sequence) else [records]
     if not many:
@@ -235,7 +235,7 @@ class Search:
             column = self.checked[which][name] if isinstance(which, int) else measured[name]
             spread = np.linalg.norm(column - column.mean()) or 1.0
             residual = (measured[name] - values) / spread
-            found.append(np.clip(np.nan_to_num(residual, nan=MOST, posinf=MOST, neginf=-MOST), -MOST, MOST))
+            found.append(np.clip(np.nan_to_num(residual, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST))
         return np.concatenate(found)
 
     def best_start(self, stage: str, starts: int, seed: int) -> np.ndarray:

@@ -209,7 +209,7 @@ def chatter(
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
-    duration: Annotated[float, typer.Option(min=0.1, help="Of the runs beside the prediction, s.")] = 8.0,
+    duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs in which it is measured, s.")] = 8.0,
     out: Annotated[
         Path | None, typer.Option(help="Also draw Nyquist plots and runs, as OUT.svg and OUT.png, or OUT.pdf.")
     ] = None,
@@ -218,10 +218,10 @@ def chatter(
 ) -> None:
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
-    A law that switches and an actuator that is slower than it oscillate without end. The frequency and the amplitude
+    With a law that switches and an actuator that lags, the loop oscillates without end. The frequency and the amplitude
     follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "third" is the share
-    of the third harmonic in s, and "samples" the control samples in a period. Where third is above 20 %, or samples
-    below 10, the prediction is rough.
+    of the third harmonic in s, and "samples" the number of control samples in a period. Where third is above 20 %, or
+    samples below 10, the prediction is rough.
 
     Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
     """
