@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import importlib
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
@@ -28,6 +29,7 @@ from smc_mujoco.simulation.signals import Recorded, Signal
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0")  # None where not given
 PARTS = ("friction", "contact", "actuator", "sensor")
+OTHER_LAWS = ("smc_mujoco.studies.boards.entries",)  # modules with laws that are not in the catalogue
 T = TypeVar("T")
 
 
@@ -74,7 +76,7 @@ def restore(data: dict) -> Scenario:
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _find(data["law"], "law", laws() | CONTROLLERS),
+        "law": _find(data["law"], "law", laws() | CONTROLLERS | _laws_elsewhere(data["law"]["module"])),
         "velocity": _find(data["velocity"], "estimator", estimators()),
         "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),
@@ -130,6 +132,14 @@ def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
         relative_degree=data.get("degree", 1),
         function=None,
     )
+
+
+def _laws_elsewhere(module: str) -> dict[str, Template]:
+    """Return the laws of a module of this package outside the catalogue, by name; none of another module."""
+    if module not in OTHER_LAWS:
+        return {}
+    values = vars(importlib.import_module(module)).values()
+    return {value.name: value for value in values if isinstance(value, Template)}
 
 
 def _signal(signal: Signal) -> dict:

@@ -12,15 +12,17 @@ matched disturbance d. On s = 0, V falls whatever u and d are: the surface is st
 6 N m, less than k.
 
 `trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were found; benchmarks/swing_up.py finds them
-again. Velocities are those of a Savitzky-Golay filter of 9 positions, as the rig has encoders and no tachometer.
+again. Velocities are those of a Savitzky-Golay filter of 5 positions, as the rig has encoders and no tachometer.
 Sources: V. I. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 9 (surfaces of least quadratic
 cost); S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE Trans. Automatic Control 24(3):437,
 1979 (the surface b'P z = 0).
 """
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -35,17 +37,22 @@ from smc_mujoco.simulation.scenario import Scenario
 
 FOLDER = Path(__file__).parent / "trajectories"
 PERIOD, DURATION = 2e-3, 10.0  # s, of the boards
-WINDOW = 9  # readings of the velocity's filter
+WINDOW = 5  # readings of the velocity's filter
 
 
-def entry(robot: str) -> Scenario:
+def entry(robot: str, **fields: Any) -> Scenario:
     """Return the run of this package's entry on the boards of "acrobot" or "pendubot".
+
+    Args:
+      robot: "pendubot" or "acrobot".
+      fields: of the Scenario, in place of the board's.
 
     Raises:
       ScenarioError: another robot.
     """
     law = find("robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up})
-    return on_board(robot, law(), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
+    made = on_board(robot, law(), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
+    return dataclasses.replace(made, **fields)
 
 
 def on_board(robot: str, law: Law | Template | str, velocity: Estimator | str = "measured") -> Scenario:

@@ -1,0 +1,43 @@
+"""How much dry friction in its free shoulder does the acrobot's swing-up tolerate?
+
+This package's entry on RealAIGym's board: an optimised trajectory from hanging to upright, tracked by a sliding-mode
+law on the surface of its Riccati equation, with 6 N m at the elbow. The law knows nothing of the friction, and has no
+motor in the joint where it acts.
+
+Look for: 1.2 s to the top. A little friction holds the machine where it leans, a fold of the elbow against the
+shoulder; more makes it miss the top and whirl on. Nothing swings it up a second time.
+"""
+
+import smc_mujoco as smc
+
+
+def run(level):
+    return smc.boards.entry("acrobot", plant=smc.plant("acrobot", cf1=level), duration=6.0)
+
+
+def stands(trace):
+    return smc.boards.criteria(trace).success
+
+
+def fold(trace):
+    return 57.3 * abs(trace.x[-1, 0])
+
+
+def answer(runs):
+    standing = runs.those(stands)
+    return (
+        f"swung up and held with {standing.named}; of these the elbow ends farthest from straight, in degrees, with "
+        f"{standing.most(fold)}"
+    )
+
+
+scene = smc.Scene(
+    title="Acrobot",
+    conditions={
+        "friction": {"none": run(0.0), "0.01 N m": run(0.01), "0.02 N m": run(0.02), "0.08 N m": run(0.08)},
+    },
+    answer=answer,
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
