@@ -29,9 +29,9 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-FREQUENCIES, AMPLITUDES = 60, 28  # of the grid on which cycles are sought
+FREQUENCIES, AMPLITUDES = 60, 36  # of the grid on which cycles are sought
 COARSE = 60  # samples of a period there
-MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-9, 3.0  # rad or m, of the error
+MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
 SAME = 0.02  # relative: two cycles nearer than that are one
 WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
 NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
