@@ -177,7 +177,7 @@ def test_second(r): assert r.overshoot < 0.1
             "unknown condition 'noisy': did you",
         ),
         ("'cart_pole', 'none', step=1, condition='jump_mild'", "'jump_mild' has no numbers for plant 'cart_pole'"),
-        ("'duffing', 'classical', step=1, reference=smc.Step(2)", "leave it out, for it is the step of 1"),
+        ("'duffing', 'classical', step=1, reference=smc.Step(2)", "leave it out, as it is the step of 1"),
         ("'duffing', lambda y, g, m: (0.0, 0.0), step=1", "put @smc.law_function(gains={...}) above the function"),
     ],
 )
