@@ -929,9 +929,9 @@ HARM = {  # what the model has, and words of the sentence
     ),
     "large": (
         '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
-        "arm.xml .*more than 4 GiB of memory: m",
+        "arm.xml .*more than 4 GiB of memory: (make|fix)",
     ),
-    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
+    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: (make|fix)ake it smaller"),
     "nan": (
         '<default><joint damping="nan"/></default>',
         r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): fix the file",
