@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, c, catalogue, runs, studies
+from smc_mujoco.cli.commands import analysis, c, catalogue, rigs, runs, studies
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
@@ -28,6 +28,7 @@ COMMANDS = {
     "tune": analysis.tune,
     "bench": studies.bench,
     "board": studies.board,
+    "identify": rigs.identify,
     "margins": analysis.margins,
     "basin": analysis.basin,
     "chatter": analysis.chatter,

@@ -31,6 +31,7 @@ from smc_mujoco.studies.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
 from smc_mujoco.studies.paper.claims.verdict import Claim
+from smc_mujoco.twins.identify import Identified
 
 # Columns of a table of scores: heading -> metric.
 SHOWN = {
@@ -461,3 +462,19 @@ def _print_claim(claim: Claim, console: Console) -> None:
         for what, value in claim.beside[name].items():
             table.add_row("", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), "")
         console.print(Padding(table, (0, 0, 1, 2)))
+
+
+def identified(found: Identified, names: Sequence[str]) -> list[Table]:
+    """Return the quantities found, with their errors and what they were, and the fit of each record, by its name."""
+    values = titled(
+        found.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
+    )
+    for name, value in found.values.items():
+        quantity = found.rig.quantities[name]
+        before = number(found.before.values[name])
+        values.add_row(name, number(value), number(found.errors[name]), before, Text(quantity.unit, "dim"))
+    heads = [Column(head, justify="right") for head in found.fits[0]]
+    fits = titled("fit, % (before)", "record", *heads)
+    for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
+        fits.add_row(name, *(f"{value:.1f} ({max(before[key], -999.0):.1f})" for key, value in fit.items()))
+    return [values, fits]

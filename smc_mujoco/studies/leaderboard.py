@@ -240,6 +240,8 @@ def leaderboard(
             if not scores:
                 continue
             floors = [cells.floor(ran[k], unit) for k in there]
+            if all((scenario := ran[k]) is not None and scenario.amplifier for k in there):
+                unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
             found = compare(scores, floors, metric == SETTLES, level, outcomes)
             blocks = tuple(_block(group, found, at, k) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1

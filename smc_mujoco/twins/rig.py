@@ -125,6 +125,11 @@ class Rig:
         chosen = dict(find(f"parameter set of {self.name}", name, self.published))
         return self.with_values(chosen, chosen.pop("source"))
 
+    def members(self) -> dict[str, "Rig"]:
+        """Return the rig with each of its parameter sets, its own first, by a name for each."""
+        sets = {f"set {i + 2}": self.with_values(each, "ensemble") for i, each in enumerate(self.ensemble)}
+        return {"set 1": self} | sets
+
     def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
         """Return a Scenario of the machine.
 
@@ -244,7 +249,7 @@ class Rig:
         data, time = [self.checked(record) for record in many], self.columns.time
         if self.dynamics is not None:
             return [
-                (self.torques(one), self.measured_torques(one), each[time])
+                (self.torques(one), self.measured_torques(one), each[time][:: inverse.STRIDE])
                 for one, each in zip(many, data, strict=True)
             ]
         found = []
@@ -273,14 +278,15 @@ class Rig:
         return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
 
     def torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the torque of each joint that the measured motion of a record takes, (K,), by inverse dynamics.
+        """Return the torque of each joint that the measured motion of a record takes, by inverse dynamics.
 
-        Positions, velocities and their slopes are those of a cubic through the samples about each.
+        Every fifth sample counts. Its position, velocity and acceleration are those of cubics through its
+        neighbours.
         """
         return inverse.torques(self._dynamics(), self.checked(record), self.columns)
 
     def measured_torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the recorded torque of each joint, (K,), smoothed as the motion is in `torques`."""
+        """Return the recorded torque of each joint, smoothed and thinned out as the motion is in `torques`."""
         return inverse.smoothed(self.checked(record), self.columns.torque)
 
     def _dynamics(self) -> Plant:

@@ -119,6 +119,10 @@ def bench(
         str, typer.Option(help="Traces to save: none, all, or worst (the worst run per plant and condition).")
     ] = "none",
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that are in the folder.")] = False,
+    rig: Annotated[
+        str | None,
+        typer.Option(help="In place of plants and conditions: a real machine, over its ensemble of parameter sets."),
+    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: run every combination from every seed, to OUT/results.parquet.
@@ -127,6 +131,8 @@ def bench(
     options. The table has only the runs of the last command, so give each study its own --out. `smc-mujoco list` shows
     laws and conditions. --laws all compares every general law that has gains for these plants in the set of --gains;
     the set default has gains for all laws. The leaderboard names the winner under each condition, and over all of them.
+    With --rig the machine's parameter sets take the place of the conditions, and a line for each metric says if one
+    law wins on all of them.
 
     Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 16 --out duffing
     """
@@ -140,6 +146,18 @@ def bench(
         from smc_mujoco.studies.study import FULL, QUICK, study
 
     terminal, size = Terminal(), QUICK if quick else FULL
+    if rig is not None:
+        from smc_mujoco.twins import ensemble
+        from smc_mujoco.twins.rig import rig as find_rig
+
+        chosen = [options.law(text) for text in options.names(laws, ("pid", "super_twisting"))]
+        begin, length = options.starts(x0, spread), size.duration if duration is None else duration
+        found = ensemble.runs(find_rig(rig), chosen, seeds or size.seeds, "default", length, begin)
+        boards = leaderboard(study(found, out, not fresh, executor, threads, progress=True, traces=traces))
+        terminal.print(tables.leaderboard(boards))
+        terminal.print(ensemble.verdict(boards))
+        terminal.wrote(out / "results.parquet")
+        return
     chosen_plants = [options.plant(text) for text in options.names(plants, size.plants)]
     length = size.duration if duration is None else duration
     found = [as_plant(plant) for plant in chosen_plants]

@@ -56,6 +56,7 @@ COMMON = {
     "dynamics": lambda q: plant_of("double_pendulum", q),
     "free": ("r1", "r2", "I1", "I2", "Ir", "b1", "b2", "cf1", "cf2"),
     "published": SETS,
+    "ensemble": tuple({key: v for key, v in each.items() if key != "source"} for each in list(SETS.values())[1:]),
     "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, as torques tell only moments.",
 }
 PENDUBOT = Rig(

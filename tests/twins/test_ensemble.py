@@ -1,0 +1,67 @@
+"""Rankings over a rig's parameter sets, and the commands that make them and identify rigs."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.cli.main import app
+from smc_mujoco.twins import ensemble
+
+PENDULUM = smc.rig("simple_pendulum_ak80")
+LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
+
+
+@pytest.fixture(scope="module")
+def boards(tmp_path_factory):
+    runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=1.5, starts=smc.starts(0.3))
+    return smc.leaderboard(smc.study(runs, tmp_path_factory.mktemp("study"), progress=False))
+
+
+def test_every_set_is_a_condition_with_its_own_numbers():
+    runs = ensemble.runs(PENDULUM, LAWS, seeds=2, duration=1.0, starts=smc.starts(0.3))
+    assert len(runs) == 2 * 2 * (1 + len(PENDULUM.ensemble))
+    levels = {run.condition: run.friction[0].level for run in runs}
+    assert levels == {"set 1": 0.21, "set 2": 0.18, "set 3": 0.24, "set 4": 0.18, "set 5": 0.24}
+    assert {run.resolved.u_max for run in runs} == {12.0}
+    assert len({run.resolved.x0 for run in runs}) == 2
+
+
+def test_the_verdict_says_where_one_law_wins(boards):
+    lines = {line.partition(":")[0]: line for line in ensemble.verdict(boards).splitlines()}
+    assert lines["tv_rate"] == "tv_rate: pid wins on all 5 parameter sets"
+    assert set(lines) == {board.metric for board in boards}
+    for board in boards:
+        start = f"{board.metric}: {board.winner or 'no law'} wins on all 5"
+        assert lines[board.metric].startswith(start)
+
+
+def test_a_rig_of_one_set_is_refused():
+    with pytest.raises(smc.ScenarioError, match="emps has one set of parameters: choose a rig with an ensemble"):
+        ensemble.runs(smc.rig("emps"), LAWS)
+
+
+def test_a_board_of_a_voltage_is_in_volts(tmp_path):
+    fields = {"actuator": smc.DCMotor(command="voltage"), "duration": 0.2}
+    runs = [
+        smc.Scenario(plant="duffing", law=law, x0=x0, seed=seed, **fields)
+        for law in LAWS
+        for seed, x0 in enumerate((0.2, 0.3))
+    ]
+    (board,) = smc.leaderboard(smc.study(runs, tmp_path, progress=False), metrics=("tv_rate",))
+    assert board.unit == "V/s"
+
+
+def test_the_command_identifies_from_files(tmp_path):
+    rig = smc.rig("emps")
+    smc.run(rig.scenario(duration=0.6, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(tmp_path / "run.npz")
+    words = ["identify", "emps", str(tmp_path / "run.npz"), "--quantities", "mass", "--starts", "1"]
+    done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "found.json")])
+    assert done.exit_code == 0, done.output
+    assert "mass" in done.output
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["quantities"]["mass"]["value"] == pytest.approx(95.1089, rel=0.02)
+    wrong = CliRunner().invoke(app, [*words, "--columns", "x"])
+    assert wrong.exit_code == 2
+    assert "columns 'x' cannot be read: write them as theta=arm_angle,t=time" in wrong.output
