@@ -113,7 +113,9 @@ class Advice:
 
     @property
     def code(self) -> str:
-        """The advised law as Python, "" for a law that is not in the catalogue under its name."""
+        """The advised law as Python, "" if none is advised or it is not in the catalogue under its name."""
+        if not self.choices[0].settles or not self.choices[0].fit:
+            return ""
         known = catalogue().get(self.law.name)
         return f"smc.{self.law!r}" if known is not None and known.function is self.law.function else ""
 
@@ -170,8 +172,10 @@ class Advice:
         law = f"{first.law} ({first.source})"
         if not first.settles or not first.fit:
             why = "none settles in any run" if not first.settles else "none settles often enough in every condition"
-            cure = "give longer runs, a stronger actuator, more suitable laws or easier conditions"
-            return f"No law can be advised, because {why}: {cure}. The best mean rank has {law}."
+            longer = f"longer runs than {self.table.scenario(0).duration:g} s"
+            cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
+            best = f" The best mean rank has {law}." if others else ""
+            return f"No law can be advised, because {why}: {cure}.{best}"
         if others and len(self.level) == len(others):
             every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
             return (

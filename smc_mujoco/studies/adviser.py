@@ -212,6 +212,8 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Componen
 
 def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
     """Return the laws that were found, or raise ScenarioError if there is none."""
+    if not found and not properties:
+        raise ScenarioError(f"the package has no law for {plant.name}: give your own with laws, as [my_law]")
     if not found:
         said = " and ".join(PROPERTIES[name].words for name in properties) or "suit"
         raise ScenarioError(f"no law for {plant.name} is among those that {said}: ask for less")

@@ -171,7 +171,13 @@ def test_few_seeds_tell_no_law_from_another(folder):
 
 def test_if_nothing_settles_nothing_is_advised(folder):
     found = smc.which("duffing", needs="calm", laws=[FAST, SLOW], out=folder, duration=0.1, seeds=4)
-    assert found.answer[0].startswith("No law can be advised, because none settles in any run: give longer runs")
+    assert found.answer[0].startswith(
+        "No law can be advised, because none settles in any run: give longer runs than 0.1 s"
+    )
+    assert "The best mean rank has " in found.answer[0]
+    assert found.code == ""
+    alone = smc.which("duffing", needs="calm", laws=[FAST], out=folder, duration=0.1, seeds=4)
+    assert alone.answer[0].endswith("or easier conditions.")
 
 
 def test_one_law_is_the_only_one(folder):
@@ -296,6 +302,7 @@ def test_without_a_velocity_sensor_velocity_is_differentiated(folder):
         ({"needs": "one-gain"}, "no law for duffing is among those that have one gain to choose"),
         ({"needs": "continuous", "laws": ["twisting"]}, "no law for duffing is among those that have a continuous u"),
         ({"plant": "dufing"}, "did you mean 'duffing'"),
+        ({"plant": "furuta"}, "the package has no law for furuta: give your own"),
         ({"laws": ["clasical"]}, "did you mean 'classical'"),
         ({"laws": [FAST, smc.law("observer_free")]}, "two laws have one name"),
         ({"conditions": "jump_mil"}, "did you mean 'jump_mild'"),
