@@ -18,7 +18,7 @@ BLOW = {
 }
 CLIPS = {  # name of the clip: plant, condition, title, seconds, what else of the scenarios
     "inverted_pendulum": ("inverted_pendulum", "nominal", "Inverted pendulum", 1.5, {}),
-    "van_der_pol": ("van_der_pol", "noise", "Van der Pol under measurement noise", 4.0, {}),
+    "van_der_pol": ("van_der_pol", "noise", "Van der Pol under measurement noise", 2.0, {}),
     "duffing": ("duffing", "nominal", "Duffing", 3.0, {}),
     "pendulum_network": ("pendulum_network", "nominal", "Five coupled pendulums", 2.0, {}),
     "hard_stops": ("inverted_pendulum", "nominal", "A blow, rubber stops, and friction in the joint", 2.2, BLOW),

@@ -12,8 +12,9 @@ THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape 
 HEIGHT = 4e-4  # of the model's extent: height of shadows over the floor
 EMISSION = 20.0  # so large that a shadow is as dark whichever light falls on it
 TINT = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
-THIN = 1.5  # px: shapes that are thinner, such as marks of a scale, cast no shadow
-PLANE, GEOM, TENDON = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_TENDON
+THIN, MARK = 1.0, 3.0  # px: half of the thickness of shapes, and of boxes such as marks of a scale, without a shadow
+PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
+GEOM, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_TENDON
 
 
 def flattening(way: np.ndarray) -> np.ndarray:
@@ -25,8 +26,8 @@ def flattening(way: np.ndarray) -> np.ndarray:
 
 def casting(model: mujoco.MjModel, pixel: float) -> np.ndarray:
     """Return which geoms cast shadows, (geoms,): opaque ones that are not too thin; `pixel` is the size of one, m."""
-    thick = np.sort(model.geom_aabb[:, 3:], axis=1)[:, 1] > THIN * pixel
-    return thick & (model.geom_type != PLANE)
+    least = np.where(model.geom_type == BOX, MARK, THIN) * pixel
+    return (np.sort(model.geom_aabb[:, 3:], axis=1)[:, 1] > least) & (model.geom_type != PLANE)
 
 
 def draw(scene: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> None:
