@@ -147,8 +147,9 @@ def identify(
         search = Search(twin, names, data, checked, drawn.advance)
         stages = ("pieces", "whole") if twin.dynamics is None and twin.window else ("whole",)
         z = search.best_start(stages[0], starts, seed)
-        for stage in stages:
-            z = search.refine(stage, z, most)
+        if stages[0] == "pieces":
+            z = search.better("whole", z, search.refine("pieces", z, most))
+        z = search.refine("whole", z, most)
         values, errors, correlations = search.statistics(z)
     found = twin.with_values(values, "identified from records")
     return Identified(
@@ -246,8 +247,11 @@ class Search:
             np.clip(here * np.exp(SPREAD * rng.standard_normal(len(here))), self.low, self.high)
             for _ in range(starts - 1)
         ]
-        costs = [float(np.sum(residual**2)) for residual in self.residuals(points, stage)]
-        return points[int(np.argmin(costs))]
+        return self.better(stage, *points)
+
+    def better(self, stage: str, *points: np.ndarray) -> np.ndarray:
+        """Return the point of least cost, the first of equals."""
+        return points[int(np.argmin([float(np.sum(residual**2)) for residual in self.residuals(points, stage)]))]
 
     def refine(self, stage: str, z: np.ndarray, most: int) -> np.ndarray:
         """Return the point of least squares near z."""
