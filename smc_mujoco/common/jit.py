@@ -8,6 +8,7 @@ import hashlib
 import io
 import os
 import re
+import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ from numba.core.ccallback import CFunc
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import TypingError
 from numba.core.sigutils import normalize_signature
+from numba.core.utils import _dynamic_modname, _dynamic_module
 from numba.extending import intrinsic
 
 from smc_mujoco.common.interrupts import held_back
@@ -27,6 +29,10 @@ from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST = hashlib.sha256().digest_size
+
+# Numba imports the module of a function that it loads from its cache, and names those that cannot be imported, such as
+# a scene file, by a name of its own, which cannot be imported either.
+sys.modules.setdefault(_dynamic_modname, _dynamic_module)
 
 if hasattr(os, "register_at_fork"):  # else a child would wait for ever for a lock that a thread of its parent held
     os.register_at_fork(

@@ -296,6 +296,23 @@ def test_where_rendering_is_turned_off_all_but_the_film_is_written_and_one_line_
     assert "MUJOCO_GL" in line
 
 
+def test_a_scene_files_law_is_loaded_from_numbas_cache_by_the_next_process(scene, folder):
+    code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
+    for out in ("one", "two"):
+        done = python(
+            "-c",
+            code,
+            "run",
+            scene,
+            "--out",
+            out,
+            cwd=folder,
+            MUJOCO_GL="disabled",
+            NUMBA_CACHE_DIR=str(folder / "numba"),
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+
+
 # show
 
 
