@@ -5,7 +5,7 @@ law on the surface of its Riccati equation, with 6 N m at the elbow. The law kno
 motor in the joint where it acts.
 
 Look for: 1.2 s to the top. A little friction holds the machine where it leans, a fold of the elbow against the
-shoulder; more makes it miss the top and whirl on. Nothing swings it up a second time.
+shoulder; more keeps it rocking about the top, which is not up by the board's rule.
 """
 
 import smc_mujoco as smc
@@ -34,7 +34,7 @@ def answer(runs):
 scene = smc.Scene(
     title="Acrobot",
     conditions={
-        "friction": {"none": run(0.0), "0.01 N m": run(0.01), "0.02 N m": run(0.02), "0.08 N m": run(0.08)},
+        "friction": {"no friction": run(0.0), "0.01 N m": run(0.01), "0.02 N m": run(0.02), "0.08 N m": run(0.08)},
     },
     answer=answer,
 )
