@@ -17,6 +17,7 @@ from smc_mujoco.cli import main, tables
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw.film import film
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.metrics.catalogue import metrics, score
 
@@ -183,6 +184,17 @@ scene = smc.Scene(title="Asked", conditions={"calm": {"only": run}}, answer=lamb
     assert code == 0
     assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked"]
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
+
+
+def test_run_hands_the_speed_and_the_camera_to_the_film(call, undrawn, scene, folder, monkeypatch):
+    asked = {}
+    monkeypatch.setattr(film, "missing", lambda: None)
+    monkeypatch.setattr(film, "film", lambda *args, **options: asked.update(options) or args[1])
+    assert call("run", scene, "--speed", "0.5", "--camera", "60,-20,3")[0] == 0
+    assert (asked["speed"], asked["camera"]) == (0.5, (60.0, -20.0, 3.0))
+    code, _, err = call("run", scene, "--camera", "1,2,3,4")
+    assert code == 2
+    assert "give the name of a camera of the model, or (azimuth, elevation)" in err
 
 
 def test_results_go_to_videos_and_the_scene_s_name_when_nothing_else_is_asked_for(call, scene, folder):
