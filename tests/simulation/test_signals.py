@@ -445,7 +445,7 @@ def test_a_csv_file_is_read(content, asked, values, file):
         ("t;d\n0;1\n0,1;2\n", {}, ("one column", "commas")),
         ("", {}, ("empty",)),
         ("\n\n", {}, ("empty",)),
-        (b"\x89PNG\r\n\x1a\n\0\0", {}, ("no text", "commas")),
+        (b"\x89PNG\r\n\x1a\n\0\0", {}, ("not text", "commas")),
         (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
         ('t,d\n0,"1\n', {}, ("CSV", "commas")),
         ("t,d\n0,0\n1e-300,1e300\n", {}, ("line 3", "too steep")),
