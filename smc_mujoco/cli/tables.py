@@ -26,7 +26,7 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
-from smc_mujoco.studies.board_tables import size
+from smc_mujoco.studies.board_tables import size, spread
 from smc_mujoco.studies.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
 from smc_mujoco.studies.paper.claims import verdict as verdicts
@@ -46,6 +46,7 @@ SHOWN = {
 FAILED = Text("failed", style="red")
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
+INTERVAL_WIDTH = 13  # characters of a line: four metrics fit in 80 columns
 BOARD_KEY = (
     "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition. A winner is "
     "better than every other law: its median is lower by more than 3 %, and the seeds confirm it. Over several "
@@ -282,10 +283,12 @@ def _law_cell(board: Board | None, law: str) -> Text:
     if board is None or entry is None:
         return Text("")
     middle = size(entry.interval.median, board.metric)
-    low, high = (size(value, board.metric, digits=2) for value in entry.interval[1:3])
+    ends = spread(entry.interval, board.metric)
+    if len(ends) > INTERVAL_WIDTH:
+        ends = ends.replace("–", "–\n")
     text = Text(f"{middle} " if middle else "", "bold" if entry.rank.best else "")
     text.append(f"#{entry.rank.place:g}").append("*" if entry.rank.best else " ")
-    return text.append(f"\n{low}–{high}" if low else "", "dim not bold")
+    return text.append(f"\n{ends}" if ends else "", "dim not bold")
 
 
 def _winner_cell(board: Board | None) -> Text:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common import html
 from smc_mujoco.common.text import number
@@ -40,6 +41,15 @@ def size(value: float, metric: str, digits: int = 3) -> str:
     if math.isnan(value):
         return ""
     return f"{100 * value:.0f}" if metric == SETTLES else number(value, digits)
+
+
+def spread(interval: Interval, metric: str) -> str:
+    """Return the ends of an interval with the digits of its median, so that it holds the median as printed.
+
+    It is "" for an interval that is not known.
+    """
+    ends = [size(value, metric) for value in (interval.low, interval.high)]
+    return "–".join(ends) if all(ends) else ""
 
 
 def heading(board: "Board") -> str:
@@ -105,9 +115,8 @@ def _laws(boards: Sequence["Board"]) -> dict[str, list[Cell]]:
     for i, board in enumerate(boards):
         for entry in board.entries:
             middle = size(entry.interval.median, board.metric)
-            ends = [size(value, board.metric, digits=2) for value in entry.interval[1:3]]
             best = entry.rank.best and middle != "" and not board.too_few
-            cell = Cell(middle, "–".join(ends) if all(ends) else "", best)
+            cell = Cell(middle, spread(entry.interval, board.metric), best)
             laws.setdefault(entry.law, [Cell("", "", False)] * len(boards))[i] = cell
     return laws
 

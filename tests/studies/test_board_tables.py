@@ -7,12 +7,18 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from rich.console import Console
 
+from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.cli import tables
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.studies.board_tables import TEX
+from smc_mujoco.studies import board_tables
+from smc_mujoco.studies.advice import _interval
+from smc_mujoco.studies.board_tables import TEX, spread
 from smc_mujoco.studies.leaderboard import Boards, leaderboard
+from smc_mujoco.studies.report import words
 
 EVIL = r"50 % & <b>x_1^{2}</b> \ λ = 2 #~$"
 LAWS = (EVIL, "second", "third")
@@ -82,6 +88,21 @@ def test_html_has_the_numbers_of_the_text_board(boards):
     assert shown["third"][1] == "0 0–16"
     assert shown["second"][1].startswith("100 ")
     assert re.fullmatch(r"[34]\.\de-7 \S+e-7–\S+e-7", shown["third"][0])
+
+
+@given(st.lists(st.floats(1e-12, 1e7) | st.just(math.inf), min_size=3, max_size=3).map(sorted))
+@example([0.606, 0.608, 0.612])
+def test_printed_median_lies_in_its_printed_interval(values):
+    def size(text: str) -> float:
+        return float(text.replace("never", "inf").replace("<1e-9", "0"))
+
+    low, median, high = values
+    interval = Interval(median, low, high, 20)
+    middle, *_ = advice = re.split(r" \(| to |\)", _interval(interval))
+    for ends in (spread(interval, "itae").split("–"), words.interval(median, low, high).split(" – "), advice[1:3]):
+        if any(ends):
+            assert size(ends[0]) <= size(middle) <= size(ends[1])
+    assert middle == board_tables.size(median, "itae") == words.number(median)
 
 
 def test_only_what_no_law_beats_is_bold(boards):
