@@ -22,6 +22,7 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
+from numba.core.typing.templates import builtin_registry
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
@@ -69,17 +70,20 @@ def package(*without: str) -> str:
 def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
+    That of a function, a class or a tuple is the same as at the first call, whatever has changed since.
+
     Raises:
       ScenarioError: it holds something that can be neither read nor pickled.
     """
     unchanging = isinstance(thing, FunctionType | type | tuple)
     try:
-        return _cached(thing) if unchanging else _hash(thing)
+        return _cached(thing) if unchanging else now(thing)
     except TypeError:  # not hashable
-        return _hash(thing)
+        return now(thing)
 
 
-def _hash(thing: Any) -> str:
+def now(thing: Any) -> str:
+    """Return the hash of a thing as it is now; raises as `of`."""
     buffer = io.BytesIO()
     try:
         _CodePickler(buffer, pickle.DEFAULT_PROTOCOL).dump(thing)
@@ -90,7 +94,7 @@ def _hash(thing: Any) -> str:
     return hashlib.sha256(buffer.getvalue()).hexdigest()
 
 
-_cached = functools.cache(_hash)  # a compiled law keeps the globals that it was compiled with, so does its hash
+_cached = functools.cache(now)  # a compiled law keeps the globals that it was compiled with, so does its hash
 
 
 class _CodePickler(pickle._Pickler):
@@ -155,7 +159,14 @@ def _function_contents(function: FunctionType) -> list[Any]:
         function.__kwdefaults__,
         closure,
         *_reached(function.__globals__, names, set()),
+        *_overloads(function),
     ]
+
+
+def _overloads(function: FunctionType) -> list[Any]:
+    """Return the functions that numba compiles in place of this one, given to `numba.extending.overload`."""
+    kinds = (kind for known, kind in builtin_registry.globals if known is function)
+    return [vars(each)["_overload_func"] for kind in kinds for each in kind.templates if "_overload_func" in vars(each)]
 
 
 def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list[Any]:

@@ -111,10 +111,15 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
-    """Return the name and the hash under which a compiled function is kept on disk; False if it has no hash."""
+    """Return the name and the hash under which a compiled function is kept on disk.
+
+    It is False, for none, if the function has no hash, or if a global of it has changed since it was hashed first: the
+    code has the present value.
+    """
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function.__qualname__}")
     try:
-        return name, f"{magic()} {fingerprint.of(function)} {arguments}"
+        known = fingerprint.of(function)
+        return known == fingerprint.now(function) and (name, f"{magic()} {known} {arguments}")
     except ScenarioError:
         return False
 

@@ -45,10 +45,11 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
-from smc_mujoco.simulation import coerce, serialise
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, grid, listed
 from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.studies import run_key
 from smc_mujoco.studies.advice import NEEDS, Advice, Choice
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
@@ -272,7 +273,9 @@ def _tuned(
     conditions = tuple(one for one in usual.conditions if applicable([one.name], [plant], usual.duration))
     goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
     (first, *_) = goal.scenarios(plant, coerce.law(law), 0)
-    depends = [serialise.describe(first), goal.describe(), fingerprint.of(coerce.law(law).function)]
+    template = law if isinstance(law, Template) else coerce.law(law).template
+    searched = template and (dict(template.gains), dict(template.conditions))  # which gains, and where
+    depends = [run_key.key(first), goal.describe(), fingerprint.of((coerce.law(law).function, searched))]
 
     def tuned_anew() -> result.Tuned:
         with warnings.catch_warnings():

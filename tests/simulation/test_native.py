@@ -8,8 +8,10 @@ import numba
 import numpy as np
 import pytest
 from numba import njit
+from numba.extending import overload
 
 import smc_mujoco as smc
+from smc_mujoco.common import fingerprint
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import native
 
@@ -69,6 +71,27 @@ def test_a_law_that_has_changed_is_not_taken_for_the_one_before():
     assert [force(mine("gains.k")), force(mine("2.0 * gains.k")), force(mine("gains.k"))] == [3.0, 6.0, 3.0]
     assert [force(mine(scaled, factor=f)) for f in (4.0, 5.0)] == [12.0, 15.0]
     assert [force(helped(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
+
+
+def test_a_global_that_changes_between_hash_and_compilation_is_not_kept_under_the_old_hash(cache):
+    """A study hashes a law before it compiles it; another process with the old value must not load the new one."""
+    late = mine("factor * gains.k", factor=2.0)
+    fingerprint.of(late)
+    late.__globals__["factor"] = 5.0
+    assert force(late) == 15.0
+    assert force(mine("factor * gains.k", factor=2.0)) == 6.0
+
+
+def test_what_numba_compiles_in_place_of_a_function_tells_laws_apart():
+    """A user's `overload` is registered with numba, and neither a global nor in the closure."""
+
+    def overloaded(number):
+        def thing(x): ...
+
+        overload(thing)(lambda x: lambda x: number * x)
+        return mine("thing(gains.k)", thing=thing)
+
+    assert [force(overloaded(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
 
 
 def test_code_of_another_law_under_the_index_of_this_one_is_not_run(cache):

@@ -5,6 +5,7 @@ import io
 import math
 import types
 
+import mujoco
 import numpy as np
 import pytest
 from rich.console import Console
@@ -258,6 +259,29 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     assert (tuned[0].budget, tuned[0].plant) == (4, heavy)
     assert smc.which(heavy, **options).law == found.law
     assert len(tuned) == 1
+
+
+def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_differs(folder, monkeypatch):
+    @law_function(gains={"kp": Gain(1.0, FORCE_PER_POSITION), "kd": Gain(1.0, FORCE_PER_SPEED)})
+    def my_spring(y, gains, memory):
+        return -gains.kp * y.e - gains.kd * y.de, y.e
+
+    def build():
+        return mujoco.MjSpec.from_string("<mujoco/>")
+
+    asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0)
+    monkeypatch.setattr(adviser, "cached", lambda path, depends, *rest: asked.append(depends) or tuned)
+    held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": Gain(1.0, FORCE_PER_SPEED, held=True)})
+    duffing = smc.plant("duffing")
+    for plant, law in (
+        (duffing, my_spring),
+        (duffing, my_spring),
+        (duffing, held),
+        (dataclasses.replace(duffing, build=build), my_spring),
+    ):
+        adviser._tuned(plant, law, 4, None, folder, None)
+    assert asked[0] == asked[1]
+    assert len({str(depends) for depends in asked}) == 3
 
 
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
