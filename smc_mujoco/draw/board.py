@@ -21,6 +21,7 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
+ROUNDING = 1e-9  # a size below it is printed as "<1e-9"
 LINE = 0.18  # inches on a full page, height of a law's line
 
 
@@ -36,7 +37,7 @@ def plot(
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by condition.
 
     There is a column of panels per metric and a row per plant. A dot at the right edge, under "never", is a law whose
-    median run fails or does not settle.
+    median run fails or does not settle. Sizes below 1e-9 are rounding: they are drawn at 1e-9.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -70,13 +71,21 @@ def plot(
         space = pages.head(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
+        room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
+            labels = [_label(name, plant) for name in names]
+            if any(style.width(label, style.points(pages.LETTERS)) > room for label in labels):
+                labels = [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
             for k, name in enumerate(names):
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
+                axes[i, k].set_xlabel(labels[k])
                 axes[i, k].tick_params(labelleft=k == 0)
             known = plants_catalogue().get(plant)
-            axes[i, 0].set_title(style.plant_name(known) if known else plant, parse_math=False)
-        pages.set_head(page, width, title or "Medians over seeds, by condition", key)
+            above = (
+                None if width >= pages.NARROW else 1.0 + style.points(1.7 * pages.LETTERS / 72) / style.points(tall[i])
+            )
+            axes[i, 0].set_title(style.plant_name(known) if known else plant, y=above, parse_math=False)  # over "never"
+        pages.set_head(page, width, title or "Medians by condition", key)
         pages.write(page, paths)
     return page
 
@@ -99,7 +108,9 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
             if len(here) and metric == SETTLES:
                 found[law, j * (len(laws) + 1) + k] = share_interval(float((here == 0.0).mean()), len(here))
             elif len(here):
-                found[law, j * (len(laws) + 1) + k] = median_interval(here)
+                one = median_interval(here)
+                middle, low, high = (max(v, ROUNDING) if v > 0.0 else v for v in one[:3])
+                found[law, j * (len(laws) + 1) + k] = Interval(middle, low, high, one.n)
     sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
     if metric != SETTLES and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
         ax.set_xscale("log")
@@ -114,7 +125,6 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
     ax.set_ylim(len(there) * (len(laws) + 1) - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
-    ax.set_xlabel(_label(metric, plant))
 
 
 def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, stretches, window
 from smc_mujoco.draw.states import HOLD, at_rest, has_dry_friction
@@ -75,8 +76,8 @@ class Panel(NamedTuple):
             return f"max − min x{unit}"
         if name in REALISM:
             return f"{mean}{'delivered' if name == 'force' else 'reaction'}{' on q' * (not group.driven)}{unit}"
-        if name == "s" and plant.free:
-            return f"{mean}sliding variable s"  # of both joints, in a unit that depends on the law
+        if name == "s" and (plant.free or not all(_is_rate(trace.scenario.law) for trace in self.traces)):
+            return f"{mean}sliding variable s"  # its unit depends on the law
         if name == "s" and plant.mixed:
             return f"{mean}s{unit}"  # short: there are many such panels, and they are low
         kind = {"rad": "angle", "m": "position"}[group.unit]
@@ -84,6 +85,11 @@ class Panel(NamedTuple):
         kind |= {"e": "error", "d": "disturbance", "applied": "control"}
         letter = name if group.driven else {"x": "q", "v": "q′"}.get(name, name)
         return f"{mean or kind[name] + ' '}{letter}{unit}"
+
+
+def _is_rate(law: Law) -> bool:
+    """Return whether a law's s has the unit of a velocity; that of twisting is e, and that of PID a force."""
+    return law.relative_degree == 1 and (law.template is None or law.template.family != "baseline")
 
 
 def overview(traces: Sequence[Trace]) -> list[Panel]:

@@ -189,7 +189,9 @@ class Advice:
         if not first.settles or not first.fit:
             return ""
         leads = first.rank.mean == min(choice.rank.mean for choice in self.choices if choice.fit)
+        equals = [c.law.name for c in self.choices[1:] if c.fit and c.rank.mean == first.rank.mean]
         why = f"it has the best mean rank of {count} finalists"
+        why += f", as {'has' if len(equals) == 1 else 'have'} {joined(equals)}" if equals else ""
         if not leads:
             why = "it has the best mean rank of those that none dominates, being better somewhere and worse nowhere"
         if count == 1:

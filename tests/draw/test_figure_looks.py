@@ -261,8 +261,8 @@ def test_bad_arguments_are_refused(options, sentence, one):
 class Rows:
     """A table of made-up runs."""
 
-    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6, still="", mixed=False):
-        self.still, self.mixed = still, mixed
+    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6, still="", mixed=False, tiny=False):
+        self.still, self.mixed, self.tiny = still, mixed, tiny
         cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
@@ -278,10 +278,12 @@ class Rows:
         if self.mixed:  # the interval of pid, the fastest, reaches to "never"
             never = [one and int(row[3]) % 2 > 0 for one, row in zip(never, self.rows, strict=True)]
             sizes = [size - 0.9 * (row[2] == "pid") for size, row in zip(sizes, self.rows, strict=True)]
+        if self.tiny:
+            sizes = [size * (1e-22 if row[2] == "pid" else 1.0) for size, row in zip(sizes, self.rows, strict=True)]
         return np.where(never, np.inf, sizes)
 
 
-@pytest.mark.parametrize("size", [None, "ieee-page"])
+@pytest.mark.parametrize("size", [None, PAGE, COLUMN])
 def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     page = smc.plot(Rows(), size=size, metrics=["settling_time", "tv_rate", "settles"])
     check(page)
@@ -290,6 +292,7 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     dots = [line for line in page.axes[1].lines if line.get_marker() not in ("None", None)]
     assert len(dots) == 6
     assert len({to_hex(dot.get_color()) for dot in dots}) == 3
+    assert not any("…" in text.get_text() for text in texts(page))
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itea': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itea"])
@@ -300,6 +303,27 @@ def test_the_axis_of_a_board_comprises_intervals_that_reach_to_never():
     lows = [text.xyann[0] for text in ax.texts if text.arrow_patch is not None]
     assert lows
     assert ax.get_xlim()[0] < min(lows)
+
+
+@pytest.mark.parametrize("size", [PAGE, COLUMN])
+def test_labels_of_the_default_metrics_of_a_board_are_apart(size):
+    page = smc.plot(Rows(), size=size)
+    check(page)
+    room = {PAGE: " ", COLUMN: "\n"}[size]
+    assert [ax.get_xlabel() for ax in page.axes[:2]] == [f"settling time{room}(s)", f"ultimate bound{room}(m)"]
+
+
+def test_sizes_of_rounding_are_drawn_at_its_bound():
+    ax = smc.plot(Rows(tiny=True), metrics=["ultimate_bound"]).axes[0]
+    sizes = np.concatenate([np.asarray(line.get_xdata()) for line in ax.lines if line.get_color() != style.RULE])
+    assert sizes.min() == 1e-9
+    assert sizes.max() > 0.9
+
+
+@pytest.mark.parametrize(("law", "unit"), [("classical", " (m/s)"), ("twisting", ""), ("pid", "")])
+def test_only_an_s_that_is_a_velocity_has_its_unit(law, unit, one):
+    shown = panels.overview([one, under(one, law, 0.9)])[-1]
+    assert shown.label == f"sliding variable s{unit}"
 
 
 def test_a_panel_of_a_board_in_which_no_law_settles_has_no_numbers():

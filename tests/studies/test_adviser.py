@@ -147,6 +147,15 @@ def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advi
     assert "the best mean rank of those that none dominates" in passed.answer[1]
 
 
+def test_the_reason_names_laws_with_the_same_mean_rank(advice):
+    first, *others = advice.choices
+    equal = [dataclasses.replace(choice, rank=choice.rank._replace(mean=first.rank.mean)) for choice in others]
+    names = [choice.law.name for choice in equal]
+    for same, ending in ((1, f", as has {names[0]}."), (2, f", as have {names[0]} and {names[1]}.")):
+        found = dataclasses.replace(advice, choices=(first, *equal[:same], *others[same:]))
+        assert f"the best mean rank of 3 finalists{ending}" in found.answer[1]
+
+
 def test_a_table_has_a_row_for_each_finalist_with_intervals(advice):
     assert advice.heads == ["law", "place", "settles", "fast: settling time, s", "calm: TV rate, N/s"]
     interval = advice.choices[0].medians["fast"]
