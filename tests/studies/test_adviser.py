@@ -340,7 +340,7 @@ def test_without_a_velocity_sensor_velocity_is_differentiated(folder):
         ({"needs": "one-gain"}, "no law for duffing is among those that have one gain to choose"),
         ({"needs": "continuous", "laws": ["twisting"]}, "no law for duffing is among those that have a continuous u"),
         ({"plant": "dufing"}, "did you mean 'duffing'"),
-        ({"plant": "furuta"}, "the package has no law for furuta: give your own"),
+        ({"plant": "acrobot"}, "the package has no law for acrobot: give your own"),
         ({"laws": ["clasical"]}, "did you mean 'classical'"),
         ({"laws": [FAST, smc.law("observer_free")]}, "two laws have one name"),
         ({"conditions": "jump_mil"}, "did you mean 'jump_mild'"),
