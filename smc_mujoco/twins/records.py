@@ -87,9 +87,9 @@ def load(path: str | os.PathLike, names: Mapping[str, str] | None = None) -> Rec
         raise ScenarioError(f"no file at {path}: give the path of a CSV or npz file")
     if file.suffix == ".npz":
         try:
-            with np.load(file) as held:
+            with file.open("rb") as opened, np.load(opened) as held:
                 found = {} if "about" in held else {name: held[name] for name in held}
-        except (OSError, ValueError) as error:
+        except Exception as error:  # damaged bytes raise any exception there is
             raise ScenarioError(f"cannot read {str(path)!r} as npz ({error}): give arrays by column") from None
         if not found:
             return traces.load(file)

@@ -243,6 +243,8 @@ def test_an_entry_is_exported_to_c():
     ("wrong", "words"),
     [
         (lambda: boards.entry("acrobat"), "acrobot"),
+        (lambda: boards.board(smc.run(boards.entry("acrobot", duration=0.01))), "duration of the run is 0.01"),
+        (lambda: boards.board(smc.run(boards.entry("acrobot", x0=3.0, duration=10.0))), "x0 of the run"),
         (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
         (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
         (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),

@@ -122,6 +122,16 @@ def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
     np.testing.assert_array_equal(renamed["position"], columns["x"])
 
 
+@pytest.mark.parametrize("cut", [0, 200, -1], ids=["empty", "cut off", "no archive"])
+def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
+    file = tmp_path / "a.npz"
+    np.savez(file, t=np.arange(99.0)) if cut >= 0 else np.save(file.with_suffix(".npy"), np.arange(3))
+    content = file.read_bytes()[:cut] if cut >= 0 else file.with_suffix(".npy").read_bytes()
+    file.write_bytes(content)
+    with pytest.raises(smc.ScenarioError, match="as npz"):
+        records.load(file)
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [

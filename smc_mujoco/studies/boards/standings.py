@@ -2,6 +2,7 @@
 
 from smc_mujoco.common import errors
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.boards.entries import on_board
 from smc_mujoco.studies.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
 from smc_mujoco.studies.boards.scoring import criteria, score, shoulder_first
 from smc_mujoco.studies.boards.simulator import Robustness
@@ -28,9 +29,16 @@ def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
     """Return the rows of the version-2 simulation board of a trace's plant, with its own row of this name.
 
     Raises:
-      ScenarioError: another plant than pendubot and acrobot, or a name that cannot be printed.
+      ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', or a name that
+        cannot be printed.
     """
     found = criteria(trace)
+    ran, ruled = trace.scenario, on_board(trace.scenario.plant.name, "none")
+    for rule in ("duration", "control_period", "x0", "v0", "limits"):
+        if (value := getattr(ran, rule)) != (right := getattr(ruled, rule)):
+            raise errors.ScenarioError(
+                f"{rule} of the run is {value} and on the boards {right}: use smc.boards.on_board"
+            )
     values = {field: getattr(found, field) for field in Row._fields[1:6]}
     own = Row(name=errors.name("name of the row", name), score=score(found), **values)
     return tuple(sorted((*SIMULATION[trace.scenario.plant.name]["v2"], own), key=lambda row: -row.score))
