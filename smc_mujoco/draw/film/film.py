@@ -126,11 +126,12 @@ def still(
     size: tuple[int, int] = (1280, 720),
     camera: Camera | None = None,
 ) -> Path:
-    """Write the frame at `time` in s as a .png. Other arguments: as `film`."""
+    """Write the frame at `time` in s, within the runs, as a .png. Other arguments: as `film`."""
     path = Path(path)
     if path.suffix != ".png":
         raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
-    now = Clock(np.array([number("time", time, least=0.0)]), np.ones(1))
+    end = max(float(trace.t[-1]) for trace in style.same_plant(traces))
+    now = Clock(np.array([number("time", time, least=0.0, most=end + 1e-9)]), np.ones(1))
     with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path

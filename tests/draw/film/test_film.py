@@ -240,9 +240,10 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
-def test_a_still_before_the_start_is_refused(tmp_path):
-    with pytest.raises(smc.ScenarioError, match="time is -1: give at least 0"):
-        film.still(runs(laws=LAWS[:1], duration=0.1), -1.0, tmp_path / "a.png", size=SIZE)
+def test_a_still_before_the_start_or_after_the_end_is_refused(tmp_path):
+    for time, sentence in ((-1.0, "time is -1: give at least 0"), (0.11, "time is 0.11: give at most 0.1$")):
+        with pytest.raises(smc.ScenarioError, match=sentence):
+            film.still(runs(laws=LAWS[:1], duration=0.1), time, tmp_path / "a.png", size=SIZE)
 
 
 def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
