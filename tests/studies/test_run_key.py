@@ -1,5 +1,6 @@
 """What tells runs apart: equal ones have one key, and whatever decides what a run does changes it."""
 
+import dataclasses
 import functools
 import os
 import shutil
@@ -214,3 +215,12 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
     fingerprint.package.cache_clear()
+
+
+def test_a_nominal_model_in_place_of_a_plants_own_tells_runs_apart():
+    def nominal(x, v, i, q):
+        return 0.0, 1.0
+
+    own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
+    other = dataclasses.replace(own, plant=dataclasses.replace(own.plant, nominal=nominal))
+    assert key(own) != key(other)
