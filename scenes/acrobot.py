@@ -24,10 +24,9 @@ def fold(trace):
 
 
 def answer(runs):
-    standing = runs.those(stands)
     return (
-        f"swung up and held with {standing.named}; of these the elbow ends farthest from straight, in degrees, with "
-        f"{standing.most(fold)}"
+        f"swung up and held with {runs.those(stands).named}; the elbow ends farthest from straight, in degrees, with "
+        f"{runs.most(fold)}"
     )
 
 

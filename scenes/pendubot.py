@@ -23,12 +23,11 @@ def stands(trace):
 
 
 def lean(trace):
-    return 57.3 * abs(trace.x[2000:, 0] - UP).max()
+    return 57.3 * abs(trace.x[trace.t >= 2.0, 0] - UP).max()
 
 
 def answer(runs):
-    standing = runs.those(stands)
-    return f"it stands after {standing.named}; of these it leans farthest, in degrees, after {standing.most(lean)}"
+    return f"it stands after {runs.those(stands).named}; it leans farthest, in degrees, after {runs.most(lean)}"
 
 
 scene = smc.Scene(

@@ -28,11 +28,11 @@ RUNS = {
 
 
 def error(trace):
-    return 1e6 * ((trace.x - trace.r)[2000:] ** 2).mean() ** 0.5
+    return 1e6 * ((trace.x - trace.r)[trace.t >= 2.0] ** 2).mean() ** 0.5
 
 
 def still(trace):
-    return 100.0 * (abs(trace.v[2000:]) < 1e-4).mean()
+    return 100.0 * (abs(trace.v[trace.t >= 2.0]) < 1e-4).mean()
 
 
 def answer(runs):

@@ -220,7 +220,7 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, f
     (folder / "wide.py").write_text("\n".join(lines))
     code, out, _ = call("run", "wide.py", "--no-video", "--out", "out")
     assert code == 0
-    table = out.partition("Wide")[2].partition("wrote\n")[0].partition("sour:")[0].splitlines()
+    table = out.partition("Wide")[2].partition("\n\n")[0].splitlines()
     assert max(map(len, table)) <= 80
     (row,) = [line for line in table if line.startswith(LABEL[:8])]
     (saved,) = [path for path in (folder / "out").glob("*.npz") if "label" in path.name]

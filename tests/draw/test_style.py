@@ -89,6 +89,7 @@ def test_law_colours_never_repeat_in_one_picture():
     assert len({*style.law_colours([*smc.laws(), *names])}) == len(smc.laws()) + len(names)
 
 
+@pytest.mark.filterwarnings("ignore:no set of gains tried")
 def test_laws_that_would_share_a_colour_differ_in_signals_and_fronts_too(monkeypatch):
     monkeypatch.setattr(style, "law_colour", lambda law: style.OTHERS[0])
     laws = ("observer_free", "classical")

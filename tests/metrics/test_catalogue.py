@@ -15,6 +15,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.metrics import catalogue as m
 from smc_mujoco.metrics.conventions import scale
+from smc_mujoco.simulation.trace import Trace
 
 SYNC = {"mean_settling_time", "spread_settling_time", "spread_bound"}
 
@@ -36,6 +37,7 @@ class Run:
     scenario: SimpleNamespace
     diverged_at: float | None = None
     failure: str | None = None
+    plant_diverged = Trace.plant_diverged
 
 
 def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):

@@ -11,9 +11,10 @@ import itertools
 import math
 import re
 import textwrap
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 # Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
+PARSING = threading.Lock()
 KINDS = ("bool", "int", "single", "real")
 WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
@@ -347,7 +349,7 @@ class Function:
 
     def augment(self, node: ast.AugAssign) -> str:
         """Translate target op= value."""
-        result = self.numeric(ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value))
+        result = self.numeric(ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value))
         target = self.destination(node.target, result.kind)
         if type(node.op) in OPERATORS and result.kind not in WHOLE_KINDS:
             return f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
@@ -596,13 +598,19 @@ class Function:
 # reading Python
 
 
+def syntax(text: str, mode: Literal["exec", "eval"] = "exec") -> Any:
+    """Return the syntax tree of a text. Before Python 3.11.8 two threads must not build one at once (gh-106905)."""
+    with PARSING:
+        return ast.parse(text, mode=mode)
+
+
 def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     """Return a Python function, compiled or not, and its syntax tree."""
     written = getattr(function, "py_func", function)
     if not isinstance(written, FunctionType):
         raise refuse(None, f"{getattr(function, '__name__', function)}, which is not a Python function,")
     try:
-        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(written))).body
+        (tree,) = syntax(textwrap.dedent(inspect.getsource(written))).body
     except (OSError, SyntaxError, ValueError):
         raise refuse(None, f"{written.__name__}, whose source is not available,") from None
     if not isinstance(tree, ast.FunctionDef):

@@ -17,7 +17,9 @@ from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.control import units
 from smc_mujoco.control.law import catalogue
 
-ALONE = {"hierarchical": "its plants have a free joint, and `search_space.scales` refuses them"}
+ALONE = dict.fromkeys(
+    ("hierarchical", "rotary_swing_up"), "its plants have a free joint, and `search_space.scales` refuses them"
+)
 LAWS = [name for name in catalogue() if name not in ALONE]
 
 # Numbers with a unit in the formulas, which no gain states.

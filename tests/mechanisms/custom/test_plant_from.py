@@ -931,7 +931,7 @@ HARM = {  # what the model has, and words of the sentence
         '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
         "arm.xml .*more than 4 GiB of memory: (make|fix)",
     ),
-    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: (make|fix)ake it smaller"),
+    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
     "nan": (
         '<default><joint damping="nan"/></default>',
         r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): fix the file",
