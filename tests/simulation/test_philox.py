@@ -196,3 +196,9 @@ def test_process_noise_with_absurdly_many_knots_is_refused(dt):
     """Each knot costs time: 1e13 of them would hang in compiled code that hears no Ctrl-C."""
     with pytest.raises(smc.ScenarioError, match="dt"):
         smc.Scenario(plant="duffing", law="none", disturbance=smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt))
+
+
+def test_uniform_numbers_are_numpys_53_bits_of_a_block():
+    for k in range(1, 50):
+        word = int(numpys(7, 3, 5, k)[0])
+        assert philox.uniform(np.uint64(7), np.uint64(3), np.uint64(5), np.uint64(k)) == (word >> 11) * 2.0**-53

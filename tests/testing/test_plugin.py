@@ -15,6 +15,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.testing import golden, report
+from smc_mujoco.testing.limits import bound
 from smc_mujoco.testing.response import respond
 
 ROOT = Path(__file__).parents[2]
@@ -111,6 +112,13 @@ def test_check_tells_all_limits_that_were_missed_at_once(session):
         ("overshoot", "NO"),
         ("max_u", "yes"),
     ]
+
+
+@pytest.mark.parametrize(("value", "kept"), [(0.9, False), (1.0, True), (2.0, True), (2.1, False)])
+def test_a_pair_of_limits_holds_from_both_sides(value, kept):
+    found = bound("overshoot", value, "%", (1.0, 2.0))
+    assert found.kept == kept
+    assert found.limit == "1 .. 2"
 
 
 def test_the_frames_of_this_package_stay_out_of_a_failure(session):

@@ -142,6 +142,23 @@ def test_an_arrow_ends_where_the_bar_of_its_range_does(plant):
 
 
 @renders
+def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
+    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, x0=0.0))
+
+    def column(picture):
+        """Return the mean column of what differs from the pendulum upright, from the middle."""
+        return np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1].mean() - 320
+
+    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
+        scene.pose(0, np.array([0.0]))
+        upright = scene.render().astype(int)
+        left, right = (column(scene.render([(0, 0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))])) for end in (-1.0, 1.0))
+        scene.pose(0, np.array([0.4]))
+        leaning = column(scene.render())
+    assert leaning * right > 0.0 > leaning * left
+
+
+@renders
 def test_the_drum_on_a_crane_s_trolley_hides_none_of_its_arrow():
     trace = smc.run(smc.Scenario(plant="overhead_crane", law="none", duration=0.01))
     seen = []
