@@ -33,6 +33,7 @@ COMMANDS = {
     "basin": analysis.basin,
     "chatter": analysis.chatter,
     "claims": studies.claims,
+    "papers": studies.papers,
     "report": studies.report,
     "view": runs.view,
     "check-c": c.check_c,

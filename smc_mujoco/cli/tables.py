@@ -26,11 +26,11 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
+from smc_mujoco.studies.audit import verdict as verdicts
+from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.board_tables import size, spread
 from smc_mujoco.studies.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
-from smc_mujoco.studies.paper.claims import verdict as verdicts
-from smc_mujoco.studies.paper.claims.verdict import Claim
 from smc_mujoco.twins.identify import Identified
 
 # Columns of a table of scores: heading -> metric.

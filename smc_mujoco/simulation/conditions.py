@@ -169,13 +169,27 @@ def parse(text: str) -> Condition:
     """
     name, _, fields = text.partition(":")
     try:
-        call = ast.parse(f"_({fields})", mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        values = read_fields(fields)
+    except SyntaxError:
+        cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
+        raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}") from None
+    return condition(name.strip(), **values)
+
+
+def read_fields(text: str) -> dict[str, Any]:
+    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3", see `parse`.
+
+    Raises:
+      SyntaxError: the text is no list of fields.
+      ScenarioError: it names something unknown, or a field twice.
+    """
+    try:
+        call = ast.parse(f"_({text})", mode="eval").body
+    except (ValueError, RecursionError, MemoryError):
         call = None
     if not isinstance(call, ast.Call) or call.args or any(word.arg is None for word in call.keywords):
-        cure = 'write it as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"'
-        raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}")
-    return condition(name.strip(), **_keywords(call))
+        raise SyntaxError
+    return _keywords(call)
 
 
 def from_file(path: Path) -> list[Condition]:

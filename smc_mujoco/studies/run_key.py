@@ -18,7 +18,14 @@ from smc_mujoco.studies.paper import scenarios
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
-UNRELATED = ("studies/paper/claims", "draw", "testing", "control/tuned_gains")  # folders that do not affect runs
+UNRELATED = (
+    "studies/audit",
+    "studies/papers",
+    "studies/paper/claims",
+    "draw",
+    "testing",
+    "control/tuned_gains",
+)  # folders that do not affect runs
 MAX_NAME = 60  # characters of a condition's name
 
 

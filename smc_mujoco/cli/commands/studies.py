@@ -1,4 +1,4 @@
-"""smc-mujoco which, bench, claims, report: many questions, answered by a study."""
+"""smc-mujoco which, bench, claims, papers, report: many questions, answered by a study."""
 
 from pathlib import Path
 from typing import Annotated
@@ -242,6 +242,10 @@ def claims(
     quick: Annotated[
         bool, typer.Option("--quick", help="Coarser grids, no network above 50 pendulums, tuned gains only.")
     ] = False,
+    paper: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`, or a folder; default Gaber's."),
+    ] = None,
     table: Annotated[
         Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
     ] = None,
@@ -261,11 +265,16 @@ def claims(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import replacing, writable
         from smc_mujoco.common.progress import bar
+        from smc_mujoco.studies.audit import audit as of_papers
         from smc_mujoco.studies.paper.claims.audit import claims as audit
         from smc_mujoco.studies.paper.claims.audit import document, evaluations
         from smc_mujoco.studies.table import Table
 
     terminal = Terminal()
+    if paper is not None:
+        found = of_papers.claims(None, ids or None, gains and options.names(gains), quick, threads=threads, paper=paper)
+        print(document(found)) if json else tables.print_claims(found, terminal, full=bool(ids))
+        return
     sets = None if gains is None else options.names(gains)
     known = None if table is None else Table.read(table)
     if out:
@@ -283,6 +292,30 @@ def claims(
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(str(out))}" if out else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
+
+
+@errors_as_sentences()
+def papers(
+    new: Annotated[
+        Path | None, typer.Option("--new", metavar="FOLDER", help="Make a folder with a paper of yours, which runs.")
+    ] = None,
+) -> None:
+    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, or begin one of your own.
+
+    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
+
+    Example: smc-mujoco papers --new my_paper && smc-mujoco claims --paper ./my_paper
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.studies.audit import paper
+
+    terminal = Terminal()
+    if new:
+        terminal.wrote(*paper.new(new))
+        return
+    rows = [(name, f"{one.authors}: {one.title} ({len(one.claims)} claims)") for name, one in paper.papers().items()]
+    terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
 
 
 @errors_as_sentences()

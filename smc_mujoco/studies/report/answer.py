@@ -12,7 +12,7 @@ from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.text import joined
 from smc_mujoco.studies.adviser import MIN_SETTLED
-from smc_mujoco.studies.paper.claims.verdict import VERDICTS
+from smc_mujoco.studies.audit.verdict import VERDICTS
 from smc_mujoco.studies.report import words
 from smc_mujoco.studies.report.scores import Place, Score
 

@@ -19,12 +19,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.paper.claims import audit, lyapunov, searches
-from smc_mujoco.studies.paper.claims import runs as claim_runs
-from smc_mujoco.studies.paper.claims.audit import catalogue, claim, claims, evaluations
-from smc_mujoco.studies.paper.claims.runs import OURS, Runs
-from smc_mujoco.studies.paper.claims.variants import reversed_gain, squeezed, with_gains, zero_gain
-from smc_mujoco.studies.paper.claims.verdict import (
+from smc_mujoco.studies.audit.verdict import (
     EXISTENTIAL,
     NAMED,
     NOT_TESTABLE,
@@ -39,6 +34,11 @@ from smc_mujoco.studies.paper.claims.verdict import (
     ratio,
     verdict,
 )
+from smc_mujoco.studies.paper.claims import audit, lyapunov, searches
+from smc_mujoco.studies.paper.claims import runs as claim_runs
+from smc_mujoco.studies.paper.claims.audit import catalogue, claim, claims, evaluations
+from smc_mujoco.studies.paper.claims.runs import OURS, Runs
+from smc_mujoco.studies.paper.claims.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.studies.paper.scenarios import PLANTS
 from smc_mujoco.studies.run_key import key
 

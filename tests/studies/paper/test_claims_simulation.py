@@ -13,6 +13,7 @@ from smc_mujoco.control.law import law_function
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
+from smc_mujoco.studies.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.studies.paper.claims import (
     contributions,
     lyapunov,
@@ -25,7 +26,6 @@ from smc_mujoco.studies.paper.claims import runs as claim_runs
 from smc_mujoco.studies.paper.claims.audit import catalogue, claims
 from smc_mujoco.studies.paper.claims.runs import Runs
 from smc_mujoco.studies.paper.claims.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.studies.paper.claims.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.studies.paper.scenarios import LAWS
 
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)

@@ -7,9 +7,9 @@ import numpy as np
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import NETWORKS, OURS, Runs, comes_to_rest
-from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import CONDITIONS, PLANTS, REALISTIC
 
 NOISY = Noise(position=0.01)  # the study's, on the position alone

@@ -23,7 +23,7 @@ from smc_mujoco.common.files import to_json
 from smc_mujoco.common.registry import modules
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.gain_sets import SETS
-from smc_mujoco.studies.paper.claims.verdict import Claim, Claims, Evidence, Statement, judged
+from smc_mujoco.studies.audit.verdict import Claim, Claims, Evidence, Statement, judged
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.paper.claims.runs import Result, Runs, Substitute

@@ -3,6 +3,7 @@
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import (
     CONDITIONED,
@@ -16,7 +17,6 @@ from smc_mujoco.studies.paper.claims.runs import (
 )
 from smc_mujoco.studies.paper.claims.timing import nanoseconds
 from smc_mujoco.studies.paper.claims.variants import squeezed
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
 PERIODS, DELAYS = (1, 10, 30, 60), (0, 5, 10, 20, 50)  # ms

@@ -14,11 +14,11 @@ from smc_mujoco.control.law import catalogue, command, law_function, sliding
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import settling_time
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, deviation, scale
 from smc_mujoco.studies.paper.claims.searches import critical_delay, largest_delays
 from smc_mujoco.studies.paper.claims.variants import with_gains
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond

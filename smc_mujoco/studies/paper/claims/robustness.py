@@ -7,9 +7,9 @@ import numpy as np
 
 from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, command_bound, deviation, scale
-from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 
 PLANT = "van_der_pol"
 

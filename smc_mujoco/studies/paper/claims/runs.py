@@ -24,10 +24,10 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.audit.verdict import Check, check, ratio
 from smc_mujoco.studies.executors import outcome
 from smc_mujoco.studies.paper import scenarios as paper
 from smc_mujoco.studies.paper.claims.variants import with_gains
-from smc_mujoco.studies.paper.claims.verdict import Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
 from smc_mujoco.studies.run_key import key
 

@@ -8,6 +8,7 @@ claim on it is supported if it holds on both networks of the study.
 """
 
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import (
     CONDITIONED,
@@ -22,7 +23,6 @@ from smc_mujoco.studies.paper.claims.runs import (
     scale,
     slower,
 )
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"

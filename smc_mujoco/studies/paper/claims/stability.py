@@ -4,11 +4,11 @@ import numpy as np
 
 from smc_mujoco.analysis.linear_theory import smallest_lam
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.claims import lyapunov
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import OURS, Runs, comes_to_rest, long_run
 from smc_mujoco.studies.paper.claims.variants import reversed_gain
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS
 
 NEAR = 1e-6  # |s| at and below which the claim says nothing

@@ -6,11 +6,11 @@ from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.lyapunov import input_gain
 from smc_mujoco.studies.paper.claims.runs import OURS, Runs, comes_to_rest
 from smc_mujoco.studies.paper.claims.searches import MIN_LAMBDA, smallest_stable
-from smc_mujoco.studies.paper.claims.verdict import UNIVERSAL, Beside, Check, check
 from smc_mujoco.studies.paper.scenarios import PLANTS, U_MAX
 
 SINGLE = ("inverted_pendulum", "van_der_pol", "duffing")

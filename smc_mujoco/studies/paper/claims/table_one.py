@@ -14,10 +14,10 @@ import numpy as np
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.claims.audit import claim
 from smc_mujoco.studies.paper.claims.runs import UNCLAMPED, Runs, scale
 from smc_mujoco.studies.paper.claims.searches import largest_delays
-from smc_mujoco.studies.paper.claims.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.paper.scenarios import CONTROL_PERIOD, LAWS, PLANTS
 
 # columns of the paper's table, and its rows: property -> a mark a column

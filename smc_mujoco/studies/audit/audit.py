@@ -1,0 +1,153 @@
+"""The audit of a paper: its claims, each a function of runs, and the verdicts on them.
+
+    claims(paper="levant_1993", only=["3"])        # the verdict on a claim, under every set of gains of the paper
+
+Thresholds are fixed in the paper's file before any run, and are not moved. How verdicts follow from checks: `verdict`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smc_mujoco.common.errors import ScenarioError, find, shown, taken, unknown
+from smc_mujoco.studies.audit.paper import Entry, Paper, failed
+from smc_mujoco.studies.audit.paper import paper as find_paper
+from smc_mujoco.studies.audit.verdict import Beside, Check, Claims, Evidence, judged
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.audit.runs import Result, Runs, Substitute
+    from smc_mujoco.studies.table import Table
+
+CURE = "return measure -> number, or measure -> {case: number}"
+
+
+def claims(
+    table: Table | None = None,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    substitute: Substitute | None = None,
+    threads: int | None = None,
+    report: Callable[[int], None] = lambda done: None,
+    paper: str | Path | Paper = "gaber",
+) -> Claims:
+    """Return the verdicts on a paper's claims, with the numbers behind them, in the order of its file.
+
+    Args:
+      table: of a study, whose runs are then not made again.
+      only: ids of the claims wanted; None for all.
+      gains: sets of gains, of the paper's; None for all of them, or its quick sets if it is to be quick.
+      quick: less, as each claim says: coarser grids, shorter runs.
+      substitute: law's name -> function that makes its mutant, to see whether the audit can fail.
+      threads: simulations at once; None for one per available core.
+      report: called with 1 as each claim is done under a set of gains, `evaluations` times in all.
+      paper: the name of one that ships, or a folder.
+
+    Raises:
+      ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
+    """
+    from smc_mujoco.studies.audit.runs import Runs, of_table
+
+    found = as_paper(paper)
+    # a table has runs of the laws as they are, not of their mutants
+    rows: dict[str, Result] = {} if table is None or substitute else of_table(table)
+    shared: dict[str, Result] = {}
+    entries = wanted(found, only)
+    evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
+    for name in sets(found, gains, quick):
+        runs = Runs(found, name, quick, substitute, threads, rows, shared)
+        for entry in sorted(entries, key=lambda entry: entry.late):
+            evidence[entry.id][name] = measure(entry, runs.of(entry))
+            report(1)
+    if quick:
+        instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
+        entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
+    return Claims(judged(entry, evidence[entry.id]) for entry in entries)
+
+
+def as_paper(paper: str | Path | Paper) -> Paper:
+    """Return a paper, from itself, its name or its folder."""
+    return paper if isinstance(paper, Paper) else find_paper(paper)
+
+
+def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
+    """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown id."""
+    known = paper.claims
+    if only is None:
+        return list(known.values())
+    ids = {str(id) for id in taken("only", only)}
+    for id in sorted(ids - set(known)):
+        raise unknown("claim", id, known)
+    return [entry for entry in known.values() if entry.id in ids]
+
+
+def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[str]:
+    """Return the sets of gains that `claims` takes for these arguments; refuse an unknown one."""
+    if gains is None:
+        return list(paper.quick_sets if quick else paper.sets)
+    names = [gains] if isinstance(gains, str) else taken("gains", gains)
+    for name in names:
+        find("set of gains", name, paper.sets)
+    if not names:
+        raise ScenarioError(f"no set of gains is given: choose from {', '.join(paper.sets)}")
+    return names
+
+
+def evaluations(
+    paper: Paper, only: Iterable[str | int] | None = None, gains: str | Sequence[str] | None = None, quick: bool = False
+) -> int:
+    """Return how often `claims` reports, for a progress bar."""
+    return len(wanted(paper, only)) * len(sets(paper, gains, quick))
+
+
+def measure(entry: Entry, runs: Runs) -> Evidence:
+    """Return the checks of a claim under one set of gains, and the numbers beside them.
+
+    Raises:
+      ScenarioError: the claim's function raises something, or returns what its thresholds are not about.
+    """
+    try:
+        found = entry.evidence(runs)
+    except Exception as error:  # whatever a user's function raises
+        raise failed(runs.paper, entry, error) from error
+    try:
+        return list(_evidence(entry, found))
+    except ScenarioError as error:
+        raise failed(runs.paper, entry, error) from None
+
+
+def _evidence(entry: Entry, found: Any) -> Iterator[Check | Beside]:
+    """Yield the checks of what a claim's function returned."""
+    if not isinstance(found, Mapping):
+        checks = isinstance(found, Sequence) and all(isinstance(one, Check | Beside) for one in found)
+        if not checks:
+            raise ScenarioError(f"it returns {shown(found)}: {CURE}")
+        if entry.thresholds:
+            raise ScenarioError("it returns checks, and holds_if has thresholds too: return numbers")
+        yield from found
+        return
+    if not entry.thresholds:
+        raise ScenarioError('it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }')
+    values = {measure: dict(_cases(measure, one)) for measure, one in found.items()}
+    for threshold in entry.thresholds:
+        if not values.get(threshold.measure):
+            cure = f"its measures are {', '.join(map(str, values)) or 'none'}"
+            raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
+        yield from threshold.evidence(values[threshold.measure])
+    asked = {threshold.measure for threshold in entry.thresholds}
+    for measure, cases in values.items():
+        for case, value in cases.items() if measure not in asked else ():
+            yield Beside(f"{case}: {measure}" if case else measure, value)
+
+
+def _cases(measure: object, found: Any) -> Iterator[tuple[str, float]]:
+    """Yield case -> number of a measure; the case is "" for a measure with one number."""
+    for case, value in found.items() if isinstance(found, Mapping) else (("", found),):
+        try:
+            yield str(case), float(value)
+        except (TypeError, ValueError):
+            where = f"{measure!r}, {case!r}" if case else repr(measure)
+            raise ScenarioError(f"it returns {shown(value)} for {where}: {CURE}") from None
