@@ -8,6 +8,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.errors import ScenarioError, taken, unknown
 from smc_mujoco.draw import page as pages
@@ -29,6 +30,7 @@ BESIDE = ("phase", "transient", "end")
 PANELS = (*OVER_TIME, "channels", *BESIDE)
 ROW = 1.5  # inches on a full page, height of a panel over time
 HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
+LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for each trace; the part below its name
 
 
 def figure(
@@ -91,12 +93,13 @@ def figure(
         column = [name for name in beside for _ in (places if name == "phase" else "x")]
         row = style.points(ROW)
         space = pages.head(width, key)
-        parts = [0.62 * len(small), len(overview), sum(HEIGHTS[name] for name in column)]
+        last = Panel("u", *next(iter(style.split(traces).items())))
+        heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else HEIGHTS[n] for n in column]
+        parts = [0.62 * len(small), *map(sum, heights)]
         rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
         page = pages.blank(width, height or max(0.5625 * width * (not narrow), space + row * rows + 0.5), fig)
         pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
         there = [i for i, part in enumerate(parts) if part]
-        heights = [1.0] * len(overview), [HEIGHTS[name] for name in column]
         if narrow:  # one below the other
             several = [parts[0]] * bool(small) + [*heights[0], *heights[1]]
             grid = page.add_gridspec(len(several), 1, height_ratios=several)
@@ -113,11 +116,24 @@ def figure(
         if cell is not None:
             _draw_small(page, cell, small, colours, changes)
         if overview:
-            _draw_over_time(page, cells, overview, drawing.titles(overview, pitch), colours, changes)
-        _draw_beside(page, others, column, places, colours, rests)
+            _draw_over_time(
+                page,
+                cells,
+                overview,
+                drawing.titles(overview, [pitch * part for part in heights[0]]),
+                names,
+                colours,
+                changes,
+            )
+        _draw_beside(page, others, column, places, names, colours, rests)
         pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key)
         pages.write(page, paths)
     return page
+
+
+def _height(panel: Panel) -> float:
+    """Return the relative height of a panel over time."""
+    return max(1.0, LOW * len(panel.traces)) if drawing.crowded(panel) else 1.0
 
 
 def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
@@ -155,19 +171,60 @@ def _small(traces: Sequence[Trace]) -> list[tuple[Panel, Panel]]:
 
 
 def _draw_over_time(
-    page, cells: Sequence[SubplotSpec], overview: Sequence[Panel], words: Sequence[str], colours, changes
+    page, cells: Sequence[SubplotSpec], overview: Sequence[Panel], words: Sequence[str], names, colours, changes
 ) -> None:
     """Draw panels over time in the cells of a column."""
+    frames: list[Axes] = []
     axes: list[Axes] = []
     for i, panel in enumerate(overview):
-        ax = page.add_subplot(cells[i], sharex=axes[0] if axes else None, ylabel=words[i])
-        ax.set_xlim(0.0, end(overview[0].traces))
-        axes.append(ax)
-        drawing.over_time(ax, panel, colours)
-        drawing.jumps(ax, changes, named=i == 0)
-        ax.tick_params(labelbottom=i == len(overview) - 1)
+        frame, rows = _rows(page, cells[i], panel, names, colours, axes[0] if axes else None)
+        frame.set_ylabel(words[i])
+        frames.append(frame)
+        for ax, part, own in rows:
+            axes.append(ax)
+            ax.set_xlim(0.0, end(overview[0].traces))
+            drawing.over_time(ax, part, own)
+            drawing.jumps(ax, changes, named=ax is axes[0])
+            ax.tick_params(labelbottom=False)
+        _level(frame, [ax for ax, *_ in rows])
+    axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlabel("time (s)")
-    page.align_ylabels(axes)
+    page.align_ylabels(frames)
+
+
+def _rows(
+    page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | None = None
+) -> tuple[Axes, list[tuple[Axes, Panel, Sequence[str]]]]:
+    """Return axes for a panel: the one that has its label, and all with the traces that each shows and their colours.
+
+    A crowded panel has a row for each trace, under its name.
+    """
+    if not drawing.crowded(panel):
+        ax = page.add_subplot(cell, sharex=share)
+        return ax, [(ax, panel, colours)]
+    frame = page.add_subplot(cell, frameon=False, xticks=[])
+    pitch, size, rows = 1.0 / len(panel.traces), style.points(8.5), []
+    for i, (trace, name, colour) in enumerate(zip(panel.traces, names, colours, strict=True)):
+        ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, FILLED * pitch), sharex=share)
+        words = style.cropped(name, 0.5 * 72 * page.bbox.width / page.dpi, size)
+        ax.set_title(words, fontsize=size, fontweight="normal", color=colour, pad=1.0, parse_math=False)
+        rows.append((ax, panel._replace(traces=[trace]), [colour]))
+        share = ax
+    return frame, rows
+
+
+def _level(frame: Axes, rows: Sequence[Axes]) -> None:
+    """Give the rows of a panel the same vertical range, and ticks near its ends; a single one stays as it is."""
+    if len(rows) == 1:
+        return
+    ranges = [ax.get_ylim() for ax in rows]
+    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+    ticks = [tick for tick in MaxNLocator(3).tick_values(low, high).tolist() if low <= tick <= high]
+    for ax in (frame, *rows):
+        ax.set(ylim=(low, high), yticks=[ticks[0], ticks[-1]])
+    for ax in rows[:-1]:
+        ax.tick_params(labelbottom=False, length=0)
+    frame.tick_params(labelcolor="none", length=0)  # its label stands beside these, as if they were seen
 
 
 def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
@@ -186,26 +243,36 @@ def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
                 ax.set_xlabel("time (s)")
 
 
-def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], places, colours, rests) -> None:
+def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], places, names, colours, rests) -> None:
     """Draw phase portraits and close-ups in the cells of a column."""
     portraits = iter(places)
     for i, name in enumerate(column):
+        if name == "end":
+            _draw_end(page, cells[i], places[0]._replace(quantity="u"), names, colours)
+            continue
         ax = page.add_subplot(cells[i])
         if name == "phase":
             panel = next(portraits)
             drawing.phase(ax, panel.traces, colours, rests)
             ax.set(xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
-        elif name == "transient":
+        else:
             panel = drawing.transient(places[0])
             drawing.over_time(ax, panel, colours)
             stop = max(trace.t[-1] for trace in panel.traces) or end(panel.traces)  # of runs that fail at once
             ax.set(xlabel="time, transient (s)", ylabel=panel.label, xlim=(0.0, stop))
-        else:
-            panel = places[0]._replace(quantity="u")
-            drawing.last_samples(ax, panel.traces, colours)
-            channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
-            letter = "u" if channel else "control u"
-            ax.set(xlabel="time before the end (ms)", ylabel=f"{letter} ({style.units(panel.group)['u']}){channel}")
+
+
+def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
+    """Draw the close-up of the last samples of u."""
+    frame, rows = _rows(page, cell, panel, names, colours)
+    period = drawing.last_period(panel.traces)
+    for ax, part, own in rows:
+        drawing.last_samples(ax, part.traces, own, period)
+    _level(frame, [ax for ax, *_ in rows])
+    channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
+    letter = "u" if channel else "control u"
+    frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']}){channel}")
+    rows[-1][0].set_xlabel("time before the end (ms)")
 
 
 def signals(

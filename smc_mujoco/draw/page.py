@@ -26,6 +26,8 @@ WIDTHS = {"ieee-column": 3.5, "ieee-page": 7.16}  # inches
 SIDES = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 LETTERS, TITLE = 11.0, 17.0  # points on a full page
+SAMPLE, GAPS = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and the space around its words
+SHARE = 0.55  # widest entry of a legend, of the page
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
 
@@ -90,27 +92,33 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
 def columns(handles: Sequence[Handle], width: float) -> int:
     """Return the number of columns of a legend on a page of `width` inches: as many as fit."""
     room, size = 72 * width - 16, style.points(LETTERS)
-    widths = [style.width(text, size) + 4.4 * size for text in _cropped(handles, width)]  # with sample and gap
+    widths = [_widest(words, size) + (SAMPLE + GAPS) * size for words in _wrapped(handles, width)]
     fitting = (n for n in range(len(widths), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
     return next(fitting, 1)
 
 
 def head(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
-    rows = -(-len(handles) // columns(handles, width))
+    lines = [words.count("\n") + 1 for words in _wrapped(handles, width)]
+    rows = max((sum(part) for part in np.array_split(lines, columns(handles, width))), default=0)
     return style.points(1.9 * TITLE + 1.45 * LETTERS * rows) / 72
 
 
-def _cropped(handles: Sequence[Handle], width: float) -> list[str]:
-    """Return the labels of a legend, as much of each as fits."""
+def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
+    """Return the labels of a legend, each on up to two lines."""
     size = style.points(LETTERS)
-    share = 0.45 if width >= NARROW else 0.95
-    return [style.cropped(str(handle.get_label()), share * 72 * width - 4.4 * size, size) for handle in handles]
+    room = SHARE * 72 * width - (SAMPLE + GAPS) * size
+    return [style.wrapped(str(handle.get_label()), room, size, lines=2) for handle in handles]
+
+
+def _widest(words: str, size: float) -> float:
+    """Return the width of the longest line of a text."""
+    return max(style.width(line, size) for line in words.split("\n"))
 
 
 def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle]) -> None:
     """Draw the title with the legend below it: in as few rows as fit."""
-    size, big, words = style.points(LETTERS), style.points(TITLE), _cropped(handles, width)
+    size, big, words = style.points(LETTERS), style.points(TITLE), _wrapped(handles, width)
     legend = page.legend(
         handles=handles,
         labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
@@ -121,6 +129,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         ncols=columns(handles, width),
         fontsize=size,
         borderpad=0.2,
+        handlelength=SAMPLE,
         columnspacing=1.5,
     )
     legend.get_title().set_parse_math(False)

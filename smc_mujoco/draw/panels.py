@@ -34,6 +34,7 @@ MAX_SMALL = 12  # channels that each have two small panels
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
 DASH = 5.0  # widths of a line
+WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
@@ -140,11 +141,11 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     return words
 
 
-def titles(panels: Sequence[Panel], pitch: float) -> list[str]:
-    """Return the labels of panels `pitch` points apart; the unit is on a second line if two would touch."""
+def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
+    """Return the labels of panels of these heights in points; the unit is on a second line if two would touch."""
     words = [panel.label for panel in panels]
-    wide = [style.width(text, style.RC["font.size"]) for text in words]
-    close = {i for i, (a, b) in enumerate(itertools.pairwise(wide)) if (a + b) / 2 > pitch - 4}
+    free = [height - style.width(text, style.RC["font.size"]) for height, text in zip(heights, words, strict=True)]
+    close = {i for i, (a, b) in enumerate(itertools.pairwise(free)) if (a + b) / 2 < 4}
     return [text.replace(" (", "\n(") if {i - 1, i} & close else text for i, text in enumerate(words)]
 
 
@@ -343,11 +344,15 @@ def transient(panel: Panel) -> Panel:
     return panel._replace(traces=cut)
 
 
-def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
-    """Draw the last samples of u of the first channel, each held until the next."""
-    period = max(trace.scenario.control_period for trace in traces)
+def last_period(traces: Sequence[Trace]) -> tuple[float, float]:
+    """Return the times between which a close-up shows the last samples of u, s."""
     stop = end(traces)
-    begin = max(0.0, stop - LAST_SAMPLES * period)
+    return max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in traces)), stop
+
+
+def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], period: tuple[float, float]) -> None:
+    """Draw the last samples of u of the first channel, each held until the next, in a period of time in s."""
+    begin, stop = period
     for trace, colour in reversed(list(zip(traces, colours, strict=True))):
         part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
         t = 1e3 * (trace.t[part] - stop)
@@ -359,6 +364,18 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> N
     if low <= high:
         half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
         ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+
+
+def crowded(panel: Panel) -> bool:
+    """Return whether bands of u would hide each other: whether more than MAX_BANDS of them are wide."""
+    if panel.quantity != "u":
+        return False
+    low, high = limits(panel.traces, "u")
+    wide = 0
+    for trace in panel.traces:
+        band = columns(trace.t, trace.u, COLUMNS)
+        wide += float(np.mean(band.high.max(axis=1) - band.low.min(axis=1))) > WIDE * (high - low)
+    return wide > MAX_BANDS
 
 
 def light(n: int) -> np.ndarray:

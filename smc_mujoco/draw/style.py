@@ -301,6 +301,16 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
     return text if cut == text else f"{cut.rstrip()}…"
 
 
+def wrapped(text: str, room: float, size: float, lines: int) -> str:
+    """Return the text on so many lines at most, broken between words; an ellipsis is at the end of one too long."""
+    found, words = [], text.split()
+    while words and len(found) < lines - 1:
+        count = next((n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1)
+        found.append(cropped(" ".join(words[:count]), room, size))
+        words = words[count:]
+    return "\n".join([*found, cropped(" ".join(words), room, size)] if words else found)
+
+
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list.
 

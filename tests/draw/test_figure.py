@@ -412,15 +412,16 @@ def test_one_trace_is_drawn_like_a_list_of_one(pair, tmp_path):
 def test_the_close_up_shows_no_round_off(pair, level):
     """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
     held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
+    period = panels.last_period(pair[:1])
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()
-        panels.last_samples(ax, [dataclasses.replace(pair[0], u=u)], ["#000000"])
+        panels.last_samples(ax, [dataclasses.replace(pair[0], u=u)], ["#000000"], period)
         low, high = ax.get_ylim()
         assert high - low >= 0.0199 * np.abs(u).max()
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
     full = Figure().subplots()
-    panels.last_samples(full, [dataclasses.replace(pair[0], u=np.sign(held - level))], ["#000000"])
+    panels.last_samples(full, [dataclasses.replace(pair[0], u=np.sign(held - level))], ["#000000"], period)
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
 
 

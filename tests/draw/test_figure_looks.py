@@ -61,7 +61,8 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
 def texts(page) -> list[matplotlib.text.Text]:
     """The words on a page that are seen, but for the numbers of a hidden axis."""
     page.draw_without_rendering()
-    found = [text for text in page.findobj(matplotlib.text.Text) if text.get_visible() and text.get_text().strip()]
+    every = page.findobj(matplotlib.text.Text)
+    found = [text for text in every if text.get_visible() and text.get_text().strip() and text.get_color() != "none"]
     hidden = set()
     for ax in page.axes:
         for axis in (ax.xaxis, ax.yaxis):
@@ -117,12 +118,44 @@ def curves(ax) -> list:
     return [line for line in ax.lines if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()]
 
 
+def calm(trace: smc.Trace) -> smc.Trace:
+    return dataclasses.replace(trace, u=0.0 * trace.u + np.exp(-trace.t)[:, None])
+
+
+def rows(ax) -> list:
+    """The rows of a panel that has one for each trace."""
+    return ax.child_axes or [ax]
+
+
 def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
     for ax in figure(ten(one)).axes:
-        lines = curves(ax)
+        lines = [line for row in rows(ax) for line in curves(row)]
         assert len(lines) == 10
         assert len({line.get_linewidth() for line in lines}) == 1
         assert len({to_hex(line.get_color()) for line in lines}) == 10
+
+
+def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
+    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
+    assert [len(rows(ax)) for ax in figure([calm(three[0]), *three[1:]], panels=["u", "end"]).axes] == [1, 1]
+    page = figure(three, size=COLUMN, panels=["x", "u", "s", "end"])
+    assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 3]
+    for ax in (page.axes[1], page.axes[3]):
+        names = [row.get_title(loc="left") for row in rows(ax)]
+        assert names == ["Observer-free", "Classical", "Adaptive"]
+        assert len({row.get_ylim() for row in rows(ax)}) == 1
+        assert [to_hex(curves(row)[0].get_color()) for row in rows(ax)] == [
+            to_hex(colour) for colour in style.law_colours(["observer_free", "classical", "adaptive"])
+        ]
+
+
+def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_column(one):
+    page = figure([calm(trace) for trace in ten(one)], size=COLUMN)
+    page.draw_without_rendering()
+    assert page.legends[0].get_window_extent().height < 0.25 * page.bbox.height
+    words = [text.get_text() for text in page.legends[0].get_texts()]
+    assert words[-1].count("\n") <= 1
+    assert "…" not in "".join(words)
 
 
 def test_ten_laws_have_colours_that_do_not_look_alike():
