@@ -25,7 +25,7 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies import executors
-from smc_mujoco.studies.paper import scenarios as paper
+from smc_mujoco.studies.papers.gaber import scenarios as paper
 from smc_mujoco.studies.study import study
 
 QUICK = "--quick" in sys.argv

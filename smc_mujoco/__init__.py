@@ -24,7 +24,7 @@ _HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as 
 _MODULES = {  # public modules; three of them need an extra
     "boards": "smc_mujoco.studies.boards",
     "gym": "smc_mujoco.envs.gymnasium_env",
-    "paper": "smc_mujoco.studies.paper.scenarios",
+    "paper": "smc_mujoco.studies.papers.gaber.scenarios",
     "suite": "smc_mujoco.envs.dm_control_env",
     "vector": "smc_mujoco.envs.vector_env",
 }

@@ -77,11 +77,11 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
+from smc_mujoco.studies.audit.audit import claims as claims
 from smc_mujoco.studies.audit.verdict import Claim as Claim
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.outcome import Outcome as Outcome
-from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.studies.paper.claims.audit import claims as claims
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.report import report as report
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study

@@ -45,6 +45,7 @@ FORMER_PLACES = {
     "smc_mujoco.signals": "smc_mujoco.simulation.signals",
     "smc_mujoco.references": "smc_mujoco.simulation.signals",
     "smc_mujoco.simulation.references": "smc_mujoco.simulation.signals",
+    "smc_mujoco.studies.paper": "smc_mujoco.studies.papers.gaber",
     "smc_mujoco.series": "smc_mujoco.simulation.time_series",
 }
 

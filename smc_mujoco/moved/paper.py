@@ -1,3 +1,3 @@
 from smc_mujoco.moved import forward
 
-forward(__name__, "smc_mujoco.studies.paper.scenarios")
+forward(__name__, "smc_mujoco.studies.papers.gaber.scenarios")

@@ -13,7 +13,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
@@ -21,7 +21,6 @@ NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "v
 UNRELATED = (
     "studies/audit",
     "studies/papers",
-    "studies/paper/claims",
     "draw",
     "testing",
     "control/tuned_gains",

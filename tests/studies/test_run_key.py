@@ -18,7 +18,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.study import condition, key
 
 ROOT = Path(__file__).parents[2]
@@ -210,7 +210,7 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
 
     same = now()
     (package / "studies" / "report" / "words.py").write_text("# other words")
-    (package / "studies" / "paper" / "claims" / "abstract.py").write_text("# other claims")
+    (package / "studies" / "papers" / "gaber" / "claims" / "abstract.py").write_text("# other claims")
     assert now() == same
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same

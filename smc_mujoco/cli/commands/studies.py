@@ -238,9 +238,9 @@ def claims(
         list[str] | None,
         typer.Argument(metavar="ID", help="Numbers of claims, as 3 18; by default all.", show_default=False),
     ] = None,
-    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default study,tuned,tracking.")] = None,
+    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser grids, no network above 50 pendulums, tuned gains only.")
+        bool, typer.Option("--quick", help="Coarser grids and shorter runs, as each claim says; one set of gains.")
     ] = False,
     paper: Annotated[
         str | None,
@@ -253,7 +253,7 @@ def claims(
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
     threads: options.Threads = None,
 ) -> None:
-    """Audit the paper's claims: measure each against the threshold that was fixed for it before any run.
+    """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
     otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
@@ -265,22 +265,19 @@ def claims(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import replacing, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.studies.audit import audit as of_papers
-        from smc_mujoco.studies.paper.claims.audit import claims as audit
-        from smc_mujoco.studies.paper.claims.audit import document, evaluations
+        from smc_mujoco.studies.audit.audit import DEFAULT, document, evaluations
+        from smc_mujoco.studies.audit.audit import claims as audit
+        from smc_mujoco.studies.audit.paper import paper as find_paper
         from smc_mujoco.studies.table import Table
 
     terminal = Terminal()
-    if paper is not None:
-        found = of_papers.claims(None, ids or None, gains and options.names(gains), quick, threads=threads, paper=paper)
-        print(document(found)) if json else tables.print_claims(found, terminal, full=bool(ids))
-        return
+    about = find_paper(paper or DEFAULT)
     sets = None if gains is None else options.names(gains)
     known = None if table is None else Table.read(table)
     if out:
         writable(out)
-    with bar("claims", evaluations(ids or None, sets, quick), counted=True) as drawn:
-        found = audit(known, ids or None, sets, quick, threads=threads, report=drawn.advance)
+    with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
+        found = audit(known, ids or None, sets, quick, threads=threads, report=drawn.advance, paper=about)
     text = document(found)
     if out:
         with replacing(out) as file:

@@ -13,14 +13,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken, unknown
+from smc_mujoco.common.files import to_json
+from smc_mujoco.common.version import __version__
 from smc_mujoco.studies.audit.paper import Entry, Paper, failed
 from smc_mujoco.studies.audit.paper import paper as find_paper
-from smc_mujoco.studies.audit.verdict import Beside, Check, Claims, Evidence, judged
+from smc_mujoco.studies.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.audit.runs import Result, Runs, Substitute
     from smc_mujoco.studies.table import Table
 
+DEFAULT = "gaber"  # the paper that the suite was built for
 CURE = "return measure -> number, or measure -> {case: number}"
 
 
@@ -32,7 +35,7 @@ def claims(
     substitute: Substitute | None = None,
     threads: int | None = None,
     report: Callable[[int], None] = lambda done: None,
-    paper: str | Path | Paper = "gaber",
+    paper: str | Path | Paper = DEFAULT,
 ) -> Claims:
     """Return the verdicts on a paper's claims, with the numbers behind them, in the order of its file.
 
@@ -97,10 +100,19 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
 
 
 def evaluations(
-    paper: Paper, only: Iterable[str | int] | None = None, gains: str | Sequence[str] | None = None, quick: bool = False
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    paper: str | Path | Paper = DEFAULT,
 ) -> int:
     """Return how often `claims` reports, for a progress bar."""
-    return len(wanted(paper, only)) * len(sets(paper, gains, quick))
+    found = as_paper(paper)
+    return len(wanted(found, only)) * len(sets(found, gains, quick))
+
+
+def document(claims: Sequence[Claim]) -> str:
+    """Return claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
+    return to_json({"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}, indent=1)
 
 
 def measure(entry: Entry, runs: Runs) -> Evidence:

@@ -8,6 +8,7 @@ sentence, which says what is wrong with which file.
 """
 
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -165,13 +166,18 @@ def paper(which: str | Path) -> Paper:
     """
     known = shipped()
     if isinstance(which, str) and which in known:
-        return _read(known[which], f"{SHIPPED}.{which}")
+        return _shipped(which)
     folder = Path(which)
     if not folder.is_dir():
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
         raise ScenarioError(f"no folder {str(which)!r} with a {FILE}: give one, or a name of {', '.join(known)}")
     return _read(folder, _package(folder))
+
+
+@functools.cache
+def _shipped(name: str) -> Paper:
+    return _read(shipped()[name], f"{SHIPPED}.{name}")
 
 
 def papers() -> dict[str, Paper]:
@@ -263,7 +269,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) 
     for field in data:
         if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "claim")):
             raise unknown("field", field, known)
-    texts = {field: _typed(field, data.get(field, ""), str, "a text") for field in TEXTS}
+    texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXTS}
     for field in TEXTS[:3]:
         if not texts[field].strip():
             raise ScenarioError(f"no {field}: write one, as {field} = {_example(field)}")
@@ -280,7 +286,10 @@ def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) 
     paper = Paper(
         name=folder.resolve().name, folder=folder, sets=sets, quick_sets=quick, claims={}, **texts, **parts
     )  # fmt: skip
-    functions = {key: value for module in code for key, value in vars(module).items() if inspect.isfunction(value)}
+    functions: dict[str, Callable] = {}
+    for module in code:
+        own = {key: value for key, value in vars(module).items() if inspect.isfunction(value)}
+        functions |= own | {f"{module.__name__.rpartition('.')[2]}.{key}": value for key, value in own.items()}
     claims = _typed("claim", data.get("claim", []), list, "tables, each under a line [[claim]]")
     if not claims:
         raise ScenarioError("no claims: write each under a line [[claim]]")
@@ -305,15 +314,14 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
         if field not in data:
             what = "threshold" if field == "holds_if" else field
             raise ScenarioError(f"it has no {what}: write {field}, {OF_CLAIM[field][1]}")
-    values = {field: _typed(field, one, *OF_CLAIM[field]) for field, one in data.items()}
+    values = {field: _text(_typed(field, one, *OF_CLAIM[field])) for field, one in data.items()}
     names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
     function = find(f"function of {CODE}", values.pop("function"), functions)
     asked = values.pop("holds_if")
     if not asked:
         raise ScenarioError(f"it has no threshold: write holds_if, {OF_CLAIM['holds_if'][1]}")
     thresholds = () if isinstance(asked, str) else tuple(_thresholds(asked))
-    measured, _, note = (inspect.getdoc(function) or "").partition("\n\n")
-    texts: dict[str, Any] = {"measured": " ".join(measured.split()).rstrip("."), "note": " ".join(note.split())}
+    texts: dict[str, Any] = {"measured": _text((inspect.getdoc(function) or "").partition("\n\n")[0]).rstrip(".")}
     fields = _fields("runs", values.pop("runs", ""))
     quantifier = find("quantifier", values.pop("quantifier", "named"), QUANTIFIERS)
     words = asked if isinstance(asked, str) else ", ".join(map(str, thresholds))
@@ -438,6 +446,11 @@ def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
     if not isinstance(value, kind):
         raise ScenarioError(f"{field} is {shown(value)}: write {cure}")
     return value
+
+
+def _text(value: Any) -> Any:
+    """Return a text with single spaces, and any other value as it is."""
+    return " ".join(value.split()) if isinstance(value, str) else value
 
 
 def _example(field: str) -> str:

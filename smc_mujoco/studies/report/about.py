@@ -13,7 +13,7 @@ from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.report import words
 from smc_mujoco.studies.report.plan import FULL, Plan
 from smc_mujoco.studies.table import Table

@@ -23,7 +23,7 @@ from smc_mujoco.control.law import laws
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.audit.verdict import Claim
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.report import answer, charts, maps, words
 from smc_mujoco.studies.report.plan import GAINS
 from smc_mujoco.studies.report.stages import Findings

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.common import progress
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent

@@ -24,10 +24,11 @@ from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.audit import audit
 from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.cache import cached
-from smc_mujoco.studies.paper import scenarios
-from smc_mujoco.studies.paper.claims import audit, lyapunov
+from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.studies.papers.gaber.claims import lyapunov
 from smc_mujoco.studies.report import about, films, scores, words
 from smc_mujoco.studies.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.studies.report.scores import Place, Score

@@ -25,7 +25,7 @@ from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
-from smc_mujoco.studies.paper import scenarios
+from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.report import answer, charts, films, maps, page, panels, report, stages, words
 from smc_mujoco.studies.report import scores as scores_of
 from smc_mujoco.studies.report.plan import QUICK, Bars
@@ -545,7 +545,7 @@ def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
     for name in (
         "analysis.region_of_attraction.basin",
         "analysis.margins.margins",
-        "studies.paper.claims.audit.claims",
+        "studies.audit.audit.claims",
         "studies.report.films.film",
         "studies.executors.outcome",
     ):

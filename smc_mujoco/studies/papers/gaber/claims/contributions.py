@@ -2,22 +2,21 @@
 
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.variants import squeezed
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
-from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import (
+from smc_mujoco.studies.audit.runs import Runs
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.papers.gaber.claims.common import (
     CONDITIONED,
     NETWORKS,
     OURS,
     RIVALS,
     UNCLAMPED,
-    Runs,
     command_bound,
     deviation,
 )
-from smc_mujoco.studies.paper.claims.timing import nanoseconds
-from smc_mujoco.studies.paper.claims.variants import squeezed
-from smc_mujoco.studies.paper.scenarios import PLANTS
+from smc_mujoco.studies.papers.gaber.claims.timing import nanoseconds
+from smc_mujoco.studies.papers.gaber.scenarios import PLANTS
 
 PERIODS, DELAYS = (1, 10, 30, 60), (0, 5, 10, 20, 50)  # ms
 MIN_DELAY, ENDS = 0.1, (0, 50)  # ms; ten times the steps, so with the ends of the delays alone
@@ -28,16 +27,8 @@ MEASURES = (  # sentence, name, metric, condition
 GENERAL = ("classical", "adaptive", "super_twisting", CONDITIONED, "boundary_layer")
 
 
-@claim(
-    "10",
-    "compensates input nonlinearity implicitly",
-    where="contributions",
-    holds_if="< 5 % of |x0|",
-)
 def compensates(runs: Runs) -> list[Check]:
-    """Largest difference of x between the plant with its input gain times 1 / (1 + x^2) and the plant, same law,
-    nominal; the gain is the plant's own, which is 1 on Van der Pol and Duffing.
-    """
+    """Claim 10: compensates input nonlinearity implicitly."""
     checks = []
     for plant in PLANTS:
         law = runs.law(plant, OURS)
@@ -46,18 +37,8 @@ def compensates(runs: Runs) -> list[Check]:
     return checks
 
 
-@claim(
-    "11",
-    "no chattering by construction",
-    where="contributions",
-    quick="periods of 1 and 60 ms, delays of 0 and 50 ms",
-    holds_if="below 1e-3 of min(lambda, u_max) per second everywhere",
-    quantifier=UNIVERSAL,
-)
 def never_chatters(runs: Runs) -> list[Check | Beside]:
-    """TV rate of u over control periods of 0.1 (delays 0 and 50 ms only), 1, 10, 30 and 60 ms and delays of 0, 5, 10,
-    20 and 50 ms.
-    """
+    """Claim 11: no chattering by construction."""
     cells = [(period, delay) for period in PERIODS for delay in DELAYS] + [(MIN_DELAY, delay) for delay in ENDS]
     if runs.quick:
         cells = [(period, delay) for period in (PERIODS[0], PERIODS[-1]) for delay in ENDS]
@@ -80,19 +61,8 @@ def never_chatters(runs: Runs) -> list[Check | Beside]:
     return evidence
 
 
-@claim(
-    "12",
-    "better smoothness and robustness than the alternatives",
-    where="contributions",
-    holds_if="best or within 10 % of best, in both",
-)
 def better(runs: Runs) -> list[Check | Beside]:
-    """TV rate, nominal, and steady error under d = 0.2, against each rival.
-
-    Within 10 % of the best is within 10 % of each. A super-twisting law that winds up has a steady error which it owes
-    to that. Beside it stand the conditioned one, which does not, and the law as published, whose integral has no bound;
-    in the first gains it is clamped.
-    """
+    """Claim 12: better smoothness and robustness than the alternatives."""
     checks, beside = [], []
     for plant in PLANTS:
         for sentence, name, metric, condition in MEASURES:
@@ -104,17 +74,8 @@ def better(runs: Runs) -> list[Check | Beside]:
     return checks + beside
 
 
-@claim(
-    "13",
-    "synchronisation without coordination",
-    where="contributions, network",
-    holds_if="< 1 s, and slower or absent without coupling",
-)
 def synchronises(runs: Runs) -> list[Check]:
-    """Settling time of the spread, largest less smallest angle; the same without coupling; both networks.
-
-    What five single pendulums do without each other is no merit of the coupling.
-    """
+    """Claim 13: synchronisation without coordination."""
     checks = []
     for plant in NETWORKS:
         scores = runs.scores(runs.scenario(plant, OURS, mismatch=coupling) for coupling in ({}, {"kc": 0.0}))
@@ -126,19 +87,8 @@ def synchronises(runs: Runs) -> list[Check]:
     return checks
 
 
-@claim(
-    "14",
-    "low complexity",
-    where="contributions",
-    holds_if="not slower than any",
-)
 def simple(runs: Runs) -> list[Check | Beside]:
-    """Time of the compiled law per control sample against the fastest of the others, least of interleaved rounds in one
-    process.
-
-    A timing, which no gain changes: its numbers vary from run to run. What decides is one ratio, to the fastest of the
-    others, which stand beside.
-    """
+    """Claim 14: low complexity."""
     spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL)}, quick=runs.quick)
     others = {name: ratio(spent[OURS], spent[name]) for name in GENERAL}
     beside = [Beside(f"time per sample / that of {name}", value) for name, value in others.items()]

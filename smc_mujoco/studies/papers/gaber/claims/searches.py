@@ -18,8 +18,9 @@ from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_bo
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.paper.claims.runs import OURS, Runs, long_run, scale
-from smc_mujoco.studies.paper.scenarios import CONTROL_PERIOD, PLANTS, U_MAX
+from smc_mujoco.studies.audit.runs import Runs
+from smc_mujoco.studies.papers.gaber.claims.common import OURS, long_run, scale
+from smc_mujoco.studies.papers.gaber.scenarios import CONTROL_PERIOD, PLANTS, U_MAX
 
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 

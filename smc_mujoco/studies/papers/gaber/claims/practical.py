@@ -11,15 +11,15 @@ import numpy as np
 from smc_mujoco.analysis.margins import TOLERATED_ERROR
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue, command, law_function, sliding
+from smc_mujoco.control.variants import with_gains
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import settling_time
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
-from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, deviation, scale
-from smc_mujoco.studies.paper.claims.searches import critical_delay, largest_delays
-from smc_mujoco.studies.paper.claims.variants import with_gains
-from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
+from smc_mujoco.studies.audit.runs import Runs
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, deviation, scale
+from smc_mujoco.studies.papers.gaber.claims.searches import critical_delay, largest_delays
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS, PLANTS
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
 MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0
@@ -44,19 +44,8 @@ CHEAP: dict[str, dict[str, float]] = {
 }
 
 
-@claim(
-    "55",
-    "tanh by lookup table or Taylor series on a microcontroller",
-    where="practical implementation",
-    holds_if="deviation < 1 % of |x0|, settles",
-)
 def cheap_tanh(runs: Runs) -> list[Check | Beside]:
-    """Largest |x - x'| from the run with tanh in double precision, x' with a 65-entry table, with Taylor's series to
-    order 7, plain and with its argument reduced to |s|/8 <= 1, and in single precision; settling time; 16-bit fixed
-    point beside.
-
-    The plain series leaves tanh beyond |s| = 1 and has no limit beyond pi/2; every plant here starts beyond.
-    """
+    """Claim 55: tanh by lookup table or Taylor series on a microcontroller."""
     evidence: list[Check | Beside] = []
     for plant in PLANTS:
         nominal = runs.scenario(plant, OURS)
@@ -81,17 +70,8 @@ def _cheap(runs: Runs, name: str, exact: Component) -> Component:
     return runs.mutated(with_gains(template(), **gains))
 
 
-@claim(
-    "56",
-    "actuator saturation inherently avoided",
-    where="practical implementation",
-    holds_if="response unchanged, < 1 % of |x0|",
-)
 def saturation_avoided(runs: Runs) -> list[Check]:
-    """Largest |x - x'| between an actuator with half of lambda as its bound and one without a bound.
-
-    u is bounded by lambda: saturation is avoided if, and only if, lambda is chosen below the actuator's bound.
-    """
+    """Claim 56: actuator saturation inherently avoided."""
     checks = []
     for plant in PLANTS:
         half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
@@ -101,19 +81,8 @@ def saturation_avoided(runs: Runs) -> list[Check]:
     return checks
 
 
-@claim(
-    "57",
-    "exponential convergence",
-    where="practical implementation",
-    holds_if="same rate within 20 %",
-)
 def exponential(runs: Runs) -> list[Check]:
-    """Decay rate of the envelope of |x| down to 2 % of its start, from the study's x0 and from twice that, against that
-    from 1 % of x0.
-
-    Far off, tanh is near 1: a constant force drives a plant that is itself nonlinear, and |x| does not fall
-    exponentially. 2 x0 was chosen to look beyond the study's start.
-    """
+    """Claim 57: exponential convergence."""
     checks = []
     for plant in PLANTS:
         start = runs.scenario(plant, OURS).resolved.x0
@@ -139,19 +108,8 @@ def decay_rate(trace: Trace) -> float:
     return -float(np.polyfit(trace.t[upto], np.log(envelope[upto]), 1)[0])
 
 
-@claim(
-    "59",
-    "abrupt parameter jump: may not converge, stability preserved",
-    where="practical implementation",
-    holds_if="bounded by |x0|",
-    quantifier=UNIVERSAL,
-)
 def jumps(runs: Runs) -> list[Check | Beside]:
-    """Largest |x| after a mild and a hard jump of a parameter at mid-run, under d = 0.2 sin(5t).
-
-    What decides is "preserved", which is universal. "May not converge" is existential, and any run whose ultimate bound
-    is above 5 % of |x0| is an example; the largest stands beside.
-    """
+    """Claim 59: abrupt parameter jump: may not converge, stability preserved."""
     checks, bounds = [], []
     for plant in PLANTS:
         for kind in ("mild", "hard"):
@@ -167,22 +125,8 @@ def jumps(runs: Runs) -> list[Check | Beside]:
     return [*checks, Beside("largest ultimate bound after a jump, over |x0|", max(bounds))]
 
 
-@claim(
-    "61",
-    "classical SMC is delay-sensitive, the paper's is not",
-    where="table I",
-    holds_if="the paper's law tolerates more than each rival",
-)
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
-    """Largest input delay with ultimate bound <= 5 % of |x0|, to one control period (8 in a quick audit, by
-    implicitfast), up to 0.5 s; beside it the largest with which |x| ends below its start, and linear theory's critical
-    delay for the paper's law.
-
-    The criterion is read so: the ultimate bound decides. That |x| ends below its start stands beside: a law that
-    chatters at a constant amplitude is not thereby unstable. 0 s: the law does not tolerate even one control period, as
-    super-twisting that winds up and never comes to rest. A bounded law may tolerate more than linear theory's delay:
-    beyond that it swings, but within the 5 %.
-    """
+    """Claim 61: classical SMC is delay-sensitive, the paper's is not."""
     longest, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (TOLERATED_ERROR, 1.0))
     evidence: list[Check | Beside] = []
     for plant in PLANTS:

@@ -8,22 +8,21 @@ claim on it is supported if it holds on both networks of the study.
 """
 
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.studies.audit.verdict import UNIVERSAL, Beside, Check, check, ratio
-from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import (
+from smc_mujoco.studies.audit.runs import Runs
+from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.papers.gaber.claims.common import (
     CONDITIONED,
     HOSMC,
     NETWORKS,
     OURS,
     UNCLAMPED,
-    Runs,
     alike,
     larger_than,
     overshoot,
     scale,
     slower,
 )
-from smc_mujoco.studies.paper.scenarios import LAWS, PLANTS
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS, PLANTS
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"
 MODERATE = (2.0, 15.0)  # %
@@ -42,28 +41,16 @@ def overshoots_more(runs: Runs, plant: str, law: str, sentence: str = "") -> Che
     return check(what, runs.score(plant, law)["overshoot"], ">", limit, sentence)
 
 
-@claim(
-    "27",
-    "pendulum: like adaptive, minimal overshoot",
-    where="inverted pendulum",
-    holds_if="within 25 % of adaptive's, and < 1 %",
-)
 def pendulum_like_adaptive(runs: Runs) -> list[Check]:
-    """Settling time against adaptive, overshoot; nominal."""
+    """Claim 27: pendulum: like adaptive, minimal overshoot."""
     return [
         alike(runs, PENDULUM, OURS, "adaptive", "like adaptive"),
         overshoots_less(runs, PENDULUM, OURS, 1.0, "minimal overshoot"),
     ]
 
 
-@claim(
-    "28",
-    "pendulum: classical slower, fluctuates",
-    where="inverted pendulum",
-    holds_if="slower, and > 1e-3 of |x0|",
-)
 def classical_fluctuates(runs: Runs) -> list[Check]:
-    """Settling time against the paper's law; peak-to-peak x in the last 20 % of the run; nominal."""
+    """Claim 28: pendulum: classical slower, fluctuates."""
     ripple = runs.score(PENDULUM, "classical")["ripple"] / scale(runs.scenario(PENDULUM, "classical"))
     return [
         slower(runs, PENDULUM, "classical", "slower"),
@@ -71,25 +58,13 @@ def classical_fluctuates(runs: Runs) -> list[Check]:
     ]
 
 
-@claim(
-    "29",
-    "pendulum: HOSMC fast, larger undershoot",
-    where="inverted pendulum",
-    holds_if="larger than the paper's law's",
-)
 def larger_undershoot(runs: Runs) -> list[Check]:
-    """Overshoot against the paper's law, nominal."""
+    """Claim 29: pendulum: HOSMC fast, larger undershoot."""
     return [overshoots_more(runs, PENDULUM, HOSMC)]
 
 
-@claim(
-    "31",
-    "Van der Pol: moderate undershoot",
-    where="Van der Pol oscillator",
-    holds_if="2 to 15 %",
-)
 def moderate_undershoot(runs: Runs) -> list[Check | Beside]:
-    """Overshoot, nominal, as its distance from that range."""
+    """Claim 31: Van der Pol: moderate undershoot."""
     over = overshoot(runs, VAN_DER_POL, OURS)
     outside = max(MODERATE[0] - over, over - MODERATE[1], 0.0)  # one check: every number meets one end of the range
     return [
@@ -98,21 +73,8 @@ def moderate_undershoot(runs: Runs) -> list[Check | Beside]:
     ]
 
 
-@claim(
-    "32",
-    "Van der Pol: HOSMC largest oscillation",
-    where="Van der Pol oscillator",
-    holds_if="largest, by the least relevant difference",
-)
 def largest_oscillation(runs: Runs) -> list[Check | Beside]:
-    """Overshoot of super-twisting against the largest of the other three; the same of the conditioned law.
-
-    If plain super-twisting meets the actuator's bound its integral winds up, and the swing measures that rather than
-    the method; conditioned super-twisting, the same law without wind-up, stands beside it, and only if both are the
-    largest is the claim supported. In the first gains the integral of super-twisting is clamped at the actuator's
-    bound, as when they were found; the law as published stands beside. Largest is larger than all others by 3 % of it
-    and by 0.5 % of |x0|.
-    """
+    """Claim 32: Van der Pol: HOSMC largest oscillation."""
     others = larger_than(max(overshoot(runs, VAN_DER_POL, law) for law in LAWS if law != HOSMC), of=100.0)
     over = {law: runs.score(VAN_DER_POL, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
     return [
@@ -121,42 +83,21 @@ def largest_oscillation(runs: Runs) -> list[Check | Beside]:
     ]
 
 
-@claim(
-    "33",
-    "Van der Pol: adaptive overshoots more",
-    where="Van der Pol oscillator",
-    holds_if="larger than the paper's law's",
-)
 def adaptive_overshoots(runs: Runs) -> list[Check]:
-    """Overshoot against the paper's law, nominal."""
+    """Claim 33: Van der Pol: adaptive overshoots more."""
     return [overshoots_more(runs, VAN_DER_POL, "adaptive")]
 
 
-@claim(
-    "34",
-    "Van der Pol: classical slower, no overshoot",
-    where="Van der Pol oscillator",
-    holds_if="slower, and < 1 %",
-)
 def classical_slower(runs: Runs) -> list[Check]:
-    """Settling time against the paper's law, overshoot; nominal."""
+    """Claim 34: Van der Pol: classical slower, no overshoot."""
     return [
         slower(runs, VAN_DER_POL, "classical", "slower"),
         overshoots_less(runs, VAN_DER_POL, "classical", 1.0, "no overshoot"),
     ]
 
 
-@claim(
-    "35",
-    "Duffing: fast, minimal overshoot",
-    where="Duffing oscillator",
-    holds_if="first or within 10 % of first, in both",
-)
 def fast_and_minimal(runs: Runs) -> list[Check]:
-    """Settling time and overshoot against the best of the three other laws, nominal.
-
-    If a rival does not overshoot at all, within 10 % of first is not to overshoot either.
-    """
+    """Claim 35: Duffing: fast, minimal overshoot."""
     ours, *times = (runs.score(DUFFING, law)["settling_time"] for law in LAWS)
     over, *overs = (overshoot(runs, DUFFING, law) for law in LAWS)
     what = f"{DUFFING}: {{}} of {OURS} against 1.1 of the best rival's"
@@ -166,43 +107,22 @@ def fast_and_minimal(runs: Runs) -> list[Check]:
     ]
 
 
-@claim(
-    "36",
-    "Duffing: adaptive and HOSMC similar",
-    where="Duffing oscillator",
-    holds_if="within 25 % of the paper's law's, both",
-)
 def similar(runs: Runs) -> list[Check | Beside]:
-    """Settling time against the paper's law, nominal.
-
-    The paper's sentence likens them to its own law; read as like each other, the number beside would decide.
-    """
+    """Claim 36: Duffing: adaptive and HOSMC similar."""
     each = alike(runs, DUFFING, HOSMC, "adaptive")
     return [*(alike(runs, DUFFING, law, OURS) for law in ("adaptive", HOSMC)), Beside(each.what, each.value)]
 
 
-@claim(
-    "37",
-    "Duffing: classical slower, larger deviation",
-    where="Duffing oscillator",
-    holds_if="both larger than the paper's law's",
-)
 def classical_deviates(runs: Runs) -> list[Check]:
-    """Settling time and overshoot against the paper's law, nominal."""
+    """Claim 37: Duffing: classical slower, larger deviation."""
     return [
         slower(runs, DUFFING, "classical", "slower"),
         overshoots_more(runs, DUFFING, "classical", "larger deviation"),
     ]
 
 
-@claim(
-    "38",
-    "network: rapid synchronisation and damping",
-    where="five-pendulum network",
-    holds_if="< 1 s, both",
-)
 def rapid(runs: Runs) -> list[Check]:
-    """Settling time of the mean angle and of the spread, largest less smallest angle; nominal, both networks."""
+    """Claim 38: network: rapid synchronisation and damping."""
     return [
         check(f"{plant}: settling time of the {of}, s", runs.score(plant, OURS)[f"{of}_settling_time"], "<", 1.0, about)
         for plant in NETWORKS
@@ -210,14 +130,8 @@ def rapid(runs: Runs) -> list[Check]:
     ]
 
 
-@claim(
-    "39",
-    "network: classical slower, coupling distortion",
-    where="five-pendulum network",
-    holds_if="slower; classical's overshoot grows with the coupling, the paper's law's does not",
-)
 def distortion(runs: Runs) -> list[Check]:
-    """Settling time against the paper's law; overshoot at a coupling of 0, 0.5 and 5 N m/rad; both networks."""
+    """Claim 39: network: classical slower, coupling distortion."""
     checks = []
     for plant in NETWORKS:
         coupled = [find_plant(plant, kc=kc) for kc in COUPLINGS]  # the same gains in all
@@ -233,37 +147,18 @@ def distortion(runs: Runs) -> list[Check]:
     return checks
 
 
-@claim(
-    "40",
-    "network: HOSMC like adaptive",
-    where="five-pendulum network",
-    holds_if="within 25 %",
-)
 def hosmc_like_adaptive(runs: Runs) -> list[Check]:
-    """Settling time of super-twisting against adaptive; nominal, both networks."""
+    """Claim 40: network: HOSMC like adaptive."""
     return [alike(runs, plant, HOSMC, "adaptive") for plant in NETWORKS]
 
 
-@claim(
-    "50",
-    "fast and monotonic on every system",
-    where="summary of benchmarking results",
-    holds_if="< 1 %",
-    quantifier=UNIVERSAL,
-)
 def monotonic(runs: Runs) -> list[Check]:
-    """Overshoot on every plant, nominal."""
+    """Claim 50: fast and monotonic on every system."""
     return [check(f"{plant}: overshoot, %", overshoot(runs, plant, OURS), "<", 1.0) for plant in PLANTS]
 
 
-@claim(
-    "51",
-    "settles like or better than classical and HOSMC",
-    where="summary of benchmarking results",
-    holds_if="<= 1.1x the better",
-)
 def settles_as_well(runs: Runs) -> list[Check]:
-    """Settling time on every plant against the better of classical and super-twisting, nominal."""
+    """Claim 51: settles like or better than classical and HOSMC."""
     checks = []
     for plant in PLANTS:
         ours, *rivals = (runs.score(plant, law)["settling_time"] for law in (OURS, "classical", HOSMC))
@@ -272,17 +167,8 @@ def settles_as_well(runs: Runs) -> list[Check]:
     return checks
 
 
-@claim(
-    "52",
-    "removes the chattering of classical and adaptive",
-    where="summary of benchmarking results",
-    holds_if="< 1 % of each",
-)
 def removes_chattering(runs: Runs) -> list[Check]:
-    """TV rate of u on every plant, nominal.
-
-    Here the paper has adaptive SMC chatter; its table I has it without chattering.
-    """
+    """Claim 52: removes the chattering of classical and adaptive."""
     checks = []
     for plant in PLANTS:
         for law in ("classical", "adaptive"):

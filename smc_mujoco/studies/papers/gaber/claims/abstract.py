@@ -7,10 +7,10 @@ import numpy as np
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
-from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import NETWORKS, OURS, Runs, comes_to_rest
-from smc_mujoco.studies.paper.scenarios import CONDITIONS, PLANTS, REALISTIC
+from smc_mujoco.studies.papers.gaber.claims.common import NETWORKS, OURS, comes_to_rest
+from smc_mujoco.studies.papers.gaber.scenarios import CONDITIONS, PLANTS, REALISTIC
 
 NOISY = Noise(position=0.01)  # the study's, on the position alone
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
@@ -21,19 +21,8 @@ QUICK_LARGEST = 50
 SHORT = 3.0  # s, of a network's run: several times what the networks of the study take to settle
 
 
-@claim(
-    "1",
-    "observer-free",
-    where="abstract",
-    holds_if="settling time within 25 % of the run with true xdot; partly supported if with one of the two filters",
-)
 def observer_free(runs: Runs) -> list[Check]:
-    """The same run, x read with noise of 0.01, xdot true or from filtered differences (5 and 20 ms) of that x.
-
-    A filter of tau passes white noise of x with the gain sqrt(2 / (1 + a)) (1 - a) / h, a = tau / (tau + h), h = 1 ms:
-    with 5 ms that of xdot is 1.7 rad/s or m/s, with 20 ms 0.5. It swamps alpha: tanh swings between its limits and is
-    weaker on average, so that x settles later, or leaves the band of 2 % again and again.
-    """
+    """Claim 1: observer-free."""
     scores = runs.scores(
         runs.scenario(plant, OURS, noise=NOISY, velocity=velocity)
         for plant in PLANTS
@@ -47,34 +36,14 @@ def observer_free(runs: Runs) -> list[Check]:
     ]
 
 
-@claim(
-    "3",
-    "reduces chattering",
-    where="abstract",
-    holds_if="< 1 % of classical",
-)
 def reduces_chattering(runs: Runs) -> list[Check]:
-    """TV rate of u against classical SMC, nominal."""
+    """Claim 3: reduces chattering."""
     rates = {plant: [runs.score(plant, law)["tv_rate"] for law in (OURS, "classical")] for plant in PLANTS}
     return [check(f"{plant}: TV rate / classical's", ratio(*rates[plant]), "<", 0.01) for plant in PLANTS]
 
 
-@claim(
-    "4",
-    "bounded control",
-    where="abstract, section 3",
-    quick="in three of these conditions",
-    holds_if="<= lambda",
-    late=True,
-)
 def bounded(runs: Runs) -> list[Check | Beside]:
-    """Max |u| over every run of the study: its five plants in every condition of the ideal mechanisms, and with an
-    actuator without a bound; and all that other claims and the table have run of this law.
-
-    u is read behind the actuator's bound, 6 in the study: a lambda above it is put to the test by the runs without that
-    bound. The check cannot fail for the law as it is, |tanh| being at most 1; it can for a mutant. A run that failed
-    has no max |u|, and counts as one that does not hold.
-    """
+    """Claim 4: bounded control."""
     ideal = [name for name in CONDITIONS if name not in REALISTIC]
     grid = [runs.scenario(plant, OURS, name) for plant in PLANTS for name in (ideal[:3] if runs.quick else ideal)]
     grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in PLANTS]
@@ -88,32 +57,16 @@ def bounded(runs: Runs) -> list[Check | Beside]:
     ]
 
 
-@claim(
-    "5",
-    "robust to noise, disturbance, parameter variation",
-    where="abstract",
-    quick="under noise, sine and mass times 1.3",
-    holds_if="<= 5 % of |x0|",
-)
 def robust(runs: Runs) -> list[Check]:
-    """Ultimate bound under noise, disturbance (sine, constant, step, pulse, process noise), mass times 0.7 and 1.3."""
+    """Claim 5: robust to noise, disturbance, parameter variation."""
     names = QUICK_DISTURBED if runs.quick else DISTURBED
     return comes_to_rest(
         runs, {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant in PLANTS for name in names}
     )
 
 
-@claim(
-    "7",
-    "scalable",
-    where="abstract",
-    quick="N = 2 to 50",
-    holds_if="within 2x of N = 2",
-)
 def scalable(runs: Runs) -> list[Check]:
-    """Settling time of both networks, N = 2, 5, 10, 20, 50 and 1000, runs of 3 s under implicitfast; the five starting
-    angles recur.
-    """
+    """Claim 7: scalable."""
     sizes, checks = [n for n in SIZES if n <= QUICK_LARGEST or not runs.quick], []
     for plant in NETWORKS:
         networks = [find_plant(plant, n=n) for n in sizes]

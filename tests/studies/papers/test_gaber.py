@@ -10,11 +10,16 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.control.law import law_function
+from smc_mujoco.control.variants import reversed_gain, with_gains, zero_gain
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
+from smc_mujoco.studies.audit.audit import claims
+from smc_mujoco.studies.audit.paper import paper
+from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
-from smc_mujoco.studies.paper.claims import (
+from smc_mujoco.studies.papers.gaber.claims import (
+    common,
     contributions,
     lyapunov,
     practical,
@@ -22,12 +27,9 @@ from smc_mujoco.studies.paper.claims import (
     searches,
     table_one,
 )
-from smc_mujoco.studies.paper.claims import runs as claim_runs
-from smc_mujoco.studies.paper.claims.audit import catalogue, claims
-from smc_mujoco.studies.paper.claims.runs import Runs
-from smc_mujoco.studies.paper.claims.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.studies.paper.scenarios import LAWS
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS
 
+GABER = paper("gaber")
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)
 OURS, CLASSICAL, ADAPTIVE, HOSMC = "observer_free", "classical", "adaptive", "super_twisting"
 CONDITIONED, UNCLAMPED = "conditioned_super_twisting", "super_twisting_unclamped"
@@ -41,7 +43,7 @@ class Stub(Runs):
     """Runs that were never made: what they scored, and what their traces hold, is told."""
 
     def __init__(self, told: Told | None = None, drawn: Drawn | None = None, **about):
-        super().__init__("study", **about)
+        super().__init__(GABER, "study", **about)
         self.told, self.drawn = told, drawn
 
     def scores(self, scenarios):
@@ -61,12 +63,12 @@ class Stub(Runs):
 
 def of(runs: Runs, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
-    return [one for one in catalogue()[id].evidence(runs) if isinstance(one, Check)]
+    return [one for one in GABER.claims[id].evidence(runs) if isinstance(one, Check)]
 
 
 def judged(runs: Runs, id: str) -> str:
     """The verdict on a claim under one set of gains."""
-    return verdict(catalogue()[id].evidence(runs), catalogue()[id].quantifier)
+    return verdict(GABER.claims[id].evidence(runs), GABER.claims[id].quantifier)
 
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
@@ -234,7 +236,7 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
     for name in SETS:
         runs = Stub(lambda s: {"tv_rate": 7919.0 * s.law.gains["lam"] * (1.0 + s.input_delay) % 1.0})
         runs.gains = name
-        named.add(tuple(one.what for one in catalogue()[id].evidence(runs)))
+        named.add(tuple(one.what for one in GABER.claims[id].evidence(runs)))
     assert len(named) == 1
 
 
@@ -326,7 +328,7 @@ def test_smoothness_under_noise_is_judged_by_size_steps_and_frequency(u, expecte
 def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
     """Amplitudes 3 and 4 at 10 and 100 Hz: variance 4.5 + 8, 16/25 of it above 50 Hz; before 8 s nothing counts."""
     u = 3 * np.sin(2 * np.pi * 10 * T) + 4 * np.sin(2 * np.pi * 100 * T) + np.where(T < 7.9, 1e3, 0.0)
-    trace = Stub(drawn=lambda s: (0.0 * T, u)).trace(Runs("study").scenario("van_der_pol", OURS))
+    trace = Stub(drawn=lambda s: (0.0 * T, u)).trace(Runs(GABER, "study").scenario("van_der_pol", OURS))
     std, step, share = robustness.fluctuation(trace)
     assert std == pytest.approx(math.sqrt(12.5), rel=1e-3)
     assert share == pytest.approx(16 / 25, rel=1e-2)
@@ -375,12 +377,12 @@ def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected)
         return s.resolved.x0[0] * np.exp(-4.0 * (1.0 - slowed * far) * T), 0.0 * T
 
     found = of(Stub(drawn=drawn), "57")
-    assert verdict(found, catalogue()["57"].quantifier) == expected
+    assert verdict(found, GABER.claims["57"].quantifier) == expected
     assert [one.value for one in found[:2]] == pytest.approx([slowed, 2 * slowed], abs=0.02)
 
 
 def test_the_decay_rate_of_an_exponential_is_its_own_and_of_an_oscillation_its_envelopes():
-    runs = Runs("study")
+    runs = Runs(GABER, "study")
     base = runs.scenario("duffing", OURS)
     for ring in (0.0, 40.0):
         x = 1.5 * np.exp(-2.0 * T) * np.cos(ring * T)
@@ -451,8 +453,8 @@ def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
-    assert searches.critical_delay(Runs("study"), "duffing") == pytest.approx(0.178, abs=0.002)
-    assert math.isnan(searches.critical_delay(Runs("study", substitute={OURS: zero_gain}), "duffing"))
+    assert searches.critical_delay(Runs(GABER, "study"), "duffing") == pytest.approx(0.178, abs=0.002)
+    assert math.isnan(searches.critical_delay(Runs(GABER, "study", substitute={OURS: zero_gain}), "duffing"))
 
 
 # table I
@@ -519,20 +521,20 @@ def winding(y, gains, memory):
 
 def test_needed_signals_and_growth_are_read_off_what_a_law_does():
     like = lambda law: {OURS: lambda _: law}  # noqa: E731
-    assert table_one.estimated(Runs("study"), OURS) == 0.0
-    assert table_one.estimated(Runs("study", substitute=like(accelerated())), OURS) == 1.0
-    assert table_one.growth(Runs("study"), OURS) == pytest.approx(0.0, abs=1e-6)
-    assert table_one.growth(Runs("study", substitute=like(accelerated())), OURS) == pytest.approx(9.0)
-    assert table_one.growth(Runs("study", substitute=like(winding())), OURS) == pytest.approx(1.0, rel=1e-2)
-    assert table_one.growth(Runs("study"), HOSMC) > 0.5
-    assert table_one.growth(Runs("study"), CLASSICAL) == 0.0
+    assert table_one.estimated(Runs(GABER, "study"), OURS) == 0.0
+    assert table_one.estimated(Runs(GABER, "study", substitute=like(accelerated())), OURS) == 1.0
+    assert table_one.growth(Runs(GABER, "study"), OURS) == pytest.approx(0.0, abs=1e-6)
+    assert table_one.growth(Runs(GABER, "study", substitute=like(accelerated())), OURS) == pytest.approx(9.0)
+    assert table_one.growth(Runs(GABER, "study", substitute=like(winding())), OURS) == pytest.approx(1.0, rel=1e-2)
+    assert table_one.growth(Runs(GABER, "study"), HOSMC) > 0.5
+    assert table_one.growth(Runs(GABER, "study"), CLASSICAL) == 0.0
 
 
 # the catalogue, and real runs
 
 
 def test_every_claim_of_the_simulations_is_there_and_says_what_it_measures():
-    known = catalogue()
+    known = GABER.claims
     for id in (*map(str, NUMBERS), "T"):
         entry = known[id]
         assert entry.text
@@ -544,8 +546,8 @@ def test_every_claim_of_the_simulations_is_there_and_says_what_it_measures():
 
 def test_of_two_laws_that_never_settle_none_is_slower_or_like_the_other():
     runs = Stub(lambda s: {"settling_time": never})
-    assert not claim_runs.slower(runs, "duffing", CLASSICAL).holds
-    assert not claim_runs.alike(runs, "duffing", CLASSICAL, OURS).holds
+    assert not common.slower(runs, "duffing", CLASSICAL).holds
+    assert not common.alike(runs, "duffing", CLASSICAL, OURS).holds
 
 
 def test_real_runs_give_the_verdicts_of_the_first_gains():
@@ -553,7 +555,7 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
     found = {one.id: one for one in claims(only=["29", "31", "45", "49"], gains="study")}
     assert {id: one.verdict for id, one in found.items()} == dict.fromkeys(("29", "31", "45", "49"), SUPPORTED)
     (over,) = found["29"].checks("study")
-    run = smc.run(Runs("study").scenario("inverted_pendulum", HOSMC))
+    run = smc.run(Runs(GABER, "study").scenario("inverted_pendulum", HOSMC))
     assert over.value == pytest.approx(-100 * run.x.min() / 0.5)
 
 

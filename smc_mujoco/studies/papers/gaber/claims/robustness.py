@@ -7,33 +7,21 @@ import numpy as np
 
 from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
-from smc_mujoco.studies.paper.claims.audit import claim
-from smc_mujoco.studies.paper.claims.runs import OURS, RIVALS, UNCLAMPED, Runs, command_bound, deviation, scale
+from smc_mujoco.studies.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, command_bound, deviation, scale
 
 PLANT = "van_der_pol"
 
 
-@claim(
-    "45",
-    "Van der Pol with noise: stable, small fluctuations",
-    where="robustness under disturbances",
-    holds_if="< 5 % of |x0|",
-)
 def small_fluctuations(runs: Runs) -> list[Check]:
-    """Ultimate bound with noise on x and v."""
+    """Claim 45: Van der Pol with noise: stable, small fluctuations."""
     bound = runs.score(PLANT, OURS, "noise")["ultimate_bound"] / scale(runs.scenario(PLANT, OURS))
     return [check(f"{PLANT}: ultimate bound with noise, over |x0|", bound, "<", 0.05)]
 
 
-@claim(
-    "46",
-    "Van der Pol with d: nearly identical, strong rejection",
-    where="robustness under disturbances",
-    holds_if="< 5 % of |x0|; residual not larger than any rival's",
-)
 def nearly_identical(runs: Runs) -> list[Check | Beside]:
-    """Largest |x - x_nominal| under d = 0.2 sin(5t); ultimate bound under it against each rival's."""
+    """Claim 46: Van der Pol with d: nearly identical, strong rejection."""
     disturbed, nominal = runs.traces([runs.scenario(PLANT, OURS, condition) for condition in ("sine", "nominal")])
     residual = {law: runs.score(PLANT, law, "sine")["ultimate_bound"] for law in (OURS, *RIVALS, UNCLAMPED)}
     what = f"{PLANT}: residual under d of"
@@ -53,18 +41,8 @@ def nearly_identical(runs: Runs) -> list[Check | Beside]:
     ]
 
 
-@claim(
-    "48",
-    "u under noise: smooth, small fluctuations",
-    where="control signal analysis",
-    holds_if="std < 10 % of min(lambda, u_max), step < 10 % of that, share < 50 %",
-)
 def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
-    """Van der Pol with noise, last 20 % of the run: standard deviation of u, its largest step from sample to sample,
-    share of its variance above 50 Hz.
-
-    Over the whole run the swing from the start, not noise, is most of u's variance; so all three are of the last 20 %.
-    """
+    """Claim 48: u under noise: smooth, small fluctuations."""
     (trace,) = runs.traces([runs.scenario(PLANT, OURS, "noise")])
     std, step, share = fluctuation(trace)
     most, over = command_bound(runs, PLANT), "over min(lambda, u_max)"
@@ -77,14 +55,8 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
     ]
 
 
-@claim(
-    "49",
-    "u under d: continuous, bounded",
-    where="control signal analysis",
-    holds_if="< 2 % of min(lambda, u_max)",
-)
 def continuous(runs: Runs) -> list[Check]:
-    """Van der Pol under d = 0.2 sin(5t): largest change of u per sample of 1 ms."""
+    """Claim 49: u under d: continuous, bounded."""
     step = ratio(runs.score(PLANT, OURS, "sine")["max_step"], command_bound(runs, PLANT))
     return [check(f"{PLANT}: largest step of u under d, over min(lambda, u_max)", step, "<", 0.02)]
 

@@ -16,9 +16,15 @@ from smc_mujoco.analysis.linear_theory import lam_range
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.studies import claims as command
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.audit import audit
+from smc_mujoco.studies.audit import runs as claim_runs
+from smc_mujoco.studies.audit.audit import claims, evaluations
+from smc_mujoco.studies.audit.paper import Entry, paper
+from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import (
     EXISTENTIAL,
     NAMED,
@@ -34,14 +40,12 @@ from smc_mujoco.studies.audit.verdict import (
     ratio,
     verdict,
 )
-from smc_mujoco.studies.paper.claims import audit, lyapunov, searches
-from smc_mujoco.studies.paper.claims import runs as claim_runs
-from smc_mujoco.studies.paper.claims.audit import catalogue, claim, claims, evaluations
-from smc_mujoco.studies.paper.claims.runs import OURS, Runs
-from smc_mujoco.studies.paper.claims.variants import reversed_gain, squeezed, with_gains, zero_gain
-from smc_mujoco.studies.paper.scenarios import PLANTS
+from smc_mujoco.studies.papers.gaber.claims import common, lyapunov, searches
+from smc_mujoco.studies.papers.gaber.claims.common import OURS
+from smc_mujoco.studies.papers.gaber.scenarios import PLANTS
 from smc_mujoco.studies.run_key import key
 
+GABER = paper("gaber")
 LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 36 37 38 39 40
           45 46 48 49 50 51 52 55 56 57 59 61 T"""
 UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
@@ -136,7 +140,7 @@ def test_one_counter_example_refutes_what_is_said_of_all_gains():
 
 
 def test_universal_claims_are_those_of_the_list():
-    assert {id for id, one in catalogue().items() if one.quantifier == UNIVERSAL} == UNIVERSALS
+    assert {id for id, one in GABER.claims.items() if one.quantifier == UNIVERSAL} == UNIVERSALS
 
 
 def test_sets_that_agree_give_their_verdict_and_others_flip():
@@ -153,15 +157,16 @@ def test_two_numbers_of_one_name_are_refused():
 
 def entry(id="900", found=(YES,), note=""):
     told = {"text": "text", "where": "here", "measured": "this", "holds_if": "< 2", "note": note}
-    return claim(id, told.pop("text"), **told)(lambda runs: found[runs.gains] if isinstance(found, dict) else found)
+    return Entry(id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told)
 
 
 @pytest.fixture
 def only(monkeypatch):
-    """A catalogue of the claims given alone."""
+    """A paper with the claims given alone."""
 
     def put(*entries):
-        monkeypatch.setattr(audit, "catalogue", lambda: {one.id: one for one in entries})
+        short = dataclasses.replace(GABER, claims={one.id: one for one in entries})
+        monkeypatch.setattr(audit, "find_paper", lambda which: short)
 
     return put
 
@@ -201,23 +206,16 @@ def test_claims_are_json_without_loss(only):
     assert told["flips"] is False
 
 
-# catalogue
+# the list
 
 
 def test_every_claim_of_the_list_is_there_once_and_in_order():
-    assert list(catalogue()) == LIST.split()
+    assert list(GABER.claims) == LIST.split()
 
 
 def test_every_claim_says_what_where_and_how():
-    for one in catalogue().values():
+    for one in GABER.claims.values():
         assert all((one.text, one.where, one.measured, one.holds_if, one.evidence.__doc__)), one.id
-
-
-def test_one_id_twice_is_refused(monkeypatch):
-    both = [SimpleNamespace(__name__=name, one=entry("7")) for name in ("first", "second")]
-    monkeypatch.setattr(audit, "modules", lambda name: both)
-    with pytest.raises(ScenarioError, match="'7' is there twice, in second"):
-        catalogue.__wrapped__()
 
 
 def test_unknown_claims_and_sets_are_refused():
@@ -229,11 +227,10 @@ def test_unknown_claims_and_sets_are_refused():
         claims(only=["3"], gains=[])
 
 
-def test_late_claims_come_last_and_every_one_is_reported(monkeypatch):
+def test_late_claims_come_last_and_every_one_is_reported(only):
     order, told = [], []
-    late, early = (claim(id, id, where="", measured="", holds_if="", late=id == "1") for id in ("1", "2"))
-    known = {"1": late(lambda runs: order.append("1") or [YES]), "2": early(lambda runs: order.append("2") or [YES])}
-    monkeypatch.setattr(audit, "catalogue", lambda: known)
+    late = dataclasses.replace(entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES])
+    only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
     assert [one.id for one in claims(gains=["study", "tuned"], report=told.append)] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
     assert sum(told) == evaluations(gains=["study", "tuned"]) == 4
@@ -244,7 +241,7 @@ def test_late_claims_come_last_and_every_one_is_reported(monkeypatch):
 
 @pytest.fixture
 def runs():
-    return Runs("study", quick=True)
+    return Runs(GABER, "study", quick=True)
 
 
 def short(runs, name="duffing", **changes):
@@ -275,7 +272,7 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
     scenario = short(runs)
     row = {m.name: None if m.network else 1.5 for m in metrics()}
     row |= {"hash": key(scenario), "law": OURS, "gains": '{"lam": 6.0}', "failure": None}
-    table = Runs("study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
+    table = Runs(GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
     assert table.scores([scenario])[0]["itae"] == 1.5
     assert [one.gains for one in table.results()] == [{"lam": 6.0}]
 
@@ -293,9 +290,9 @@ def test_a_change_of_plant_keeps_the_gains_of_its_name(runs):
 
 
 def test_a_mutant_stands_for_its_law_alone():
-    runs = Runs("study", substitute={OURS: zero_gain})
+    runs = Runs(GABER, "study", substitute={OURS: zero_gain})
     assert runs.law("duffing", OURS).name == "observer_free_zero"
-    assert runs.law("duffing", "classical") == Runs("study").law("duffing", "classical")
+    assert runs.law("duffing", "classical") == Runs(GABER, "study").law("duffing", "classical")
 
 
 # laws made of laws
@@ -371,15 +368,15 @@ def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory(monkeypatch):
     single = ("inverted_pendulum", "van_der_pol", "duffing")
     monkeypatch.setattr(searches, "PLANTS", single)
-    runs = Runs("study")
+    runs = Runs(GABER, "study")
     for name, found in searches.smallest_stable(runs).items():
-        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], claim_runs.PERIOD)
+        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], common.PERIOD)
         assert theory <= found <= 1.02 * theory, name
 
 
 def test_a_law_without_effect_stabilises_what_hangs_alone(monkeypatch):
     monkeypatch.setattr(searches, "PLANTS", ("duffing", "pendulum_network"))
-    found = searches.smallest_stable(Runs("study", quick=True, substitute={OURS: zero_gain}))
+    found = searches.smallest_stable(Runs(GABER, "study", quick=True, substitute={OURS: zero_gain}))
     assert found == {"duffing": math.inf, "pendulum_network": searches.MIN_LAMBDA}
 
 
@@ -430,7 +427,9 @@ def test_a_command_beyond_lambda_is_seen():
         def scores(self, scenarios):
             return [found | {"max_u": 2.0 * found["max_u"]} for found in super().scores(scenarios)]
 
-    assert verdict(catalogue()["4"].evidence(Louder("study", quick=True, substitute={OURS: louder}))) != SUPPORTED
+    assert (
+        verdict(GABER.claims["4"].evidence(Louder(GABER, "study", quick=True, substitute={OURS: louder}))) != SUPPORTED
+    )
 
 
 # the command

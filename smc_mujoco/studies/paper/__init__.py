@@ -1,1 +1,0 @@
-"""The study that ships: one paper, its plants and its claims."""

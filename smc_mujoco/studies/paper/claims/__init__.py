@@ -1,1 +1,0 @@
-"""The paper's claims, one file a section of the paper, and the audit that judges them."""
