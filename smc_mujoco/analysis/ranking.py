@@ -103,6 +103,18 @@ class Comparison:
         lower = exceeds(rival, own, resolution=self.floors[:, None, None])
         return lower & (self.p <= 1 - self.level) & (self.runs >= SEEDS)
 
+    @functools.cached_property
+    def tied(self) -> np.ndarray:
+        """Whether two laws tie, (laws, laws).
+
+        They do if neither is better in any block; in blocks with fewer than 16 seeds, if their medians do not differ
+        relevantly.
+        """
+        own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
+        lower = exceeds(rival, own, resolution=self.floors[:, None, None])
+        differs = np.any(np.where(self.runs < SEEDS, lower, self.better), axis=0)
+        return ~np.logical_or(differs, differs.T)
+
     @property
     def best(self) -> list[tuple[str, ...]]:
         """The laws of each block that no other is better than."""

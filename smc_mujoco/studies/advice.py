@@ -20,6 +20,12 @@ from smc_mujoco.studies.table import Table
 
 NAMED = 6  # names of laws that the screening left out
 NEEDS: Mapping[str, Metric] = {metric.need: metric for metric in metrics() if metric.need}
+TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # what orders laws that tie, least first, in words
+
+
+def ties(plant: Plant) -> list[Metric]:
+    """Return the metrics that order laws which tie on a plant."""
+    return [NEEDS[need] for need in TIES if not NEEDS[need].refusal(plant)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -119,6 +125,18 @@ class Advice:
         known = catalogue().get(self.law.name)
         return f"smc.{self.law!r}" if known is not None and known.function is self.law.function else ""
 
+    @property
+    def tied(self) -> list[str]:
+        """The finalists that tie with the advised law: of those that are level with it, seeds enough say so."""
+        laws, first = self.comparison.laws, self.compared[0]
+        return [name for name in self.compared[1:] if self.comparison.tied[laws.index(first), laws.index(name)]]
+
+    @property
+    def rule(self) -> str:
+        """The order of laws that tie, in words."""
+        words = [words for need, words in TIES.items() if NEEDS[need] in ties(self.plant)]
+        return f"laws that tie stand in the order of {', then of '.join(words)}, less first"
+
     # the table
 
     @property
@@ -178,10 +196,11 @@ class Advice:
             return f"No law can be advised, because {why}: {cure}.{best}"
         if others and len(self.level) == len(others):
             every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
-            return (
-                f"No law can be called the best: {every} are level in every comparison. Use the one that you know. "
-                f"The best mean rank has {law}."
-            )
+            best = f"The best mean rank has {law}."
+            if self.tied:
+                best = f"{self.rule.capitalize()}; first is {law}."
+            none = f"No law can be called the best: {every} are level in every comparison"
+            return f"{none}. Use the one that you know. {best}"
         return f"Use {law}."
 
     def _because(self) -> str:
@@ -194,6 +213,9 @@ class Advice:
         why += f", as {'has' if len(equals) == 1 else 'have'} {joined(equals)}" if equals else ""
         if not leads:
             why = "it has the best mean rank of those that none dominates, being better somewhere and worse nowhere"
+        ahead = [c.law.name for c in self.choices[1:] if c.law.name in self.tied and c.rank.mean < first.rank.mean]
+        if ahead:
+            why = f"it ties with {joined(ahead)}, of better mean rank, and {self.rule}"
         if count == 1:
             alone = "is the only law here that suits" if len(self.choices) == 1 else "alone settles often enough"
             why = f"it {alone}"
@@ -255,9 +277,11 @@ class Advice:
             return f"How sure: not at all, with {what}. A law is called better from {SEEDS} on."
         beaten = [name for name in others if first in self.dominated(name)]
         mixed = [name for name in others if self.wins(name, first)]
+        unsure = [name for name in self.level if name not in self.tied]
         parts = [
             f"it dominates {joined(beaten)}: better somewhere, worse nowhere" if beaten else "",
-            f"not to be told from {joined(self.level)}" if self.level else "",
+            f"it ties with {joined(self.tied)}; {self.rule}" if self.tied else "",
+            f"not to be told from {joined(unsure)}" if unsure else "",
             f"a matter of what counts against {joined(mixed)}, better here and worse there" if mixed else "",
             f"its place by mean rank is {_range(rank.low, rank.high)} of {len(self.compared)} with 95 % confidence",
         ]

@@ -18,7 +18,8 @@ two-gains ...). With "no-velocity", laws that read a velocity get one that is di
 
 A law is not fit if it settles in less than half as many runs of a condition as the law that settles in the most: to do
 nothing would be calmest. Laws that are not fit are not compared. A law dominates another if it is better in some block
-and worse in none. Laws are ordered by mean rank, but none before a law that dominates it. The first one is advised.
+and worse in none. Laws are ordered by mean rank, but none before a law that dominates it. Laws that tie with the one
+whose turn it is are ordered among themselves: less overshoot first, then less energy of u. The first law is advised.
 """
 
 import dataclasses
@@ -50,7 +51,7 @@ from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable,
 from smc_mujoco.simulation.grid import case, grid, listed
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.advice import NEEDS, Advice, Choice
+from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
@@ -330,20 +331,36 @@ def _contest(table: Table, plant: Plant, needs: Sequence[str]) -> Contest:
     specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
     nan = math.nan
     unfit = [Rank(law, nan, nan, nan, nan, nan, 1.0, best=False) for law in group.laws if law not in laws]
-    return Contest(table, comparison, [*_order(comparison), *unfit], fit, specialists)
+    return Contest(
+        table, comparison, [*_order(comparison, _restraint(group, ran, table, plant)), *unfit], fit, specialists
+    )
 
 
-def _order(comparison: Comparison) -> list[Rank]:
-    """Return the laws by mean rank, each behind all that dominate it."""
+def _restraint(group: paired_runs.Group, ran: Sequence, table: Table, plant: Plant) -> dict[str, tuple[float, ...]]:
+    """Return the mean rank of each law on each of the metrics that order laws which tie, less is first."""
+    found = []
+    for metric in ties(plant):
+        there, scores, _ = group.scores(paired_runs.values(table, metric.name))
+        if scores:
+            centres = np.array([np.nanmedian(scores[law], axis=1) for law in group.laws])
+            floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in there])
+            found.append(block_ranks(centres, floors).mean(axis=1))
+    return {law: tuple(float(mean[i]) for mean in found) for i, law in enumerate(group.laws)}
+
+
+def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -> list[Rank]:
+    """Return the laws by mean rank, each behind all that dominate it, and laws that tie in the order of `restraint`."""
     ahead = np.any(comparison.better, axis=0)
     dominates = np.logical_and(ahead, ~ahead.T)
+    place = {law: k for k, law in enumerate(comparison.laws)}
     left, ordered = ranks(comparison), []
     while left:
-        at = [comparison.laws.index(rank.law) for rank in left]
-        free = [rank for rank, k in zip(left, at, strict=True) if not dominates[at, k].any()]
-        first = (free or left)[0]  # none is free only if the laws dominate each other in a circle
-        ordered.append(first)
-        left.remove(first)
+        at = [place[rank.law] for rank in left]
+        free = [rank for rank in left if not dominates[at, place[rank.law]].any()]
+        free = free or left[:1]  # none is free only if the laws dominate each other in a circle
+        equals = [rank for rank in free if comparison.tied[place[free[0].law], place[rank.law]]]
+        ordered.append(min(equals, key=lambda rank: restraint[rank.law]))
+        left.remove(ordered[-1])
     return ordered
 
 

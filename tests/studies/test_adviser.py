@@ -92,14 +92,14 @@ def test_the_answer_says_what_why_and_how_sure(advice):
     assert f"its place by mean rank is {low:g}{f' to {high:g}' if high > low else ''} of 3" in sure
 
 
-def with_cells(advice, **cells):
+def with_cells(advice, restraint=None, **cells):
     """Advice on the same runs with other scores: law -> medians of fast and calm, each under nominal and noise."""
     spread = np.linspace(0.99, 1.01, 24)
     scores = {law: np.outer(own, spread) if np.ndim(own) == 1 else np.array(own) for law, own in cells.items()}
     comparison = ranking.compare(scores)
     names = {choice.law.name: choice for choice in advice.choices}
     choices = []
-    for rank in adviser._order(comparison):
+    for rank in adviser._order(comparison, restraint or dict.fromkeys(cells, ())):
         medians = {need: median_of(scores[rank.law][2 * k : 2 * k + 2]) for k, need in enumerate(("fast", "calm"))}
         choices.append(dataclasses.replace(names[rank.law], rank=rank, medians=medians))
     return dataclasses.replace(advice, comparison=comparison, choices=tuple(choices))
@@ -139,6 +139,52 @@ def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     assert "dominate" not in traded.key
 
 
+def test_laws_that_tie_stand_in_the_order_of_overshoot_and_energy_and_the_answer_says_so(advice):
+    cells = {"observer_free": [1.0, 1, 9, 9], "slow": [1.01, 1, 9, 9], "classical": [2, 2, 9, 9]}
+    less, more = {"slow": (1.0, 1.0)}, {"slow": (1.5, 1.0)}
+    others = {"observer_free": (1.0, 2.0), "classical": (1.0, 3.0)}
+    for restraint, first in ((less, "slow"), (more, "observer_free")):
+        found = with_cells(advice, restraint | others, **cells)
+        (other,) = {"slow", "observer_free"} - {first}
+        assert [choice.law.name for choice in found.choices] == [first, other, "classical"]
+        assert found.tied == found.level == [other]
+        assert f"it ties with {other}; laws that tie stand in the order of overshoot, then of energy of u" in text(
+            found
+        )
+
+
+def test_a_law_that_ties_with_one_of_better_mean_rank_is_advised_for_the_rule(advice):
+    """Slow is ahead by 5 % under noise, but not in more seeds; it overshoots more."""
+    mixed, even = np.tile([0.5, 1.6], 12), np.ones(24)
+    cells = {"observer_free": [mixed] * 4, "slow": [even] * 4}
+    restraint = {"observer_free": (1.0,), "slow": (2.0,)}
+    found = with_cells(advice, restraint, **cells)
+    first, second = found.choices
+    assert second.rank.mean < first.rank.mean
+    assert found.answer[0].startswith("No law can be called the best")
+    assert found.answer[0].endswith(
+        f"overshoot, then of energy of u, less first; first is {first.law} ({first.source})."
+    )
+    three = with_cells(advice, restraint | {"classical": (1.0,)}, **cells, classical=[3 * even] * 4)
+    assert three.law.name == "observer_free"
+    assert three.answer[1].startswith(
+        "Because it ties with slow, of better mean rank, and laws that tie stand in the ord"
+    )
+
+
+def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
+    (group,) = adviser.paired_runs.groups(advice.table, by=("plant",))
+    ran = adviser.paired_runs.scenarios(advice.table, group)
+    found = adviser._restraint(group, ran, advice.table, advice.plant)
+    assert set(found) == set(group.laws)
+    energies = {law: np.median(advice.table.select(law=law).column("energy")) for law in group.laws}
+    overshoots = {law: np.median(advice.table.select(law=law).column("overshoot")) for law in group.laws}
+    assert found["idle"][1] == 1.0 == min(rank for _, rank in found.values())
+    assert energies["idle"] == 0.0
+    most = max(overshoots, key=overshoots.__getitem__)
+    assert found[most][0] == max(rank for rank, _ in found.values())
+
+
 def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advice):
     found = with_cells(advice, observer_free=[1, 1, 9, 5], slow=[1, 1, 9, 9], classical=[2, 2, 10, 10])
     worse = dataclasses.replace(found.choices[1], rank=found.choices[1].rank._replace(mean=0.5))
@@ -174,13 +220,14 @@ def test_equal_laws_are_level_and_no_law_is_called_the_best(folder):
     assert found.level == [found.choices[1].law.name]
     assert found.answer[0].startswith("No law can be called the best: both laws are level in every comparison.")
     assert "level with the first in every comparison" in text(found)
-    assert f"not to be told from {found.choices[1].law.name}" in text(found)
+    assert f"it ties with {found.choices[1].law.name}; laws that tie stand in the order of" in text(found)
 
 
 def test_few_seeds_tell_no_law_from_another(folder):
     few = smc.which("duffing", needs="fast", laws=[FAST, SLOW], out=folder, **COMMON | {"seeds": 4})
     assert few.answer[0].startswith("No law can be called the best")
     assert not few.comparison.better.any()
+    assert few.tied == []
     assert "How sure: not at all, with 4 seeds. A law is called better from 16 on." in text(few)
 
 
