@@ -6,8 +6,10 @@ their cost is smooth; then as a whole, with the loop closed where the controller
 batch. The search is scipy's trust region. `mujoco.sysid` is not used: it replays recorded controls in an open loop,
 without controllers, encoders and delays, and needs ten more packages.
 
-Standard errors allow for residuals that depend on their neighbours, and for short events that decide a quantity: they
-are those of a jackknife that leaves out one block of time after the other, at first order.
+Standard errors allow for residuals that depend on their neighbours: they are those of a jackknife that leaves out one
+block of time after the other, at first order. A closed loop feeds the noise of its measurement back, and where one
+short transient decides a quantity, the other blocks cannot tell what that does. So closed loops are also repeated in
+simulation with their own noise and rounding, and a standard error is at least the deviation that this causes.
 """
 
 import dataclasses
@@ -22,6 +24,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -33,6 +36,7 @@ from smc_mujoco.twins.rig import rig as find_rig
 STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry friction makes shorter ones rough
 SPREAD = 0.2  # standard deviation of the logarithm of other starts of the search; chosen
 MAX_CORRELATION = 0.98  # correlation from which records cannot tell two quantities apart; chosen
+REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
 BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
 SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
 WORST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
@@ -292,6 +296,7 @@ class Search:
         deviation = np.sqrt(np.diag(covariance))
         with np.errstate(all="ignore"):
             correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+        deviation = np.maximum(deviation, self._fed_back(J, z))
         values = dict(zip(self.names, (z * self.scales).tolist(), strict=True))
         errors = dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
         return values, errors, correlations
@@ -310,6 +315,32 @@ class Search:
             mine, errors = J[which == b], r[which == b]
             moves[b] = np.linalg.lstsq(A - mine.T @ mine, mine.T @ errors, rcond=None)[0]
         return (count - 1) / count * moves.T @ moves
+
+    def _fed_back(self, J: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the deviation of the solution, (p,), that the noise of the measurement causes through the controller.
+
+        It is the root mean square over `REPEATS` simulated repetitions of the records, with their noise and rounding,
+        at first order; 0 in an open loop.
+        """
+        if self.twin.controller is None:
+            return np.zeros(len(z))
+        rig, several = self.rig(z), range(len(self.data))
+        calm = [rig.replay(record, rounded=False) for record in self.data]
+        noisy = [
+            dataclasses.replace(rig.replay(record), noise=Noise(files.noise(self.checked[i], rig.columns)), seed=repeat)
+            for repeat in range(REPEATS)
+            for i, record in enumerate(self.data)
+        ]
+        traces = run(calm + noisy)
+        at = rig.start, None
+        expected = [self._compared(rig, i, at, traces[i])[0] for i in several]
+        moved = np.zeros((REPEATS, len(z)))
+        for repeat in range(REPEATS):
+            ran = traces[len(calm) * (1 + repeat) :]
+            change = [self._relative(self._compared(rig, i, at, ran[i])[0], expected[i], i) for i in several]
+            moved[repeat] = np.linalg.lstsq(J, np.concatenate(change), rcond=None)[0]
+        self.report(1)
+        return np.sqrt(np.mean(moved**2, axis=0))
 
 
 def _scale(quantity: Quantity) -> float:
@@ -335,7 +366,7 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
     state = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in of.columns.x)
     of = dataclasses.replace(
         of, controller=None if law.name == "none" else law, commands=None, dynamics=None, start=0.0, score_from=0.0,
-        columns=dataclasses.replace(of.columns, state=state, v=(), torque=()),
+        columns=dataclasses.replace(of.columns, state=state, torque=()),
     )  # fmt: skip
     return of, [files.of_trace(trace, of.columns) for trace in traces]
 

@@ -1,36 +1,79 @@
-"""Inverse dynamics: the torques that a measured motion takes."""
+"""Inverse dynamics: the torques that a measured motion takes, and the measured ones, both below 5 Hz.
+
+Velocities and accelerations are those of cubics through the positions. The noise of an acceleration, times the inertia,
+may exceed the torque itself, and least squares of torques would then make the inertia small to be rid of it. So the
+torques that were computed and those that were measured go through the same low-pass filter, forward and backward.
+Source: M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997 (the parallel filter).
+"""
 
 import mujoco
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.twins.records import Columns, Record, step_of
 
-SAMPLES, ORDER = 21, 3  # of the cubic about each sample; chosen: 42 ms at 500 Hz
-STRIDE = 5  # samples of which one is compared, as neighbours share a cubic; chosen
+WINDOW, ORDER = 0.04, 3  # s, of the cubic about each sample; chosen
+PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
+CUTOFF, POLES = 5.0, 4  # Hz; chosen: three times the frequency of the fastest public exciting motions, 1.6 Hz
+END = 0.1  # s, left out at both ends, where a filter has one side only
+SHORTEST, SLOWEST = 1.0, 0.05  # s: duration of a record, and time between its samples; chosen
 
 
-def smoothed(data: Record, names: tuple[str, ...]) -> Record:
-    """Return every STRIDE-th sample of columns, by the cubic through the samples about it."""
-    return {name: np.asarray(savgol_filter(data[name], SAMPLES, ORDER))[::STRIDE] for name in names}
+class Filter:
+    """The filter of a record's columns at its own rate."""
+
+    def __init__(self, data: Record, columns: Columns):
+        """Raise ScenarioError for a record that is too short, or sampled too slowly."""
+        t = data[columns.time]
+        self.data, self.step = data, step_of(data, columns)
+        if t[-1] - t[0] < SHORTEST or self.step > SLOWEST:
+            raise ScenarioError(
+                f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
+                f"at least {SHORTEST:g} s, with a sample every {SLOWEST:g} s or more often"
+            )
+        self.stride = max(1, round(PERIOD / self.step))
+        self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
+
+    def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
+        """Return a column or a derivative of it, (N,), by cubics through the samples about each that is compared."""
+        samples = 2 * max(2, round(WINDOW / self.step / 2)) + 1
+        smooth = savgol_filter(self.data[name], samples, ORDER, deriv=derivative, delta=self.step)
+        return np.asarray(smooth)[:: self.stride]
+
+    def low(self, values: np.ndarray) -> np.ndarray:
+        """Return what is slower than CUTOFF in values (N,), without the ends."""
+        return self.inner(sosfiltfilt(self.poles, values))
+
+    def inner(self, values: np.ndarray) -> np.ndarray:
+        """Return values without the ends."""
+        cut = round(END / (self.stride * self.step))
+        return values[cut : len(values) - cut]
+
+
+def times(data: Record, columns: Columns) -> np.ndarray:
+    """Return the times of the torques, s."""
+    own = Filter(data, columns)
+    return own.inner(data[columns.time][:: own.stride])
+
+
+def measured(data: Record, columns: Columns) -> Record:
+    """Return the recorded torque of each joint below CUTOFF, N m."""
+    own = Filter(data, columns)
+    return {name: own.low(own.cubic(name)) for name in columns.torque}
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:
-    """Return the torque of each joint at every STRIDE-th sample, by MuJoCo's inverse dynamics of a measured motion."""
-    model = plant.load()
+    """Return the torque of each joint that the measured motion takes, below CUTOFF, by MuJoCo's inverse dynamics."""
+    own, model = Filter(data, columns), plant.load()
     held, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
-    step = step_of(data, columns)
-    x = np.column_stack(list(smoothed(data, columns.x).values()))
-    v = np.column_stack(list(smoothed(data, columns.v).values()))
-    a = np.column_stack(
-        [np.asarray(savgol_filter(data[name], SAMPLES, ORDER, deriv=1, delta=step))[::STRIDE] for name in columns.v]
-    )
+    x, v, a = (np.column_stack([own.cubic(name, order) for name in columns.x]) for order in range(3))
     found = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):
         held.qpos[at], held.qvel[dofs], held.qacc[dofs] = x[k], v[k], a[k]
         mujoco.mj_inverse(model, held)
         found[k] = held.qfrc_inverse[dofs]
-    return {name: found[:, i] for i, name in enumerate(columns.torque)}
+    return {name: own.low(found[:, i]) for i, name in enumerate(columns.torque)}

@@ -249,7 +249,7 @@ class Rig:
         data, time = [self.checked(record) for record in many], self.columns.time
         if self.dynamics is not None:
             return [
-                (self.torques(one), self.measured_torques(one), each[time][:: inverse.STRIDE])
+                (self.torques(one), self.measured_torques(one), inverse.times(each, self.columns))
                 for one, each in zip(many, data, strict=True)
             ]
         found = []
@@ -278,16 +278,12 @@ class Rig:
         return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
 
     def torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the torque of each joint that the measured motion of a record takes, by inverse dynamics.
-
-        Every fifth sample counts. Its position, velocity and acceleration are those of cubics through its
-        neighbours.
-        """
+        """Return the torque of each joint that the measured motion of a record takes below 5 Hz, N m."""
         return inverse.torques(self._dynamics(), self.checked(record), self.columns)
 
     def measured_torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the recorded torque of each joint, smoothed and thinned out as the motion is in `torques`."""
-        return inverse.smoothed(self.checked(record), self.columns.torque)
+        """Return the recorded torque of each joint at the same times, through the same filter, N m."""
+        return inverse.measured(self.checked(record), self.columns)
 
     def _dynamics(self) -> Plant:
         if self.dynamics is None:

@@ -62,6 +62,26 @@ def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
         assert result.errors[name] < 0.05 * PENDULUM.values[name]
 
 
+def test_a_transient_of_a_closed_loop_gives_a_quantity_within_three_standard_errors():
+    """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by 8 and 11 deviations."""
+    runs = [
+        AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=seed, noise=smc.Noise(2e-7))
+        for seed in (4, 10)
+    ]
+    for trace in smc.run(runs):
+        result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
+        for name, value in result.values.items():
+            assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
+            assert result.errors[name] < 0.01 * AXIS.values[name]
+
+
+def test_noise_is_read_off_a_moving_record():
+    t, rng = 1e-3 * np.arange(4000), np.random.default_rng(5)
+    record = {"x": 0.3 * np.sin(20.0 * t) + rng.normal(0.0, 2e-4, len(t))}
+    record["x"][2000:] += 0.1  # a jump
+    assert records.noise(record, records.Columns()) == pytest.approx(2e-4, rel=0.05)
+
+
 def test_what_cannot_be_told_apart_is_said(swung):
     with pytest.raises(smc.ScenarioError) as error:
         smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)

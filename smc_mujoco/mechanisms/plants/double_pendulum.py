@@ -12,10 +12,11 @@ shoulder alone, `acrobot` the elbow. I1 and I2 are about the joints, Ir is a mot
 and F = (cf1, cf2). A motor gives at most 6 N m. Each channel's nominal f has the other's command; it is MuJoCo's own,
 without the dry friction.
 Source: dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), design C.1: model 1.1, the default here, is model 1.0
-without friction and rotors. `MODEL_1_0` has these. Its dry friction is cf arctan(100 q'), here MuJoCo's cf sgn(q').
+without friction and rotors. `MODEL_1_0` has these. Its published dry friction is cf arctan(100 q'), which reaches
+cf pi/2 at speed: F here.
 """
 
-from math import cos, sin
+from math import cos, pi, sin
 
 import mujoco
 from numba import njit
@@ -42,7 +43,13 @@ MODEL_1_1 = {
     "cf2": 0.0,
     "grav": 9.81,
 }
-MODEL_1_0 = MODEL_1_1 | {"Ir": 6.287203962819607e-5, "b1": 0.001, "b2": 0.001, "cf1": 0.16, "cf2": 0.12}
+MODEL_1_0 = MODEL_1_1 | {
+    "Ir": 6.287203962819607e-5,
+    "b1": 0.001,
+    "b2": 0.001,
+    "cf1": 0.16 * pi / 2,
+    "cf2": 0.12 * pi / 2,
+}
 
 
 def build(n):
