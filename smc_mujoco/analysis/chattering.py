@@ -35,6 +35,7 @@ MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
 SAME = 0.02  # relative: two cycles nearer than that are one
 WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
 NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
+FEW = 10.0  # control samples in a period: below it, cycles lock to the samples, and the prediction is rough
 DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in this many steps
 
 
@@ -51,7 +52,7 @@ class Chattering:
         force, per unit of mass.
       third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
         large the law does not see a sine, and the prediction is rough.
-      samples: control samples in a period. Below about ten a cycle locks to the samples, and the prediction is rough.
+      samples: control samples in a period. Below ten a cycle locks to the samples, and the prediction is rough.
       gain: N, complex; response: L, complex, at the cycle.
       assumptions: what was left out or is doubtful, in sentences.
     """
@@ -229,8 +230,12 @@ def _described(loop: Loop, wave: Wave, said: tuple[str, ...]) -> Chattering:
     samples = math.tau / wave.omega / loop.scenario.control_period
     passed = abs(loop.response(3.0 * wave.omega) / response)
     said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
-    if samples < 8.0:
+    if samples < FEW:
         said += (f"a period has {samples:.1f} control samples: the cycle locks to them",)
+    sensor = loop.scenario.sensor
+    count = 0.0 if sensor is None else sensor.quantum(loop.scenario.plant.units[loop.channel] == "rad")
+    if count:
+        said += (f"the encoder rounds x by up to {50.0 * count / wave.amplitude:.2g} % of the oscillation's amplitude",)
     if wave.drift > 0.05:
         said += ("gains or memories of the law drift: the prediction is a snapshot",)
     return Chattering(
@@ -249,17 +254,15 @@ def _described(loop: Loop, wave: Wave, said: tuple[str, ...]) -> Chattering:
 
 def _assumptions(scenario: Scenario) -> Iterator[str]:
     """Yield what is left out of the linear part."""
-    yield "small oscillation about rest at x = 0, without disturbance and noise"
+    yield "about rest at x = 0, without reference, disturbance and noise"
     if scenario.plant.driven > 1:
         yield "the other driven channels are at rest"
     if any(isinstance(part, RateLimit) for part in scenario.actuator):
         yield "the actuator's rate limit is not reached"
     if any(isinstance(part, Backlash) for part in scenario.actuator):
-        yield "the gear has no play"
+        yield "rotor and joint are free masses while the rotor crosses its play"
     if scenario.friction:
         yield "no dry friction"
-    if scenario.sensor is not None and math.isfinite(scenario.sensor.counts):
-        yield "the encoder's counts are fine"
 
 
 def shared(cycles: Sequence[Chattering]) -> list[str]:

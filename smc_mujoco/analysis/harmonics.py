@@ -1,13 +1,15 @@
 """Harmonic balance: what a compiled law returns for a sinusoidal error, and how the mechanism answers a sinusoidal u.
 
     loop = Loop(scenario, channel=0)
-    loop.response(omega)                  # x of the channel per N or N m of command: complex, rad or m
-    wave = loop.drive(0.01, omega)        # what the law returns for e = 0.01 sin(omega t)
-    wave.gain                             # complex, N or N m per rad or m
+    loop.response(omega)                  # x of the channel per unit of u: complex, rad or m
+    wave = loop.wave(0.01, omega)         # what the law returns for e = 0.01 sin(omega t)
+    wave.gain                             # complex, unit of u per rad or m
 
 A limit cycle is where gain times response is 1. The response is that of MuJoCo's own model, linearised about rest by
 finite differences, with drives, back-EMF, springs and joints without an actuator. The gain is that of the compiled
 law, with its estimator and its surface, at its control period: there is no approximation but that the error is a sine.
+Play between rotor and joint is a second element that is not linear; its describing function is that of two free masses,
+see `play`, and multiplies the gain.
 """
 
 import copy
@@ -20,11 +22,13 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.errors import ScenarioError, number, whole
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import native
@@ -33,6 +37,7 @@ from smc_mujoco.simulation.scenario import Scenario
 STEP = 1e-6  # SI units, of finite differences
 FINE = 2e-5  # s, longest step at which a model under RK4 is linearised, by Euler's method
 CHUNK = 50_000  # samples that a law is called for at once
+MAX_SAMPLES = 10**9  # of a period, for a describing function
 SAMPLES = 3  # of a drive, about: so many times the finest period's
 PERIODS = (12, 600)  # fewest and most of a drive
 FINEST = 1000  # samples of a period; a law that runs more often is run that often here
@@ -51,7 +56,7 @@ class Wave:
     Attributes:
       amplitude: of e, rad or m.
       omega: rad/s.
-      gain: first harmonic of u over that of e, complex, N m/rad or N/m.
+      gain: first harmonic of u over that of e, complex, unit of u per rad or m, times the describing function of play.
       third: share of the third harmonic in s, over the first.
       s, u: half the range of the sliding variable and of u, with the harmonics that the mechanism lets through.
       rate: amplitude of the first harmonic of s, times omega.
@@ -77,12 +82,15 @@ class Loop:
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
         self.controller = Controller(s.velocity, s.surface, s.law)
         self._linearise()
+        self._answer = functools.lru_cache(maxsize=64)(self._solve)  # all amplitudes of a frequency have one answer
 
     def _linearise(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
         s = self.scenario.resolved
         closed = tuple(part for part in s.actuator if part.drives)
-        ideal = dataclasses.replace(self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None)
+        ideal = dataclasses.replace(
+            self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None, integrator=s.integrator
+        )
         with installed(None):
             compiled = assembly.model([ideal])
             made = assembly.with_values(compiled, ideal)
@@ -92,6 +100,12 @@ class Loop:
             if s.integrator == "RK4":
                 made.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
                 made.opt.timestep = s.control_period / math.ceil(s.control_period / FINE)
+            gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
+            if gear is not None:  # the rotor is rigid on the joint here
+                driven = dof_ids(made)[: s.plant.driven]
+                made.dof_armature[driven] += gear.rotor_inertia
+                made.dof_damping[driven] += gear.rotor_damping
+                mujoco.mj_setConst(made, mujoco.MjData(made))
             self.step = float(made.opt.timestep)
             data = mujoco.MjData(made)
             key = assembly.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
@@ -101,6 +115,7 @@ class Loop:
             mujoco.mjd_transitionFD(made, data, STEP, True, self.a, b, None, None)
             self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)
             self.rows, self.nv = dof_ids(made), made.nv
+            self.gap = 0.0 if gear is None else self._gap(gear, made, data)
         rest, p = np.zeros(s.plant.n), copy.copy(s.plant.values({}))
         self.model = {}
         for i in (self.channel, *(() if self.partner is None else (self.partner,))):
@@ -111,10 +126,10 @@ class Loop:
             self.model[i] = f, g, fx, fv
 
     def response(self, omega: complex) -> complex:
-        """Return the amplitude of x at control samples per unit of sampled and held u, rad or m per N m or N."""
+        """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
         return complex(self._answer(omega)[self.rows[self.channel]])
 
-    def _answer(self, omega: complex) -> np.ndarray:
+    def _solve(self, omega: complex) -> np.ndarray:
         """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
 
         A sampled and held sine has images at omega + 2 pi m / control_period; all that a sample sees are summed.
@@ -132,10 +147,25 @@ class Loop:
         return passed @ answers * np.exp(-1j * omega * late)
 
     def gain(self, amplitude: float, omega: float, finest: int = FINEST) -> complex:
-        """Return the first harmonic of u over that of e = amplitude sin(omega t), N m/rad or N/m."""
+        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
         angles, u, _ = self._drive([amplitude], omega, finest)
-        mirrored = 2.0 if self.scenario.control_period * omega == math.pi else 1.0  # two samples: a wave is its image
-        return _harmonic(u, angles) / (1j * amplitude * mirrored)
+        return self._over(_harmonic(u, angles), amplitude, omega)
+
+    def _over(self, first: complex, amplitude: float, omega: float) -> complex:
+        """Return the gain that belongs to a first harmonic of u."""
+        alone = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
+        mirrored = 2.0 if alone else 1.0  # of two samples a period a wave is its own image
+        return first / (1j * amplitude * mirrored) * play(amplitude, self.gap)
+
+    def _gap(self, gear: Backlash, made: mujoco.MjModel, data: mujoco.MjData) -> float:
+        """Return how far the joint moves while the rotor crosses its play, rad or m: see `play`."""
+        dof = self.rows[self.channel]
+        mobility, force = np.zeros(made.nv), np.eye(made.nv)[dof]
+        mujoco.mj_forward(made, data)
+        mujoco.mj_solveM(made, data, mobility[None], force[None])
+        motors = [part for part in self.scenario.resolved.actuator if isinstance(part, DCMotor)]
+        rotor = gear.rotor_inertia + sum(motor.gear**2 * motor.rotor_inertia for motor in motors)
+        return gear.gap * rotor * float(mobility[dof])
 
     def wave(self, amplitude: float, omega: float) -> Wave:
         """Return what the law returns for e = amplitude sin(omega t), and s with the harmonics that follow from it."""
@@ -152,7 +182,7 @@ class Loop:
         return Wave(
             amplitude=amplitude,
             omega=omega,
-            gain=self.gain(amplitude, omega),
+            gain=self._over(first, amplitude, omega),
             third=abs(_harmonic(s, 3.0 * angles) / at) if at and most > 1 else math.nan,
             s=float(np.ptp(s)) / 2.0,
             u=float(np.ptp(u)) / 2.0,
@@ -221,6 +251,10 @@ class Controller:
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         if not _run(self.addresses, g0, g1, g2, m0, m1, m2, readings, y, out):
             raise ScenarioError("the law raised an exception in the harmonic balance")
+        if not np.isfinite(out[:, 0]).all():
+            bad = int(np.argmin(np.isfinite(out[:, 0])))
+            x, v = y[bad, X], y[bad, V]
+            raise ScenarioError(f"the law returned {out[bad, 0]:g} at x = {x:g}, v = {v:g}: correct the law")
         return out
 
 
@@ -238,12 +272,13 @@ def describing_function(
       samples: of a period. The result converges as 1 / samples for laws that switch or integrate.
 
     Returns:
-      N, complex, N m/rad or N/m. For a relay k sign(e): 4 k / (pi a).
+      N, complex, unit of u per rad or m. For a relay k sign(e): 4 k / (pi a).
 
     Raises:
       ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of samples that is not > 0.
     """
     amplitude, omega = number("amplitude", amplitude, above=0.0), number("omega", omega, above=0.0)
+    samples = whole("samples", samples, 2, MAX_SAMPLES)
     h = math.tau / omega / samples
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
     controller = Controller(resolved.velocity, None, resolved.law)
@@ -257,6 +292,36 @@ def describing_function(
         u = controller(np.column_stack([np.full(len(at), h), x, v]), y, memories)[:, 0]
         total += (u[at >= samples] / turns[at >= samples]).sum()
     return complex(total) * 2.0 / samples / amplitude
+
+
+def play(amplitude: float, gap: float) -> complex:
+    """Return the describing function of play: the force on the joint over that on a rotor without play, complex.
+
+    Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor leaves its flank when
+    u changes its sign, and is alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it gives the joint
+    at once what u has given it since: an impulse of 1 - cos c. As x has the amplitude
+    |play(...) u| / ((m1 + m2) omega^2), c depends on nothing but amplitude over gap.
+
+    Args:
+      amplitude: of the joint's x, rad or m.
+      gap: of the play, times m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
+    """
+    if gap == 0.0:
+        return 1.0 + 0.0j
+    from scipy.optimize import brentq
+
+    def excess(c: float) -> float:
+        return (c - math.sin(c)) * amplitude - gap * abs(_late(c))
+
+    return _late(math.pi if excess(math.pi) < 0.0 else float(brentq(excess, 0.0, math.pi)))  # type: ignore[arg-type]
+
+
+def _late(c: float) -> complex:
+    """Return the describing function of play for the angle c at which the rotor meets the other flank."""
+    given = 1.0 - math.cos(c)
+    sine = 0.5 * (math.pi - c) + 0.25 * math.sin(2.0 * c) + given * math.sin(c)
+    cosine = -0.5 * math.sin(c) ** 2 + given * math.cos(c)
+    return complex(sine, cosine) * 2.0 / math.pi
 
 
 def _nominal(plant, i, p, x, v):

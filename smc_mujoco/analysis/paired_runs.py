@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.analysis.differences import OF_SCALE, coarse
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -41,8 +41,11 @@ def values(table: Columns, metric: str) -> np.ndarray:
     """Return a metric by row: inf for a failed run, NaN where it does not apply.
 
     "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no successful run has it.
+    A limit cycle that a run does not have counts as one of amplitude 0, see `Metric.absent`.
     """
-    scores = np.array(table.column("settling_time" if metric == SETTLES else metric), float)
+    name = "settling_time" if metric == SETTLES else metric
+    scores = np.array(table.column(name), float)
+    scores[np.isnan(scores)] = CATALOGUE[name].absent
     failed = np.array([failure is not None for failure in table.column("failure")], bool)
     failed |= ~np.isnan(np.array(table.column("diverged_at"), float))
     plants, lacking = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed

@@ -355,7 +355,7 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in found:
-        value = "none" if math.isnan(margin.value) else f"{'>= ' * margin.open}{number(margin.value)}"
+        value = f"{'>= ' * margin.open}{number(margin.value)}"
         theory = "" if margin.theory is None else "any" if margin.theory == math.inf else number(margin.theory)
         plant = "" if margin.plant == last else margin.plant
         law = Text(margin.law, style=style.law_colour(margin.law))
@@ -377,14 +377,11 @@ def chattering(
     numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
 
-    def digits(value: float) -> str:
-        return "none" if math.isnan(value) else number(value, 3)
-
     for scenario, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True):
         third = "" if math.isnan(cycle.third_harmonic) else f"{100 * cycle.third_harmonic:.0f} %"
         samples = "" if math.isnan(cycle.samples) else number(cycle.samples, 3)
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
-        both = map(digits, (cycle.amplitude, amplitude, cycle.frequency, frequency))
+        both = map(number, (cycle.amplitude, amplitude, cycle.frequency, frequency))
         table.add_row(law, *both, third, samples)
     return table
 

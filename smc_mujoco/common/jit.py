@@ -18,6 +18,7 @@ from llvmlite import ir
 from numba import from_dtype, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
+from numba.core.codegen import CPUCodeLibrary, RuntimeLinker
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.errors import TypingError
 from numba.core.sigutils import normalize_signature
@@ -168,10 +169,18 @@ class Cache(FunctionCache):
         return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write it, unless the code holds addresses, the disk is full or the files belong to another user."""
+        """Write it, unless no other process could load it, the disk is full or the files belong to another user."""
         with contextlib.suppress(OSError):
-            if not data.library.has_dynamic_globals:
+            if not data.library.has_dynamic_globals and _complete(data.library):
                 super().save_overload(sig, data)
+
+
+def _complete(library: CPUCodeLibrary) -> bool:
+    """Return whether no address is filled in while code is linked, such as that of a function that calls itself.
+
+    Numba does so only in the process that compiles. A process that loads such code from the disk would abort.
+    """
+    return not any(one.name.startswith(RuntimeLinker.PREFIX) for one in library._final_module.global_variables)
 
 
 class Sealed(IndexDataCacheFile):

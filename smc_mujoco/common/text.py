@@ -5,7 +5,9 @@ from collections.abc import Iterable, Sequence
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with this many significant digits; "never" for inf; "<1e-9" below that, which is rounding."""
+    """Return a number with this many significant digits; "never" for inf, "none" for NaN, "<1e-9" for rounding."""
+    if math.isnan(value):
+        return "none"
     if math.isinf(value):
         return "never"
     if 0.0 < abs(value) < 1e-9:

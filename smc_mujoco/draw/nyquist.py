@@ -36,6 +36,7 @@ def nyquist(
     scenarios: Sequence[Scenario],
     path: str | os.PathLike | None = None,
     channel: int = 0,
+    cycles: Sequence[Chattering] | None = None,
     traces: Sequence[Trace] | None = None,
     size: Size = None,
     format: str | None = None,
@@ -46,6 +47,7 @@ def nyquist(
     Args:
       scenarios: of one plant and one set of conditions, with different laws.
       channel: index of a driven channel.
+      cycles: predicted for these scenarios; default: they are predicted.
       traces: of these scenarios; default: they are run.
       path, size, format, fig: as in `figure`.
 
@@ -58,7 +60,8 @@ def nyquist(
     if not scenarios:
         raise ScenarioError("no scenario to draw: give at least one")
     paths = [] if path is None else pages.files(path, format)
-    cycles = [chattering(scenario, channel) for scenario in scenarios]
+    if cycles is None:
+        cycles = [chattering(scenario, channel) for scenario in scenarios]
     runs = [run(scenario) for scenario in scenarios] if traces is None else traces
     width, height = pages.measure(size, fig)
     with style.page(width):

@@ -7,11 +7,12 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
     BAND,
     CATALOGUE,
@@ -220,6 +221,31 @@ def hf_share(trace: Trace) -> float:
     power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
     frequency = np.arange(power.size) / (t[-1] - t[0])
     return power[frequency > HIGH_PASS * (1 + CONSTANT)].sum() / power[1:].sum()
+
+
+@metric("unit of s", command=True, absent=0.0)
+def chattering_amplitude(trace: Trace) -> float:
+    """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN without one.
+
+    Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a limit cycle. Laws are
+    compared at 0 where there is none.
+    """
+    return _cycle(trace)[0]
+
+
+@metric("Hz", command=True)
+def chattering_frequency(trace: Trace) -> float:
+    """Frequency of the limit cycle of s in the last part, of the channel with the largest; NaN without one.
+
+    A cycle has at least five periods in the last part, else it counts as none.
+    """
+    return _cycle(trace)[1]
+
+
+def _cycle(trace: Trace) -> tuple[float, float]:
+    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
+    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
+    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
 
 
 @metric("s", realistic=True)

@@ -32,7 +32,7 @@ import inspect
 import itertools
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -65,6 +65,7 @@ class Metric:
       network: whether it compares channels, and so needs several of a kind.
       realistic: whether it is meaningful only for mechanisms with friction, contacts or other parts.
       command: whether it is computed from u or s, which free joints do not have.
+      absent: value at which laws are compared in a run where it is NaN; NaN for a metric that always has a value.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Metric:
     network: bool = False
     realistic: bool = False
     command: bool = False
+    absent: float = math.nan
 
     def refusal(self, plant: Plant) -> str:
         """Return why the metric has no single value for the plant, or ""."""
@@ -110,7 +112,7 @@ class Metric:
 
 
 def metric(
-    unit: str, *, label: str = "", need: str = "", **flags: bool
+    unit: str, *, label: str = "", need: str = "", **flags: Any
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
     """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
 

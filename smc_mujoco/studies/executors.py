@@ -18,6 +18,7 @@ A batch whose worker dies is run by another one. Four deaths over one batch end 
 
 import contextlib
 import logging
+import math
 import pickle
 import platform
 import sys
@@ -48,12 +49,12 @@ Batch = Sequence[Prepared]
 
 
 def outcome(trace: Trace) -> Outcome:
-    """Return the scores of a run, or how it failed."""
+    """Return the scores of a run, without those that are NaN, or how it failed."""
     failed: Outcome = {"diverged_at": trace.diverged_at, "failure": trace.failure}
     if trace.failure is not None:
         return failed
     try:
-        return failed | score(trace)
+        return failed | {name: value for name, value in score(trace).items() if not math.isnan(value)}
     except ScenarioError as error:  # not finite, though nothing failed
         return failed | {"failure": str(error)}
 

@@ -80,7 +80,7 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
             within = _recorded(file, key, name, known, "tolerance")
         else:
             within = _tolerance(name, golden, tolerances, rel or 0.0)
-        kept = value == golden or abs(value - golden) <= within
+        kept = value == golden or abs(value - golden) <= within or (math.isnan(value) and math.isnan(golden))
         limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(within)}", kept))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 

@@ -7,6 +7,7 @@ from typing import NamedTuple, ParamSpec, TypeVar
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.text import table
+from smc_mujoco.metrics.catalogue import CATALOGUE
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -24,18 +25,21 @@ class Limit(NamedTuple):
 def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     """Return the Limit of a value that may be at most `limit`, or in the range `limit` = (least, most).
 
+    A limit cycle that a run does not have keeps every limit of its amplitude, see `Metric.absent`.
+
     Raises:
       ScenarioError: the limit is neither a number nor a pair.
     """
+    compared = CATALOGUE[metric].absent if math.isnan(value) else value
     if not isinstance(limit, tuple | list):
         most = number(f"limit of {metric}", limit, infinite=True)
-        return Limit(metric, quantity(value, unit), f"<= {quantity(most)}", value <= most)
+        return Limit(metric, quantity(value, unit), f"<= {quantity(most)}", compared <= most)
     if len(limit) != 2:
         raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the most, or (least, most)")
     least, most = (number(f"limit of {metric}", end, infinite=True) for end in limit)
     if least > most:
         raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
-    return Limit(metric, quantity(value, unit), f"{quantity(least)} .. {quantity(most)}", least <= value <= most)
+    return Limit(metric, quantity(value, unit), f"{quantity(least)} .. {quantity(most)}", least <= compared <= most)
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
@@ -53,7 +57,9 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
 
 
 def quantity(value: float, unit: str = "") -> str:
-    """Return a number with its unit for tables. Infinity is "never", as in every table of this package."""
+    """Return a number with its unit for tables. As in every table of this package inf is "never", and NaN "none"."""
+    if math.isnan(value):
+        return "none"
     if math.isinf(value):
         return "never"
     return f"{value:.6g} {unit}".rstrip() if unit != "1" else f"{value:.6g}"

@@ -47,6 +47,11 @@ def mine(body="y.x + gains.k", **space) -> FunctionType:
     return space["mine"]
 
 
+@njit
+def factorial(n):
+    return 1.0 if n < 2 else n * factorial(n - 1)
+
+
 def test_a_law_is_compiled_once_for_all_processes():
     assert [hits(smc.law("classical").function, gains=("k", "c")) for _ in range(2)] == [0, 1]
 
@@ -110,8 +115,9 @@ def test_code_of_another_law_under_the_index_of_this_one_is_not_run(cache):
     [
         ("thing(gains.k)", ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: 2.0 * x)),
         ("thing[0] * gains.k", np.full(1_000_000, 2.0)),  # too large to be copied into code
+        ("thing(3) * gains.k / 3.0", factorial),
     ],
-    ids=["function", "array"],
+    ids=["function", "array", "function that calls itself"],
 )
 def test_code_that_holds_an_address_is_not_kept(cache, body, thing):
     """It would be another one in the next process."""

@@ -257,12 +257,12 @@ def chatter(
         traces = run(cases, threads=threads)
     measured = [of_trace(trace, channel) for trace in traces]
     terminal.print(tables.chattering(cases, channel, cycles, measured))
-    terminal.note("assumed: " + "; ".join(shared(cycles)))
+    terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
     if json:
         terminal.wrote(save(cases, cycles, measured, json))
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 
-        nyquist(cases, out, channel, traces)
+        nyquist(cases, out, channel, cycles, traces)
         terminal.wrote(*pictures)
