@@ -77,6 +77,8 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
+from smc_mujoco.studies.audit.audit import Audit as Audit
+from smc_mujoco.studies.audit.audit import audit as audit
 from smc_mujoco.studies.audit.audit import claims as claims
 from smc_mujoco.studies.audit.verdict import Claim as Claim
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard

@@ -1,4 +1,4 @@
-"""Variants of laws: other gains, a reversed command, or an input gain that varies with x.
+"""Variants of laws: other gains, a reversed command, no memory, or an input gain that varies with x.
 
 A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
 multiplied by g at each sample is therefore the law on a plant with that gain. This is exact if |g| <= 1, except that g
@@ -40,6 +40,11 @@ def squeezed(law: Component) -> Component:
     return with_input_gain(law, "squeezed")
 
 
+def forgetful(law: Component) -> Component:
+    """Return the law without memory: it is 0 at every sample. A law that keeps nothing stays as it is."""
+    return dataclasses.replace(law, name=f"{law.name}_forgetful", function=_without_memory(law.function))
+
+
 def with_input_gain(law: Component, name: str) -> Component:
     """Return the law whose command, within the actuator's bound, is multiplied by a gain of INPUT_GAINS."""
     return dataclasses.replace(law, name=f"{law.name}_{name}", function=_multiplied(law.function, name))
@@ -55,3 +60,15 @@ def _multiplied(function: Callable, name: str) -> Callable:
         return factor(y.x) * min(max(u, -y.limit), y.limit), s
 
     return multiplied
+
+
+@functools.cache
+def _without_memory(function: Callable) -> Callable:
+    """Return the function with a memory that is 0 whenever it is called; compiled once."""
+    body = njit(function)
+
+    def without_memory(y, gains, memory):
+        memory[:] = 0.0
+        return body(y, gains, memory)
+
+    return without_memory

@@ -47,6 +47,15 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+def portable_key(scenario: Scenario) -> str:
+    """Return a hash, 16 hex digits, of the scenario and of the code of its parts: the same on every machine.
+
+    It holds neither the versions of packages nor the rest of this package's code, on which a run depends too.
+    """
+    data = {name: value for name, value in described(scenario).items() if name != "versions"}
+    return hashlib.sha256(to_json([data, _codes(scenario)], sort_keys=True).encode()).hexdigest()[:16]
+
+
 def row(scenario: Scenario) -> dict[str, Any]:
     """Return the columns of a table that describe a run."""
     data = described(scenario)

@@ -251,22 +251,34 @@ def claims(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
+    evidence: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Also write claim, runs, numbers, threshold and verdict, sealed."),
+    ] = None,
+    badge: Annotated[
+        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
+    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
     otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
-    claim. Claims that you name are shown in full, with every check. All of them take minutes.
+    claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
+
+    The evidence is a file that a second audit with the same versions writes again to the last bit: the hashes of each
+    claim's runs, their numbers, thresholds and verdicts, and a seal.
 
     Example: smc-mujoco claims 3 18 --gains tuned
+
+    Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
     """
     with held_back():
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import replacing, writable
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.studies.audit.audit import DEFAULT, document, evaluations
-        from smc_mujoco.studies.audit.audit import claims as audit
+        from smc_mujoco.studies.audit.audit import DEFAULT, audit, document, evaluations
         from smc_mujoco.studies.audit.paper import paper as find_paper
         from smc_mujoco.studies.table import Table
 
@@ -274,20 +286,26 @@ def claims(
     about = find_paper(paper or DEFAULT)
     sets = None if gains is None else options.names(gains)
     known = None if table is None else Table.read(table)
-    if out:
-        writable(out)
+    if evidence and known:
+        raise ScenarioError("--evidence is of runs that the audit makes itself: leave out --table")
+    for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
+        if file:
+            writable(ended(file, ending) if ending else file)
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
-        found = audit(known, ids or None, sets, quick, threads=threads, report=drawn.advance, paper=about)
+        done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
+    found = done.claims
+    written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
     text = document(found)
     if out:
         with replacing(out) as file:
             file.write_text(text + "\n")
+        written.append(out)
     if json:
         print(text)
         return
     tables.print_claims(found, terminal, full=bool(ids))
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
-    notes.append(f"wrote {printable(str(out))}" if out else "")
+    notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
 
 
@@ -296,8 +314,12 @@ def papers(
     new: Annotated[
         Path | None, typer.Option("--new", metavar="FOLDER", help="Make a folder with a paper of yours, which runs.")
     ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Check the seal of a file that `smc-mujoco claims --evidence` wrote."),
+    ] = None,
 ) -> None:
-    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, or begin one of your own.
+    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin one of your own, or check evidence.
 
     A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
 
@@ -305,11 +327,16 @@ def papers(
     """
     with held_back():
         from smc_mujoco.cli import tables
-        from smc_mujoco.studies.audit import paper
+        from smc_mujoco.studies.audit import evidence, paper
 
     terminal = Terminal()
     if new:
         terminal.wrote(*paper.new(new))
+    if check:
+        data = evidence.check(check)
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
+        terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
+    if new or check:
         return
     rows = [(name, f"{one.authors}: {one.title} ({len(one.claims)} claims)") for name, one in paper.papers().items()]
     terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

@@ -1,6 +1,8 @@
 """The audit of a paper: its claims, each a function of runs, and the verdicts on them.
 
-    claims(paper="levant_1993", only=["3"])        # the verdict on a claim, under every set of gains of the paper
+    found = audit("gaber", only=["3"])             # one claim, under every set of gains of the paper
+    found.claims[0].verdict
+    found.save("evidence.json")                    # claim -> runs -> numbers -> threshold -> verdict
 
 Thresholds are fixed in the paper's file before any run, and are not moved. How verdicts follow from checks: `verdict`.
 """
@@ -20,34 +22,79 @@ from smc_mujoco.studies.audit.paper import paper as find_paper
 from smc_mujoco.studies.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
 
 if TYPE_CHECKING:
-    from smc_mujoco.studies.audit.runs import Result, Runs, Substitute
+    from smc_mujoco.studies.audit.runs import Result, Runs, Substitute, Used
     from smc_mujoco.studies.table import Table
 
 DEFAULT = "gaber"  # the paper that the suite was built for
 CURE = "return measure -> number, or measure -> {case: number}"
 
 
-def claims(
-    table: Table | None = None,
+@dataclasses.dataclass(frozen=True)
+class Audit:
+    """An audit of a paper.
+
+    Attributes:
+      paper: the paper as it was read.
+      claims: with their verdicts, in the order of the paper's file.
+      quick: whether less was looked at, as each claim says.
+      used: claim -> set of gains -> key -> run that the claim rests on.
+      sealable: whether all of it was run here, with the laws as they are.
+    """
+
+    paper: Paper
+    claims: Claims
+    quick: bool
+    used: Mapping[str, Mapping[str, Mapping[str, Used]]]
+    sealable: bool
+
+    def save(self, path: str | Path) -> Path:
+        """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
+
+        A second audit in a clean process writes the same file, to the last bit, with the same versions of the packages
+        and on a machine whose arithmetic is the same. The file holds no times, no paths and nothing of the machine.
+        Numbers that differ from audit to audit, such as timings, are left out, and the file says so.
+
+        Raises:
+          ScenarioError: the name does not end in .json, or runs were taken from a table.
+        """
+        from smc_mujoco.studies.audit import evidence
+
+        return evidence.save(self, path)
+
+    def badge(self, path: str | Path) -> Path:
+        """Write a badge, an .svg file with the number of claims by verdict."""
+        from smc_mujoco.studies.audit import badge
+
+        return badge.save(self.paper.name, self.claims, path)
+
+    def _repr_html_(self) -> str:
+        return self.claims._repr_html_()
+
+
+def audit(
+    paper: str | Path | Paper = DEFAULT,
     only: Iterable[str | int] | None = None,
     gains: str | Sequence[str] | None = None,
     quick: bool = False,
-    substitute: Substitute | None = None,
     threads: int | None = None,
+    *,
+    table: Table | None = None,
+    substitute: Substitute | None = None,
     report: Callable[[int], None] = lambda done: None,
-    paper: str | Path | Paper = DEFAULT,
-) -> Claims:
-    """Return the verdicts on a paper's claims, with the numbers behind them, in the order of its file.
+) -> Audit:
+    """Audit a paper: measure each claim against its threshold, and keep what every verdict rests on.
+
+        smc.audit("./my_paper").save("evidence.json")
 
     Args:
-      table: of a study, whose runs are then not made again.
+      paper: the name of one that ships, see `smc-mujoco papers`, or a folder.
       only: ids of the claims wanted; None for all.
       gains: sets of gains, of the paper's; None for all of them, or its quick sets if it is to be quick.
       quick: less, as each claim says: coarser grids, shorter runs.
-      substitute: law's name -> function that makes its mutant, to see whether the audit can fail.
       threads: simulations at once; None for one per available core.
+      table: of a study, whose runs are then not made again.
+      substitute: law's name -> function that makes its mutant, to see whether the audit can fail.
       report: called with 1 as each claim is done under a set of gains, `evaluations` times in all.
-      paper: the name of one that ships, or a folder.
 
     Raises:
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
@@ -60,15 +107,34 @@ def claims(
     shared: dict[str, Result] = {}
     entries = wanted(found, only)
     evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
+    used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
     for name in sets(found, gains, quick):
         runs = Runs(found, name, quick, substitute, threads, rows, shared)
         for entry in sorted(entries, key=lambda entry: entry.late):
-            evidence[entry.id][name] = measure(entry, runs.of(entry))
+            own = runs.of(entry)
+            evidence[entry.id][name] = measure(entry, own)
+            used[entry.id][name] = own.used
             report(1)
     if quick:
         instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
         entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
-    return Claims(judged(entry, evidence[entry.id]) for entry in entries)
+    verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
+    return Audit(found, verdicts, quick, used, table is None and not substitute)
+
+
+def claims(
+    table: Table | None = None,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    substitute: Substitute | None = None,
+    threads: int | None = None,
+    report: Callable[[int], None] = lambda done: None,
+    paper: str | Path | Paper = DEFAULT,
+) -> Claims:
+    """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors as of `audit`."""
+    options: dict[str, Any] = {"table": table, "substitute": substitute, "report": report}
+    return audit(paper, only, gains, quick, threads, **options).claims
 
 
 def as_paper(paper: str | Path | Paper) -> Paper:

@@ -53,6 +53,7 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first five a
     "quantifier": (str, "universal, existential or named"),
     "quick": (str, "a text"),
     "late": (bool, "true or false"),
+    "varies": (str, "a text: why its numbers differ from audit to audit"),
     "immune": (str, "a text: why no mutant of the law loses the claim"),
     "plants": (list, "a list of names"),
     "laws": (list, "a list of names"),
@@ -72,6 +73,7 @@ class Entry(Statement):
       thresholds: what the numbers must be; empty if the function returns checks.
       quick: what a quick audit measures instead, if that is less.
       late: whether it looks at the runs of all other claims, and so comes after them.
+      varies: why its numbers differ from audit to audit, as a timing; they are not sealed.
       immune: why no mutant of the law loses the claim, if none can.
       plants, laws, conditions: names of what it is about; the first law is the one that mutants replace.
       fields: of the scenarios of its runs.
@@ -82,6 +84,7 @@ class Entry(Statement):
     thresholds: tuple[Threshold, ...] = ()
     quick: str = ""
     late: bool = False
+    varies: str = ""
     immune: str = ""
     plants: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()

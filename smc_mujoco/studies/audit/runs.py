@@ -53,10 +53,11 @@ class Result(NamedTuple):
 
 
 class Used(NamedTuple):
-    """A run that a claim has used: its scenario, and a hash of what was taken from it, scores or trace."""
+    """A run that a claim has used: its scenario, and a hash of its scores or of its trace, whatever was taken."""
 
     scenario: Scenario
-    result: str
+    scores: str = ""
+    trace: str = ""
 
 
 class Runs:
@@ -139,7 +140,8 @@ class Runs:
         fields: dict[str, Any] = {"plant": found, **paper.fields, **conditioned, **(entry.fields if entry else {})}
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)
-        return Scenario(**fields | changes)
+        scenario = Scenario(**fields | changes)
+        return scenario.named(condition) if isinstance(condition, str) and condition in paper.conditions else scenario
 
     def grid(self, **changes: Any) -> dict[tuple[str, str, str], Scenario]:
         """Return (plant, law, condition) -> scenario for all that the claim names, with some fields changed."""
@@ -155,7 +157,9 @@ class Runs:
             law = trace.scenario.law
             self._known[names[index]] = Result.of(law.name, law.gains, outcome(trace))
         self._used |= {name: self._known[name] for name, _ in wanted}
-        self.used |= {name: Used(scenario, _hash_of_scores(self._known[name].scores)) for name, scenario in wanted}
+        for name, scenario in wanted:
+            hashed = _hash_of_scores(self._known[name].scores)
+            self.used[name] = self.used.get(name, Used(scenario))._replace(scores=hashed)
         return [self._known[name].scores for name, _ in wanted]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
@@ -166,7 +170,9 @@ class Runs:
         """Return the traces of scenarios, in order; they are not kept."""
         wanted: Sequence[Scenario] = list(scenarios)
         traces = dict(stream(wanted, self.threads))
-        self.used |= {key(one): Used(one, _hash_of_trace(traces[i])) for i, one in enumerate(wanted)}
+        for i, scenario in enumerate(wanted):
+            name = key(scenario)
+            self.used[name] = self.used.get(name, Used(scenario))._replace(trace=_hash_of_trace(traces[i]))
         return [traces[i] for i in range(len(wanted))]
 
     def results(self) -> Iterator[Result]:

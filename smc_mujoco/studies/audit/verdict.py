@@ -173,15 +173,19 @@ class Claims(list[Claim]):
 
 def verdict(evidence: Evidence, quantifier: str = NAMED) -> str:
     """Return the verdict under one set of gains."""
-    sentences: dict[str, list[bool]] = {}
+    hold = sentences(evidence, quantifier)
+    if not hold:
+        return NOT_TESTABLE
+    return SUPPORTED if all(hold) else PARTLY if any(hold) else REFUTED
+
+
+def sentences(evidence: Evidence, quantifier: str = NAMED) -> list[bool]:
+    """Return whether each sentence holds: all its checks do, or one of an existential claim."""
+    checks: dict[str, list[bool]] = {}
     for one in evidence:
         if isinstance(one, Check):
-            sentences.setdefault(one.sentence, []).append(one.holds)
-    if not sentences:
-        return NOT_TESTABLE
-    enough = any if quantifier == EXISTENTIAL else all
-    hold = [enough(checks) for checks in sentences.values()]
-    return SUPPORTED if all(hold) else PARTLY if any(hold) else REFUTED
+            checks.setdefault(one.sentence, []).append(one.holds)
+    return [any(holds) if quantifier == EXISTENTIAL else all(holds) for holds in checks.values()]
 
 
 def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str, bool, str]:
