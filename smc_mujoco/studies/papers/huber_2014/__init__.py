@@ -1,0 +1,1 @@
+"""Paper huber_2014: claims in paper.toml, measured in claims.py."""

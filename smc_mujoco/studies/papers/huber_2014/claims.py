@@ -1,0 +1,66 @@
+"""How the claims of Huber, Acary, Brogliato & Plestan 2014 are measured."""
+
+import numpy as np
+
+from smc_mujoco.control.law import command, law_function
+
+
+@law_function(gains={"G": 10.0, "beta": 0.3}, positive=("G", "beta"), memory=1, relative_degree=2)
+def implicit_twisting(y, gains, memory):
+    """Twisting with both signs at the end of the period: v = -a S1 - b S2, a = G (1 + beta dt/2), b = G beta.
+
+    S1 is in sgn(e+ + dt/2 e'+) and S2 in sgn(e'+), with e'+ = e' + dt v and e+ = e + dt (e' + e'+)/2, v the
+    acceleration of the error. v + a S1 + b S2 grows with v and jumps at two places. Its zero is at one of them, or at
+    one of the three values that v has between them.
+    """
+    a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
+    first, second = -(y.e + 1.5 * y.dt * y.de) / y.dt**2, -y.de / y.dt
+    if first > second:
+        first, second, a, b = second, first, b, a
+    return command(y, min(a + b, max(first, min(b - a, max(second, -a - b))))), y.e
+
+
+def quarter(signal):
+    """Return the last quarter of a signal."""
+    return signal[-(len(signal) // 4) : -1]
+
+
+def rests(runs):
+    """Largest |x| and |u| of the last quarter of 12 s at control periods of 5 to 100 ms, without a disturbance."""
+    (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
+    traces = runs.traces(runs.scenario(plant, law, control_period=h) for h in periods)
+    names = [f"{1e3 * h:g} ms" for h in periods]
+    pairs = list(zip(names, traces, strict=True))
+    return {
+        "largest |x| of the last quarter, m": {name: np.abs(quarter(trace.x)).max() for name, trace in pairs},
+        "largest |u| of the last quarter, N": {name: np.abs(quarter(trace.u)).max() for name, trace in pairs},
+    }
+
+
+def ratios(runs, scenarios, names):
+    """Return measure -> {name: implicit over explicit} for pairs of scenarios."""
+    traces = runs.traces(scenarios)
+    measures = {
+        "largest |e|": lambda trace: np.abs(quarter(trace.x - trace.r)).max(),
+        "variation of u": lambda trace: np.abs(np.diff(quarter(trace.u), axis=0)).sum(),
+        "mean square of e": lambda trace: np.mean(quarter(trace.x - trace.r) ** 2),
+    }
+    return {
+        f"{what} of the last quarter, implicit / explicit": {
+            name: float(of(implicit) / of(explicit))
+            for name, implicit, explicit in zip(names, traces[::2], traces[1::2], strict=True)
+        }
+        for what, of in measures.items()
+    }
+
+
+def compared(runs):
+    """Error e and command u of the last quarter of 12 s at 10 ms, implicit over explicit, gains and model alike."""
+    return ratios(runs, runs.grid().values(), runs.plants)
+
+
+def at_every_period(runs):
+    """Error e and command u of the last quarter of 12 s at 1 to 50 ms, implicit over explicit."""
+    (plant,), (condition,), periods = runs.plants, runs.conditions, runs.values["periods"]
+    scenarios = [runs.scenario(plant, law, condition, control_period=h) for h in periods for law in runs.laws]
+    return ratios(runs, scenarios, [f"{1e3 * h:g} ms" for h in periods])

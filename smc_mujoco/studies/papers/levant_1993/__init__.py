@@ -1,0 +1,1 @@
+"""Paper levant_1993: claims in paper.toml, measured in claims.py."""

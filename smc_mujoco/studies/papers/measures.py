@@ -1,0 +1,44 @@
+"""Measures that the claims of several papers share."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from smc_mujoco.metrics.limit_cycle import limit_cycle
+from smc_mujoco.simulation.trace import Trace
+
+LATE = 3000  # samples at the end of a run: as many for every control period, as their maximum grows with the number
+
+
+def late(signal: np.ndarray) -> float:
+    """Return the largest magnitude of a signal, (samples, channels), at the end of its run."""
+    return float(np.abs(signal[-LATE:]).max())
+
+
+def late_step(signal: np.ndarray) -> float:
+    """Return the largest change of a signal, (samples, channels), from sample to sample at the end of its run."""
+    return late(np.diff(signal[:-1], axis=0))
+
+
+def exponent(levels: Sequence[float], errors: Iterable[float]) -> float:
+    """Return p of errors ~ levels^p by least squares of the logarithms; NaN for errors that are 0 or not finite.
+
+    Errors are in the order of the levels, as many at each; they are averaged by their logarithm.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.log(np.reshape(list(errors), (len(levels), -1))).mean(axis=1)
+    return float(np.polyfit(np.log(levels), logs, 1)[0]) if np.isfinite(logs).all() else float("nan")
+
+
+def settled(trace: Trace, signal: np.ndarray, band: float) -> float:
+    """Return the time from which a signal, (samples, channels), stays within a band, s; inf if it does not."""
+    outside = np.flatnonzero(~(np.abs(signal).max(axis=1) <= band))
+    if not outside.size:
+        return 0.0
+    return float(trace.t[outside[-1] + 1]) if outside[-1] + 1 < len(trace.t) else float("inf")
+
+
+def cycle(trace: Trace, part: float = 0.5) -> tuple[float, float]:
+    """Return amplitude of s and frequency, Hz, of the limit cycle in the last part of a run; NaN, NaN without one."""
+    first = int(len(trace.t) * (1.0 - part))
+    return limit_cycle(trace.t[first:], trace.s[first:, 0])

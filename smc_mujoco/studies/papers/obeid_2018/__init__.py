@@ -1,0 +1,1 @@
+"""Paper obeid_2018: claims in paper.toml, measured in claims.py."""

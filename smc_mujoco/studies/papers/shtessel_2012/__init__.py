@@ -1,0 +1,1 @@
+"""Paper shtessel_2012: claims in paper.toml, measured in claims.py."""
