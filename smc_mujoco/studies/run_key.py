@@ -52,7 +52,7 @@ def portable_key(scenario: Scenario) -> str:
 
     It holds neither the versions of packages nor the rest of this package's code, on which a run depends too.
     """
-    data = {name: value for name, value in described(scenario).items() if name != "versions"}
+    data = described(scenario) | {"versions": None, "condition": None}  # a condition's name adds nothing to the fields
     return hashlib.sha256(to_json([data, _codes(scenario)], sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -101,6 +101,11 @@ class Runs:
         return self._entry.plants if self._entry else ()
 
     @property
+    def plant(self) -> str:
+        """Name of the plant of a claim that has one."""
+        return self.plants[0]
+
+    @property
     def laws(self) -> tuple[str, ...]:
         """Names of the claim's laws."""
         return self._entry.laws if self._entry else ()
@@ -150,7 +155,7 @@ class Runs:
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
         """Return every metric of every scenario, in order; a run that fails has inf in every metric."""
-        wanted = [(key(scenario), scenario) for scenario in scenarios]
+        wanted = [(_key(scenario), scenario) for scenario in scenarios]
         new = {name: scenario for name, scenario in wanted if name not in self._known}
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
@@ -171,7 +176,7 @@ class Runs:
         wanted: Sequence[Scenario] = list(scenarios)
         traces = dict(stream(wanted, self.threads))
         for i, scenario in enumerate(wanted):
-            name = key(scenario)
+            name = _key(scenario)
             self.used[name] = self.used.get(name, Used(scenario))._replace(trace=_hash_of_trace(traces[i]))
         return [traces[i] for i in range(len(wanted))]
 
@@ -183,6 +188,11 @@ class Runs:
 def of_table(table: "Table") -> dict[str, Result]:
     """Return the runs that a study's table holds, by key."""
     return {row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()}
+
+
+def _key(scenario: Scenario) -> str:
+    """Return the key of a run without the name of its condition, which changes nothing in it."""
+    return key(scenario.named(None))
 
 
 def _hash_of_scores(scores: Scores) -> str:

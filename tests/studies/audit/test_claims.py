@@ -365,18 +365,20 @@ def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
 # searches
 
 
-def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory(monkeypatch):
-    single = ("inverted_pendulum", "van_der_pol", "duffing")
-    monkeypatch.setattr(searches, "PLANTS", single)
-    runs = Runs(GABER, "study")
+def about(plants, **options):
+    """Runs of claim 24, of these plants."""
+    return Runs(GABER, "study", **options).of(dataclasses.replace(GABER.claims["24"], plants=plants))
+
+
+def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
+    runs = about(("inverted_pendulum", "van_der_pol", "duffing"))
     for name, found in searches.smallest_stable(runs).items():
         theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], common.PERIOD)
         assert theory <= found <= 1.02 * theory, name
 
 
-def test_a_law_without_effect_stabilises_what_hangs_alone(monkeypatch):
-    monkeypatch.setattr(searches, "PLANTS", ("duffing", "pendulum_network"))
-    found = searches.smallest_stable(Runs(GABER, "study", quick=True, substitute={OURS: zero_gain}))
+def test_a_law_without_effect_stabilises_what_hangs_alone():
+    found = searches.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
     assert found == {"duffing": math.inf, "pendulum_network": searches.MIN_LAMBDA}
 
 
@@ -427,9 +429,8 @@ def test_a_command_beyond_lambda_is_seen():
         def scores(self, scenarios):
             return [found | {"max_u": 2.0 * found["max_u"]} for found in super().scores(scenarios)]
 
-    assert (
-        verdict(GABER.claims["4"].evidence(Louder(GABER, "study", quick=True, substitute={OURS: louder}))) != SUPPORTED
-    )
+    runs = Louder(GABER, "study", quick=True, substitute={OURS: louder})
+    assert verdict(GABER.claims["4"].evidence(runs.of(GABER.claims["4"]))) != SUPPORTED
 
 
 # the command

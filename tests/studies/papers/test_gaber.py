@@ -63,12 +63,12 @@ class Stub(Runs):
 
 def of(runs: Runs, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
-    return [one for one in GABER.claims[id].evidence(runs) if isinstance(one, Check)]
+    return [one for one in GABER.claims[id].evidence(runs.of(GABER.claims[id])) if isinstance(one, Check)]
 
 
 def judged(runs: Runs, id: str) -> str:
     """The verdict on a claim under one set of gains."""
-    return verdict(GABER.claims[id].evidence(runs), GABER.claims[id].quantifier)
+    return verdict(GABER.claims[id].evidence(runs.of(GABER.claims[id])), GABER.claims[id].quantifier)
 
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
@@ -236,7 +236,7 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
     for name in SETS:
         runs = Stub(lambda s: {"tv_rate": 7919.0 * s.law.gains["lam"] * (1.0 + s.input_delay) % 1.0})
         runs.gains = name
-        named.add(tuple(one.what for one in GABER.claims[id].evidence(runs)))
+        named.add(tuple(one.what for one in GABER.claims[id].evidence(runs.of(GABER.claims[id]))))
     assert len(named) == 1
 
 
@@ -521,13 +521,15 @@ def winding(y, gains, memory):
 
 def test_needed_signals_and_growth_are_read_off_what_a_law_does():
     like = lambda law: {OURS: lambda _: law}  # noqa: E731
-    assert table_one.estimated(Runs(GABER, "study"), OURS) == 0.0
-    assert table_one.estimated(Runs(GABER, "study", substitute=like(accelerated())), OURS) == 1.0
-    assert table_one.growth(Runs(GABER, "study"), OURS) == pytest.approx(0.0, abs=1e-6)
-    assert table_one.growth(Runs(GABER, "study", substitute=like(accelerated())), OURS) == pytest.approx(9.0)
-    assert table_one.growth(Runs(GABER, "study", substitute=like(winding())), OURS) == pytest.approx(1.0, rel=1e-2)
-    assert table_one.growth(Runs(GABER, "study"), HOSMC) > 0.5
-    assert table_one.growth(Runs(GABER, "study"), CLASSICAL) == 0.0
+    table = GABER.claims["T"]
+    as_it_is = Runs(GABER, "study").of(table)
+    assert table_one.estimated(as_it_is, OURS) == 0.0
+    assert table_one.estimated(Runs(GABER, "study", substitute=like(accelerated())).of(table), OURS) == 1.0
+    assert table_one.growth(as_it_is, OURS) == pytest.approx(0.0, abs=1e-6)
+    for law, grows in ((accelerated(), pytest.approx(9.0)), (winding(), pytest.approx(1.0, rel=1e-2))):
+        assert table_one.growth(Runs(GABER, "study", substitute=like(law)).of(table), OURS) == grows
+    assert table_one.growth(as_it_is, HOSMC) > 0.5
+    assert table_one.growth(as_it_is, CLASSICAL) == 0.0
 
 
 # the catalogue, and real runs

@@ -6,47 +6,43 @@ import numpy as np
 
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
-from smc_mujoco.studies.papers.gaber.claims.common import NETWORKS, OURS, comes_to_rest
-from smc_mujoco.studies.papers.gaber.scenarios import CONDITIONS, PLANTS, REALISTIC
+from smc_mujoco.studies.papers.gaber.claims.common import OURS, comes_to_rest
 
-NOISY = Noise(position=0.01)  # the study's, on the position alone
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
-DISTURBED = ("noise", "sine", "constant", "step", "pulse", "process_noise", "light", "heavy")
+QUICK_IDEAL = 3  # conditions
 QUICK_DISTURBED = ("noise", "sine", "heavy")
-SIZES = (2, 5, 10, 20, 50, 1000)  # pendulums
-QUICK_LARGEST = 50
+QUICK_LARGEST = 50  # pendulums
 SHORT = 3.0  # s, of a network's run: several times what the networks of the study take to settle
 
 
 def observer_free(runs: Runs) -> list[Check]:
     """Claim 1: observer-free."""
     scores = runs.scores(
-        runs.scenario(plant, OURS, noise=NOISY, velocity=velocity)
-        for plant in PLANTS
+        runs.scenario(plant, OURS, *runs.conditions, velocity=velocity)
+        for plant in runs.plants
         for velocity in ("measured", *FILTERS.values())
     )
-    times = np.reshape([each["settling_time"] for each in scores], (len(PLANTS), -1))
+    times = np.reshape([each["settling_time"] for each in scores], (len(runs.plants), -1))
     return [  # NaN if neither settles: noise may keep both out of the band
         check(f"{plant}, {name}: |settling time / with true xdot - 1|", abs(ratio(time, true) - 1.0), "<=", 0.25, name)
-        for plant, (true, *filtered) in zip(PLANTS, times.tolist(), strict=True)
+        for plant, (true, *filtered) in zip(runs.plants, times.tolist(), strict=True)
         for name, time in zip(FILTERS, filtered, strict=True)
     ]
 
 
 def reduces_chattering(runs: Runs) -> list[Check]:
     """Claim 3: reduces chattering."""
-    rates = {plant: [runs.score(plant, law)["tv_rate"] for law in (OURS, "classical")] for plant in PLANTS}
-    return [check(f"{plant}: TV rate / classical's", ratio(*rates[plant]), "<", 0.01) for plant in PLANTS]
+    rates = {plant: [runs.score(plant, law)["tv_rate"] for law in (OURS, "classical")] for plant in runs.plants}
+    return [check(f"{plant}: TV rate / classical's", ratio(*rates[plant]), "<", 0.01) for plant in runs.plants]
 
 
 def bounded(runs: Runs) -> list[Check | Beside]:
     """Claim 4: bounded control."""
-    ideal = [name for name in CONDITIONS if name not in REALISTIC]
-    grid = [runs.scenario(plant, OURS, name) for plant in PLANTS for name in (ideal[:3] if runs.quick else ideal)]
-    grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in PLANTS]
+    names = runs.conditions[:QUICK_IDEAL] if runs.quick else runs.conditions
+    grid = [runs.scenario(plant, OURS, name) for plant in runs.plants for name in names]
+    grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in runs.plants]
     scores = runs.scores(grid)
     largest = max(ratio(each["max_u"], run.law.gains["lam"]) for run, each in zip(grid, scores, strict=True))
     every = [ratio(run.scores["max_u"], run.gains["lam"]) for run in runs.results() if run.law == OURS]
@@ -59,16 +55,16 @@ def bounded(runs: Runs) -> list[Check | Beside]:
 
 def robust(runs: Runs) -> list[Check]:
     """Claim 5: robust to noise, disturbance, parameter variation."""
-    names = QUICK_DISTURBED if runs.quick else DISTURBED
+    names = QUICK_DISTURBED if runs.quick else runs.conditions
     return comes_to_rest(
-        runs, {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant in PLANTS for name in names}
+        runs, {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant in runs.plants for name in names}
     )
 
 
 def scalable(runs: Runs) -> list[Check]:
     """Claim 7: scalable."""
-    sizes, checks = [n for n in SIZES if n <= QUICK_LARGEST or not runs.quick], []
-    for plant in NETWORKS:
+    sizes, checks = [n for n in runs.values["sizes"] if n <= QUICK_LARGEST or not runs.quick], []
+    for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
         grid = [runs.scenario(plant, OURS, plant=one, duration=SHORT, integrator="implicitfast") for one in networks]
         least, *times = (scores["settling_time"] for scores in runs.scores(grid))

@@ -8,7 +8,6 @@ from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import (
     CONDITIONED,
-    NETWORKS,
     OURS,
     RIVALS,
     UNCLAMPED,
@@ -16,10 +15,7 @@ from smc_mujoco.studies.papers.gaber.claims.common import (
     deviation,
 )
 from smc_mujoco.studies.papers.gaber.claims.timing import nanoseconds
-from smc_mujoco.studies.papers.gaber.scenarios import PLANTS
 
-PERIODS, DELAYS = (1, 10, 30, 60), (0, 5, 10, 20, 50)  # ms
-MIN_DELAY, ENDS = 0.1, (0, 50)  # ms; ten times the steps, so with the ends of the delays alone
 MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),
     ("robustness", "steady error under d", "steady_error", "constant"),
@@ -30,7 +26,7 @@ GENERAL = ("classical", "adaptive", "super_twisting", CONDITIONED, "boundary_lay
 def compensates(runs: Runs) -> list[Check]:
     """Claim 10: compensates input nonlinearity implicitly."""
     checks = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         law = runs.law(plant, OURS)
         own, bent = runs.traces([runs.scenario(plant, OURS, law=one) for one in (law, squeezed(law))])
         checks.append(check(f"{plant}: max |x - x'| / |x0|", deviation(own, bent), "<", 0.05))
@@ -39,11 +35,14 @@ def compensates(runs: Runs) -> list[Check]:
 
 def never_chatters(runs: Runs) -> list[Check | Beside]:
     """Claim 11: no chattering by construction."""
-    cells = [(period, delay) for period in PERIODS for delay in DELAYS] + [(MIN_DELAY, delay) for delay in ENDS]
+    periods, delays, shortest = (runs.values[name] for name in ("periods", "delays", "shortest"))
+    ends = delays[0], delays[-1]
+    cells = [(period, delay) for period in periods for delay in delays]
+    cells += [(shortest, delay) for delay in ends]  # ten times the steps, so with the ends of the delays alone
     if runs.quick:
-        cells = [(period, delay) for period in (PERIODS[0], PERIODS[-1]) for delay in ENDS]
+        cells = [(period, delay) for period in (periods[0], periods[-1]) for delay in ends]
     evidence = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         scores = runs.scores(
             runs.scenario(plant, OURS, control_period=period * 1e-3, input_delay=delay * 1e-3)
             for period, delay in cells
@@ -64,7 +63,7 @@ def never_chatters(runs: Runs) -> list[Check | Beside]:
 def better(runs: Runs) -> list[Check | Beside]:
     """Claim 12: better smoothness and robustness than the alternatives."""
     checks, beside = [], []
-    for plant in PLANTS:
+    for plant in runs.plants:
         for sentence, name, metric, condition in MEASURES:
             values = {law: runs.score(plant, law, condition)[metric] for law in (OURS, *RIVALS, CONDITIONED, UNCLAMPED)}
             for law in RIVALS:
@@ -77,8 +76,8 @@ def better(runs: Runs) -> list[Check | Beside]:
 def synchronises(runs: Runs) -> list[Check]:
     """Claim 13: synchronisation without coordination."""
     checks = []
-    for plant in NETWORKS:
-        scores = runs.scores(runs.scenario(plant, OURS, mismatch=coupling) for coupling in ({}, {"kc": 0.0}))
+    for plant in runs.plants:
+        scores = runs.scores(runs.scenario(plant, OURS, condition) for condition in runs.conditions)
         joined, alone = (each["spread_settling_time"] for each in scores)
         checks += [
             check(f"{plant}: settling time of the spread, s", joined, "<", 1.0, "synchronises"),

@@ -19,7 +19,7 @@ from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, deviation, scale
 from smc_mujoco.studies.papers.gaber.claims.searches import critical_delay, largest_delays
-from smc_mujoco.studies.papers.gaber.scenarios import LAWS, PLANTS
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
 MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0
@@ -47,7 +47,7 @@ CHEAP: dict[str, dict[str, float]] = {
 def cheap_tanh(runs: Runs) -> list[Check | Beside]:
     """Claim 55: tanh by lookup table or Taylor series on a microcontroller."""
     evidence: list[Check | Beside] = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         nominal = runs.scenario(plant, OURS)
         kinds = [replace(nominal, law=_cheap(runs, name, nominal.law)) for name in CHEAP]
         reference, *traces = runs.traces([nominal, *kinds])
@@ -73,7 +73,7 @@ def _cheap(runs: Runs, name: str, exact: Component) -> Component:
 def saturation_avoided(runs: Runs) -> list[Check]:
     """Claim 56: actuator saturation inherently avoided."""
     checks = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
         traces = runs.traces([runs.scenario(plant, OURS, u_max=limit) for limit in (half, math.inf)])
         what = f"{plant}: deviation at u_max = lambda / 2, over |x0|"
@@ -84,7 +84,7 @@ def saturation_avoided(runs: Runs) -> list[Check]:
 def exponential(runs: Runs) -> list[Check]:
     """Claim 57: exponential convergence."""
     checks = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         start = runs.scenario(plant, OURS).resolved.x0
         away = [runs.scenario(plant, OURS, x0=tuple(times * x for x in start)) for times in (NEAR, *FAR)]
         near, *rates = map(decay_rate, runs.traces(away))
@@ -111,9 +111,10 @@ def decay_rate(trace: Trace) -> float:
 def jumps(runs: Runs) -> list[Check | Beside]:
     """Claim 59: abrupt parameter jump: may not converge, stability preserved."""
     checks, bounds = [], []
-    for plant in PLANTS:
-        for kind in ("mild", "hard"):
-            (trace,) = runs.traces([runs.scenario(plant, OURS, f"jump_{kind}")])
+    for plant in runs.plants:
+        for condition in runs.conditions:
+            kind = condition.removeprefix("jump_")
+            (trace,) = runs.traces([runs.scenario(plant, OURS, condition)])
             jump = trace.scenario.jump
             assert jump is not None  # the condition has one
             peak, bound = (
@@ -127,9 +128,11 @@ def jumps(runs: Runs) -> list[Check | Beside]:
 
 def delay_tolerant(runs: Runs) -> list[Check | Beside]:
     """Claim 61: classical SMC is delay-sensitive, the paper's is not."""
-    longest, below = (largest_delays(runs, PLANTS, (*LAWS, UNCLAMPED), within) for within in (TOLERATED_ERROR, 1.0))
+    longest, below = (
+        largest_delays(runs, runs.plants, (*LAWS, UNCLAMPED), within) for within in (TOLERATED_ERROR, 1.0)
+    )
     evidence: list[Check | Beside] = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         ours, theory = longest[plant, OURS], critical_delay(runs, plant)
         evidence += [
             *(

@@ -16,18 +16,18 @@ PLANT = "van_der_pol"
 
 def small_fluctuations(runs: Runs) -> list[Check]:
     """Claim 45: Van der Pol with noise: stable, small fluctuations."""
-    bound = runs.score(PLANT, OURS, "noise")["ultimate_bound"] / scale(runs.scenario(PLANT, OURS))
-    return [check(f"{PLANT}: ultimate bound with noise, over |x0|", bound, "<", 0.05)]
+    bound = runs.score(runs.plant, OURS, "noise")["ultimate_bound"] / scale(runs.scenario(runs.plant, OURS))
+    return [check(f"{runs.plant}: ultimate bound with noise, over |x0|", bound, "<", 0.05)]
 
 
 def nearly_identical(runs: Runs) -> list[Check | Beside]:
     """Claim 46: Van der Pol with d: nearly identical, strong rejection."""
-    disturbed, nominal = runs.traces([runs.scenario(PLANT, OURS, condition) for condition in ("sine", "nominal")])
-    residual = {law: runs.score(PLANT, law, "sine")["ultimate_bound"] for law in (OURS, *RIVALS, UNCLAMPED)}
-    what = f"{PLANT}: residual under d of"
+    disturbed, nominal = runs.traces([runs.scenario(runs.plant, OURS, condition) for condition in ("sine", "nominal")])
+    residual = {law: runs.score(runs.plant, law, "sine")["ultimate_bound"] for law in (OURS, *RIVALS, UNCLAMPED)}
+    what = f"{runs.plant}: residual under d of"
     return [
         check(
-            f"{PLANT}: deviation from nominal under d, over |x0|",
+            f"{runs.plant}: deviation from nominal under d, over |x0|",
             deviation(disturbed, nominal),
             "<",
             0.05,
@@ -43,22 +43,29 @@ def nearly_identical(runs: Runs) -> list[Check | Beside]:
 
 def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
     """Claim 48: u under noise: smooth, small fluctuations."""
-    (trace,) = runs.traces([runs.scenario(PLANT, OURS, "noise")])
+    plant = runs.plant
+    (trace,) = runs.traces([runs.scenario(plant, OURS, "noise")])
     std, step, share = fluctuation(trace)
-    most, over = command_bound(runs, PLANT), "over min(lambda, u_max)"
-    whole = runs.score(PLANT, OURS, "noise")["hf_share"]
+    most, over = command_bound(runs, runs.plant), "over min(lambda, u_max)"
+    whole = runs.score(plant, OURS, "noise")["hf_share"]
     return [
-        check(f"{PLANT}: standard deviation of u with noise, {over}", ratio(std, most), "<", 0.1, "small fluctuations"),
-        check(f"{PLANT}: largest step of u with noise, {over}", ratio(step, most), "<", 0.1, "smooth"),
-        check(f"{PLANT}: share of u above {HIGH_PASS:g} Hz with noise", share, "<", 0.5, "smooth"),
-        Beside(f"{PLANT}: share of u above {HIGH_PASS:g} Hz with noise, over the whole run", whole),
+        check(
+            f"{plant}: standard deviation of u with noise, {over}",
+            ratio(std, most),
+            "<",
+            0.1,
+            "small fluctuations",
+        ),
+        check(f"{plant}: largest step of u with noise, {over}", ratio(step, most), "<", 0.1, "smooth"),
+        check(f"{plant}: share of u above {HIGH_PASS:g} Hz with noise", share, "<", 0.5, "smooth"),
+        Beside(f"{plant}: share of u above {HIGH_PASS:g} Hz with noise, over the whole run", whole),
     ]
 
 
 def continuous(runs: Runs) -> list[Check]:
     """Claim 49: u under d: continuous, bounded."""
-    step = ratio(runs.score(PLANT, OURS, "sine")["max_step"], command_bound(runs, PLANT))
-    return [check(f"{PLANT}: largest step of u under d, over min(lambda, u_max)", step, "<", 0.02)]
+    step = ratio(runs.score(runs.plant, OURS, "sine")["max_step"], command_bound(runs, runs.plant))
+    return [check(f"{runs.plant}: largest step of u under d, over min(lambda, u_max)", step, "<", 0.02)]
 
 
 def fluctuation(trace: Trace) -> tuple[float, float, float]:

@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, long_run, scale
-from smc_mujoco.studies.papers.gaber.scenarios import CONTROL_PERIOD, PLANTS, U_MAX
+from smc_mujoco.studies.papers.gaber.scenarios import CONTROL_PERIOD, U_MAX
 
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 
@@ -70,10 +70,10 @@ def critical_delay(runs: Runs, plant: str) -> float:
 
 def smallest_stable(runs: Runs) -> dict[str, float]:
     """Return plant -> the smallest lambda found stable between MIN_LAMBDA and U_MAX; inf if U_MAX is not."""
-    ends = dying(runs, dict.fromkeys(PLANTS, (MIN_LAMBDA, U_MAX)))
-    low, high = dict.fromkeys(PLANTS, MIN_LAMBDA), dict.fromkeys(PLANTS, U_MAX)
+    ends = dying(runs, dict.fromkeys(runs.plants, (MIN_LAMBDA, U_MAX)))
+    low, high = dict.fromkeys(runs.plants, MIN_LAMBDA), dict.fromkeys(runs.plants, U_MAX)
     for _ in range(QUICK_ROUNDS if runs.quick else ROUNDS):
-        tried = {plant: np.geomspace(low[plant], high[plant], INNER + 2).tolist() for plant in PLANTS}
+        tried = {plant: np.geomspace(low[plant], high[plant], INNER + 2).tolist() for plant in runs.plants}
         inner = dying(runs, {plant: lams[1:-1] for plant, lams in tried.items()})
         for plant, lams in tried.items():
             last = max((i for i, stable in enumerate([False, *inner[plant]]) if not stable), default=0)

@@ -13,7 +13,6 @@ from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import (
     CONDITIONED,
     HOSMC,
-    NETWORKS,
     OURS,
     UNCLAMPED,
     alike,
@@ -22,11 +21,10 @@ from smc_mujoco.studies.papers.gaber.claims.common import (
     scale,
     slower,
 )
-from smc_mujoco.studies.papers.gaber.scenarios import LAWS, PLANTS
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"
 MODERATE = (2.0, 15.0)  # %
-COUPLINGS = (0.0, 0.5, 5.0)  # N m/rad; the study's is 0.5
 
 
 def overshoots_less(runs: Runs, plant: str, law: str, limit: float, sentence: str = "") -> Check:
@@ -44,63 +42,63 @@ def overshoots_more(runs: Runs, plant: str, law: str, sentence: str = "") -> Che
 def pendulum_like_adaptive(runs: Runs) -> list[Check]:
     """Claim 27: pendulum: like adaptive, minimal overshoot."""
     return [
-        alike(runs, PENDULUM, OURS, "adaptive", "like adaptive"),
-        overshoots_less(runs, PENDULUM, OURS, 1.0, "minimal overshoot"),
+        alike(runs, runs.plant, OURS, "adaptive", "like adaptive"),
+        overshoots_less(runs, runs.plant, OURS, 1.0, "minimal overshoot"),
     ]
 
 
 def classical_fluctuates(runs: Runs) -> list[Check]:
     """Claim 28: pendulum: classical slower, fluctuates."""
-    ripple = runs.score(PENDULUM, "classical")["ripple"] / scale(runs.scenario(PENDULUM, "classical"))
+    ripple = runs.score(runs.plant, "classical")["ripple"] / scale(runs.scenario(runs.plant, "classical"))
     return [
-        slower(runs, PENDULUM, "classical", "slower"),
-        check(f"{PENDULUM}: ripple of classical over |x0|", ripple, ">", 1e-3, "fluctuates"),
+        slower(runs, runs.plant, "classical", "slower"),
+        check(f"{runs.plant}: ripple of classical over |x0|", ripple, ">", 1e-3, "fluctuates"),
     ]
 
 
 def larger_undershoot(runs: Runs) -> list[Check]:
     """Claim 29: pendulum: HOSMC fast, larger undershoot."""
-    return [overshoots_more(runs, PENDULUM, HOSMC)]
+    return [overshoots_more(runs, runs.plant, HOSMC)]
 
 
 def moderate_undershoot(runs: Runs) -> list[Check | Beside]:
     """Claim 31: Van der Pol: moderate undershoot."""
-    over = overshoot(runs, VAN_DER_POL, OURS)
+    over = overshoot(runs, runs.plant, OURS)
     outside = max(MODERATE[0] - over, over - MODERATE[1], 0.0)  # one check: every number meets one end of the range
     return [
-        check(f"{VAN_DER_POL}: overshoot of {OURS}, percentage points outside 2 to 15 %", outside, "<=", 0.0),
-        Beside(f"{VAN_DER_POL}: overshoot of {OURS}, %", over),
+        check(f"{runs.plant}: overshoot of {OURS}, percentage points outside 2 to 15 %", outside, "<=", 0.0),
+        Beside(f"{runs.plant}: overshoot of {OURS}, %", over),
     ]
 
 
 def largest_oscillation(runs: Runs) -> list[Check | Beside]:
     """Claim 32: Van der Pol: HOSMC largest oscillation."""
-    others = larger_than(max(overshoot(runs, VAN_DER_POL, law) for law in LAWS if law != HOSMC), of=100.0)
-    over = {law: runs.score(VAN_DER_POL, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
+    others = larger_than(max(overshoot(runs, runs.plant, law) for law in LAWS if law != HOSMC), of=100.0)
+    over = {law: runs.score(runs.plant, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
     return [
-        *(check(f"{VAN_DER_POL}: overshoot of {law}, %", over[law], ">", others) for law in (HOSMC, CONDITIONED)),
-        Beside(f"{VAN_DER_POL}: overshoot of {UNCLAMPED}, %", over[UNCLAMPED]),
+        *(check(f"{runs.plant}: overshoot of {law}, %", over[law], ">", others) for law in (HOSMC, CONDITIONED)),
+        Beside(f"{runs.plant}: overshoot of {UNCLAMPED}, %", over[UNCLAMPED]),
     ]
 
 
 def adaptive_overshoots(runs: Runs) -> list[Check]:
     """Claim 33: Van der Pol: adaptive overshoots more."""
-    return [overshoots_more(runs, VAN_DER_POL, "adaptive")]
+    return [overshoots_more(runs, runs.plant, "adaptive")]
 
 
 def classical_slower(runs: Runs) -> list[Check]:
     """Claim 34: Van der Pol: classical slower, no overshoot."""
     return [
-        slower(runs, VAN_DER_POL, "classical", "slower"),
-        overshoots_less(runs, VAN_DER_POL, "classical", 1.0, "no overshoot"),
+        slower(runs, runs.plant, "classical", "slower"),
+        overshoots_less(runs, runs.plant, "classical", 1.0, "no overshoot"),
     ]
 
 
 def fast_and_minimal(runs: Runs) -> list[Check]:
     """Claim 35: Duffing: fast, minimal overshoot."""
-    ours, *times = (runs.score(DUFFING, law)["settling_time"] for law in LAWS)
-    over, *overs = (overshoot(runs, DUFFING, law) for law in LAWS)
-    what = f"{DUFFING}: {{}} of {OURS} against 1.1 of the best rival's"
+    ours, *times = (runs.score(runs.plant, law)["settling_time"] for law in LAWS)
+    over, *overs = (overshoot(runs, runs.plant, law) for law in LAWS)
+    what = f"{runs.plant}: {{}} of {OURS} against 1.1 of the best rival's"
     return [
         check(what.format("settling time, s,"), ours, "<=", 1.1 * min(times), "fast"),
         check(what.format("overshoot, %,"), over, "<=", 1.1 * min(overs), "minimal overshoot"),
@@ -109,15 +107,15 @@ def fast_and_minimal(runs: Runs) -> list[Check]:
 
 def similar(runs: Runs) -> list[Check | Beside]:
     """Claim 36: Duffing: adaptive and HOSMC similar."""
-    each = alike(runs, DUFFING, HOSMC, "adaptive")
-    return [*(alike(runs, DUFFING, law, OURS) for law in ("adaptive", HOSMC)), Beside(each.what, each.value)]
+    each = alike(runs, runs.plant, HOSMC, "adaptive")
+    return [*(alike(runs, runs.plant, law, OURS) for law in ("adaptive", HOSMC)), Beside(each.what, each.value)]
 
 
 def classical_deviates(runs: Runs) -> list[Check]:
     """Claim 37: Duffing: classical slower, larger deviation."""
     return [
-        slower(runs, DUFFING, "classical", "slower"),
-        overshoots_more(runs, DUFFING, "classical", "larger deviation"),
+        slower(runs, runs.plant, "classical", "slower"),
+        overshoots_more(runs, runs.plant, "classical", "larger deviation"),
     ]
 
 
@@ -125,7 +123,7 @@ def rapid(runs: Runs) -> list[Check]:
     """Claim 38: network: rapid synchronisation and damping."""
     return [
         check(f"{plant}: settling time of the {of}, s", runs.score(plant, OURS)[f"{of}_settling_time"], "<", 1.0, about)
-        for plant in NETWORKS
+        for plant in runs.plants
         for of, about in (("mean", "damping"), ("spread", "synchronisation"))
     ]
 
@@ -133,8 +131,8 @@ def rapid(runs: Runs) -> list[Check]:
 def distortion(runs: Runs) -> list[Check]:
     """Claim 39: network: classical slower, coupling distortion."""
     checks = []
-    for plant in NETWORKS:
-        coupled = [find_plant(plant, kc=kc) for kc in COUPLINGS]  # the same gains in all
+    for plant in runs.plants:
+        coupled = [find_plant(plant, kc=kc) for kc in runs.values["couplings"]]  # the same gains in all
         scores = runs.scores(runs.scenario(plant, law, plant=one) for law in ("classical", OURS) for one in coupled)
         over = [each["overshoot"] for each in scores]
         what, about = f"{plant}: overshoot of", "coupling distortion"
@@ -149,18 +147,18 @@ def distortion(runs: Runs) -> list[Check]:
 
 def hosmc_like_adaptive(runs: Runs) -> list[Check]:
     """Claim 40: network: HOSMC like adaptive."""
-    return [alike(runs, plant, HOSMC, "adaptive") for plant in NETWORKS]
+    return [alike(runs, plant, HOSMC, "adaptive") for plant in runs.plants]
 
 
 def monotonic(runs: Runs) -> list[Check]:
     """Claim 50: fast and monotonic on every system."""
-    return [check(f"{plant}: overshoot, %", overshoot(runs, plant, OURS), "<", 1.0) for plant in PLANTS]
+    return [check(f"{plant}: overshoot, %", overshoot(runs, plant, OURS), "<", 1.0) for plant in runs.plants]
 
 
 def settles_as_well(runs: Runs) -> list[Check]:
     """Claim 51: settles like or better than classical and HOSMC."""
     checks = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         ours, *rivals = (runs.score(plant, law)["settling_time"] for law in (OURS, "classical", HOSMC))
         what = f"{plant}: settling time, over the better of classical and {HOSMC}"
         checks.append(check(what, ratio(ours, min(rivals)), "<=", 1.1))
@@ -170,7 +168,7 @@ def settles_as_well(runs: Runs) -> list[Check]:
 def removes_chattering(runs: Runs) -> list[Check]:
     """Claim 52: removes the chattering of classical and adaptive."""
     checks = []
-    for plant in PLANTS:
+    for plant in runs.plants:
         for law in ("classical", "adaptive"):
             ours, rival = (runs.score(plant, name)["tv_rate"] for name in (OURS, law))
             checks.append(check(f"{plant}: TV rate, over that of {law}", ratio(ours, rival), "<", 0.01))

@@ -9,19 +9,16 @@ from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check
 from smc_mujoco.studies.papers.gaber.claims import lyapunov
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, comes_to_rest, long_run
-from smc_mujoco.studies.papers.gaber.scenarios import PLANTS
 
 NEAR = 1e-6  # |s| at and below which the claim says nothing
 RISE = 1e-12  # of the run's largest V: less is rounding
-RATIOS = (0.5, 0.8, 1.0, 1.2)  # lambda over the smallest that linear theory finds stable
-SPREAD, RATES = (0.25, 1.0, 2.0), (-1.0, 0.0, 1.0)  # initial states: times x0; times |x0| per s
 CONVERGED = 0.05  # of |x0|
 
 
 def decreases(runs: Runs) -> list[Check | Beside]:
     """Claim 18: Vdot <= -eps s^2 for all s != 0."""
     evidence = []
-    for name in PLANTS:
+    for name in runs.plants:
         plant, gains = find_plant(name), runs.law(name, OURS).gains
         x, v = lyapunov.plane(plant, gains["k1"], points=51 if runs.quick else lyapunov.POINTS)
         states = plant, gains["lam"], gains["k1"], x, v
@@ -39,7 +36,7 @@ def decreases(runs: Runs) -> list[Check | Beside]:
 def monotonic(runs: Runs) -> list[Check]:
     """Claim 19: V decreases monotonically."""
     checks = []
-    for trace in runs.traces([runs.scenario(name, OURS) for name in PLANTS]):
+    for trace in runs.traces([runs.scenario(name, OURS) for name in runs.plants]):
         plant, gains = trace.scenario.plant, trace.scenario.law.gains
         s = trace.v + gains["k1"] * trace.x - trace.u / lyapunov.input_gain(plant)  # alpha - u / g, u of the actuator
         height = s**2 / 2.0
@@ -50,11 +47,12 @@ def monotonic(runs: Runs) -> list[Check]:
 
 def global_(runs: Runs) -> list[Check | Beside]:
     """Claim 20: globally asymptotically stable, any lambda > 0."""
-    starts = [(position, rate) for position in SPREAD for rate in ((0.0,) if runs.quick else RATES)]
-    least = {name: smallest_lam(find_plant(name), runs.law(name, OURS).gains["k1"]) for name in PLANTS}
-    cells = [(name, share) for name in PLANTS if least[name] > 0.0 for share in RATIOS]
+    positions, rates, ratios = (runs.values[name] for name in ("positions", "rates", "ratios"))
+    starts = [(position, rate) for position in positions for rate in ((0.0,) if runs.quick else rates)]
+    least = {name: smallest_lam(find_plant(name), runs.law(name, OURS).gains["k1"]) for name in runs.plants}
+    cells = [(name, share) for name in runs.plants if least[name] > 0.0 for share in ratios]
     lams = [(name, share * least[name]) for name, share in cells]
-    own = [(name, runs.law(name, OURS).gains["lam"]) for name in PLANTS]
+    own = [(name, runs.law(name, OURS).gains["lam"]) for name in runs.plants]
     shares = iter(converging(runs, [*lams, *own], starts))
     return [
         *(
@@ -62,7 +60,7 @@ def global_(runs: Runs) -> list[Check | Beside]:
             for name, share in cells
         ),
         *(Beside(f"{name}: smallest lambda", lam) for name, lam in least.items()),
-        *(Beside(f"{name}: share at the set's lambda", next(shares)) for name in PLANTS),
+        *(Beside(f"{name}: share at the set's lambda", next(shares)) for name in runs.plants),
     ]
 
 
@@ -78,5 +76,5 @@ def converging(runs: Runs, lams: list[tuple[str, float]], starts: list[tuple[flo
 
 def any_gain(runs: Runs) -> list[Check]:
     """Claim 21: g smooth and non-zero suffices."""
-    laws = {name: reversed_gain(runs.law(name, OURS)) for name in PLANTS}
+    laws = {name: reversed_gain(runs.law(name, OURS)) for name in runs.plants}
     return comes_to_rest(runs, {name: runs.scenario(name, OURS, law=law) for name, law in laws.items()})

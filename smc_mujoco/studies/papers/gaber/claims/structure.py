@@ -11,20 +11,17 @@ from smc_mujoco.studies.audit.verdict import Beside, Check, check
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, comes_to_rest
 from smc_mujoco.studies.papers.gaber.claims.lyapunov import input_gain
 from smc_mujoco.studies.papers.gaber.claims.searches import MIN_LAMBDA, smallest_stable
-from smc_mujoco.studies.papers.gaber.scenarios import PLANTS, U_MAX
+from smc_mujoco.studies.papers.gaber.scenarios import U_MAX
 
-SINGLE = ("inverted_pendulum", "van_der_pol", "duffing")
 LAG = 0.05  # s, chosen: an actuator's
 SHARE = 1.5  # times the largest jerk that the lag allows, g u_max / LAG: the bound that the differentiator assumes
-ESTIMATORS = ("filtered_difference", "savitzky_golay", "levant")
-SIGMAS = (0.001, 0.01)  # rad or m
 
 
 def higher_degree(runs: Runs) -> list[Check]:
     """Claim 15: general relative degree r."""
     third = runs.mutated(find_law("observer_free_third"))
     grid = {}
-    for name in SINGLE:
+    for name in runs.plants:
         jerk = input_gain(find_plant(name)) * U_MAX / LAG
         velocity = estimator("levant", L=SHARE * jerk)
         grid[name] = runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=velocity)
@@ -38,7 +35,7 @@ def higher_degree(runs: Runs) -> list[Check]:
 
 def no_tuning(runs: Runs) -> list[Check | Beside]:
     """Claim 24: damping arises from alpha, no tuning."""
-    theory = {name: smallest_lam(find_plant(name), runs.law(name, OURS).gains["k1"]) for name in PLANTS}
+    theory = {name: smallest_lam(find_plant(name), runs.law(name, OURS).gains["k1"]) for name in runs.plants}
     return [
         *(
             check(f"{name}: smallest lambda that stabilises it", lam, "<=", MIN_LAMBDA)
@@ -50,11 +47,11 @@ def no_tuning(runs: Runs) -> list[Check | Beside]:
 
 def with_estimators(runs: Runs) -> list[Check]:
     """Claim 25: works with low-pass filtered differentiation, Savitzky-Golay, sliding differentiators."""
-    sigmas = SIGMAS[-1:] if runs.quick else SIGMAS
+    sigmas = runs.values["sigmas"][-1:] if runs.quick else runs.values["sigmas"]
     grid = {
         f"{plant}, {name}, sigma {sigma:g}": runs.scenario(plant, OURS, velocity=name, noise=Noise(position=sigma))
-        for plant in PLANTS
-        for name in ESTIMATORS
+        for plant in runs.plants
+        for name in runs.values["estimators"]
         for sigma in sigmas
     }
     return comes_to_rest(runs, grid)

@@ -18,7 +18,7 @@ from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import UNCLAMPED, scale
 from smc_mujoco.studies.papers.gaber.claims.searches import largest_delays
-from smc_mujoco.studies.papers.gaber.scenarios import CONTROL_PERIOD, LAWS, PLANTS
+from smc_mujoco.studies.papers.gaber.scenarios import CONTROL_PERIOD, LAWS
 
 # columns of the paper's table, and its rows: property -> a mark a column
 COLUMNS = {"classical": "classical", "HOSMC": "super_twisting", "adaptive": "adaptive", "proposed": "observer_free"}
@@ -66,19 +66,19 @@ def table_one(runs: Runs) -> list[Check | Beside]:
 
 def worst_ratio(runs: Runs, law: str, metric: str, other: str, reference: str) -> float:
     """Return a metric of a law over a reference metric of another law, nominal, worst plant; inf if it is 0 / 0."""
-    ratios = [ratio(runs.score(plant, law)[metric], runs.score(plant, other)[reference]) for plant in PLANTS]
+    ratios = [ratio(runs.score(plant, law)[metric], runs.score(plant, other)[reference]) for plant in runs.plants]
     return math.inf if any(map(math.isnan, ratios)) else max(ratios)
 
 
 def tolerance(runs: Runs) -> dict[str, float]:
     """Return law -> largest delay less classical's, s, worst plant."""
-    longest = largest_delays(runs, PLANTS, LAWS)
-    return {law: min(longest[p, law] - longest[p, "classical"] for p in PLANTS) for law in LAWS}
+    longest = largest_delays(runs, runs.plants, LAWS)
+    return {law: min(longest[p, law] - longest[p, "classical"] for p in runs.plants) for law in LAWS}
 
 
 def growth(runs: Runs, law: str) -> float:
     """Return the growth of max |u| with distance or with time, whichever is larger, as a share; worst plant."""
-    return max(_growth(runs.law(plant, law), scale(runs.scenario(plant, law))) for plant in PLANTS)
+    return max(_growth(runs.law(plant, law), scale(runs.scenario(plant, law))) for plant in runs.plants)
 
 
 def _growth(law: Component, start: float) -> float:
@@ -91,7 +91,7 @@ def _growth(law: Component, start: float) -> float:
 
 def estimated(runs: Runs, law: str) -> float:
     """Return how many signals, beside position and velocity, change what a law does."""
-    bound = runs.law(PLANTS[0], law)
+    bound = runs.law(runs.plants[0], law)
     x, v, other = np.random.default_rng(0).normal(size=(3, PROBES))
     plain = _asked(bound, x, v)
     return float(sum(np.any(_asked(bound, x, v, **{name: other}) != plain) for name in ESTIMATED))
