@@ -53,8 +53,14 @@ def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
 
 
 def model(scenarios: Sequence[Scenario], nuserdata: int = 0) -> mujoco.MjModel:
-    """Return the compiled model that scenarios of one structure share, without their values."""
-    made = ready(spec(scenarios), nuserdata)
+    """Return the compiled model that scenarios of one structure share, without their values and for no picture.
+
+    Its procedural textures have a few pixels: MuJoCo paints them at each compilation, in three quarters of its time.
+    """
+    shared = spec(scenarios)
+    for texture in shared.textures:
+        texture.width, texture.height = 1, 6  # a skybox has six sides
+    made = ready(shared, nuserdata)
     first = scenarios[0].resolved
     made.opt.timestep = first.physics_step
     made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
