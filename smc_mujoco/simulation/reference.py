@@ -66,7 +66,10 @@ class Loop:
         self.compiled = assembly.model([scenario])
         self.model = assembly.with_values(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
-        self.channels = channels(self.model)
+        table = channels(self.model)
+        self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
+        self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["tip"] >= 0  # (n,) bool
+        self.rubs, self.forced = self.channels["friction"] >= 0, self.channels["force"] >= 0
         self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
         if self.model.nhistory:
             encoder.remember(self.model, self.data)
@@ -78,6 +81,7 @@ class Loop:
         if isinstance(scenario.plant.nominal, Coupled):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.nominal)
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
+        self.streams = [scenario.stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
         self.latest = np.zeros(n)  # the last command of each channel
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -124,8 +128,8 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
-                applied, driven = np.zeros(len(x)), self.channels["ctrl"] >= 0
-                applied[driven] = np.clip(reached[driven], -self.limits, self.limits)  # scaled and back: an ulp beyond
+                applied = np.zeros(len(x))  # scaled and back: an ulp beyond
+                applied[self.driven] = np.clip(reached[self.driven], -self.limits, self.limits)
                 sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
@@ -136,7 +140,7 @@ class Loop:
     def begin(self, data: mujoco.MjData, step: int) -> None:
         """Begin a physics step: run the law if it is a sample, and apply the command whose delay has passed."""
         self.sum_forces(data)
-        if not (np.all(np.abs(data.qpos) < MAX_STATE) and np.all(np.abs(data.qvel) < MAX_STATE)):
+        if not ((np.abs(data.qpos) < MAX_STATE).all() and (np.abs(data.qvel) < MAX_STATE).all()):
             raise Failure(PLANT_DIVERGED)
         k, within = divmod(step, self.scenario.steps)
         if within == 0:
@@ -145,10 +149,10 @@ class Loop:
         past = step - self.scenario.delay_steps
         if past >= 0:
             self.arrived = self.commands[past // self.scenario.steps]
-        asked, driven = self.arrived, self.channels["ctrl"] >= 0
+        asked = self.arrived
         if self.tandem:
             asked, self.first = self.tandem(asked, self.first)
-        data.ctrl[self.channels["ctrl"][driven]] = (self.scale * asked)[driven]
+        data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * asked)[self.driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Return measured positions and estimated velocities, (n,) each, at sample k."""
@@ -186,7 +190,7 @@ class Loop:
         self.r[:] = r
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
         for i in range(len(x)):
-            if self.channels["ctrl"][i] < 0:  # only measured
+            if not self.driven[i]:  # only measured
                 u[i] = s[i] = self.r[i] = 0.0
                 continue
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
@@ -194,7 +198,7 @@ class Loop:
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
                 float(ddr if math.isnan(self.a[i]) else self.a[i]), limits[i], float(scenario.model == "nominal"),
             )  # fmt: skip
-            if (j := i + int(np.sum(self.channels["ctrl"] >= 0))) < len(x):  # moves with it, without an actuator
+            if (j := i + len(limits)) < len(x):  # moves with it, without an actuator
                 fq, gq = self.model_at(x, v, j, i)
                 y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
             if self.surface:
@@ -202,7 +206,7 @@ class Loop:
                 y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
             u[i], s[i] = self.law(i, y)
             u[i] += added
-            self.latest[i] = np.clip(u[i], -limits[i], limits[i])
+            self.latest[i] = min(max(u[i], -limits[i]), limits[i])
             asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
             if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < MAX_CONTROL):
                 raise Failure(f"{self.law.name} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
@@ -217,31 +221,33 @@ class Loop:
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
-        xfrc, table = data.xfrc_applied.ravel(), self.channels
-        xfrc[table["xfrc"]] = xfrc[table["push"]] = 0.0
-        joints = np.zeros(len(table))  # forces on the joints themselves, in a user's model
-        for j, (signal, memory) in enumerate(zip(self.scenario.disturbance, self.signal_memory, strict=True)):
-            stream = self.scenario.stream(j)
-            d = [evaluate(signal, t, memory[i], self.scenario.seed, i, stream)[0] for i in range(len(table))]
-            matched = table["sign"] * d * (table["ctrl"] >= 0)  # only where there is an actuator
+        xfrc, at = data.xfrc_applied.ravel(), self.channels
+        xfrc[at["xfrc"]] = xfrc[at["push"]] = 0.0
+        joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
+        for signal, memory, stream in zip(self.scenario.disturbance, self.signal_memory, self.streams, strict=True):
+            if signal.random:
+                d = [evaluate(signal, t, own, self.scenario.seed, i, stream)[0] for i, own in enumerate(memory)]
+            else:
+                d = evaluate(signal, t)[0]  # alike in all channels
+            matched = at["sign"] * d * self.driven  # only where there is an actuator
             joints += matched
-            xfrc[table["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
+            xfrc[at["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
         if self.scenario.plant.direct:
-            xfrc[table["xfrc"]], data.qfrc_applied[table["direct"]] = 0.0, joints
-        d = joints if self.scenario.plant.direct else table["sign"] * xfrc[table["xfrc"]]
-        hinged = table["tip"] >= 0
-        arm = data.xipos.ravel()[table["tip"]] - data.xanchor.ravel()[table["anchor"]]
-        d[hinged] += (table["push_sign"] * arm * xfrc[table["push"]])[hinged]
-        if not np.all(np.isfinite(d)):
+            xfrc[at["xfrc"]], data.qfrc_applied[at["direct"]] = 0.0, joints
+        d = joints if self.scenario.plant.direct else at["sign"] * xfrc[at["xfrc"]]
+        if self.hinged.any():
+            arm = data.xipos.ravel()[at["tip"]] - data.xanchor.ravel()[at["anchor"]]
+            d[self.hinged] += (at["push_sign"] * arm * xfrc[at["push"]])[self.hinged]
+        if not np.isfinite(d).all():
             raise Failure("the disturbance became NaN or inf")
         return d
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
-        rubs = self.channels["friction"] >= 0
-        self.forces[0] += np.where(self.channels["force"] >= 0, data.actuator_force[self.channels["force"]], 0.0)
+        self.forces[0] += np.where(self.forced, data.actuator_force[self.channels["force"]], 0.0)
         self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
-        self.forces[1, rubs] += data.actuator_force[self.channels["friction"][rubs]]
+        if self.rubs.any():
+            self.forces[1, self.rubs] += data.actuator_force[self.channels["friction"][self.rubs]]
 
 
 def gains_of(c: Component) -> tuple:

@@ -233,7 +233,7 @@ class Scenario:
         """Unit of u in each channel, (n,): that of the joint's force, or "V"."""
         return self.plant.efforts if self.amplifier is None else (self.amplifier.unit,) * self.plant.n
 
-    @property
+    @functools.cached_property
     def limits(self) -> tuple[float, ...]:
         """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's own limit."""
         u_max = self.resolved.u_max
@@ -241,17 +241,17 @@ class Scenario:
             return (min(u_max, self.amplifier.voltage),) * self.plant.driven
         return tuple(min(u_max, limit) for limit in self.plant.limits) or (u_max,) * self.plant.driven
 
-    @property
+    @functools.cached_property
     def steps(self) -> int:
         """Physics steps per control period."""
         return round(self.control_period / self.resolved.physics_step)
 
-    @property
+    @functools.cached_property
     def samples(self) -> int:
         """K, the number of control periods; a trace has K + 1 samples."""
         return math.floor(self.duration / self.control_period + 1e-6)
 
-    @property
+    @functools.cached_property
     def stages(self) -> int:
         """Callbacks per physics step: one a stage of the integrator."""
         return 4 if self.resolved.integrator == "RK4" else 1
@@ -261,7 +261,7 @@ class Scenario:
         """How many delayed readings of the sensor MuJoCo keeps."""
         return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step)
 
-    @property
+    @functools.cached_property
     def delay_steps(self) -> int:
         """The input delay in physics steps."""
         return round(self.input_delay / self.resolved.physics_step)
@@ -290,7 +290,7 @@ class Scenario:
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 
-    @property
+    @functools.cached_property
     def drive(self) -> Nominal:
         """Force of the actuator per unit of u and per velocity, as the law's model knows it."""
         return Nominal() if self.amplifier is None else self.amplifier.nominal
