@@ -187,7 +187,7 @@ def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name, sigm
     """Without a velocity sensor."""
     laws = scenarios.LAWS if name == "levant" else ("observer_free", "classical")
     pairs = [(plant, law) for plant in scenarios.GAINS for law in laws]
-    changes = {"velocity": name, "noise": smc.Noise(position=sigma)}
+    changes = {"velocity": name, "noise": smc.Noise(position=sigma), "integrator": "Euler"}
     traces = smc.run([scenarios.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
     for pair, trace in zip(pairs, traces, strict=True):
         assert trace.failure is None, pair

@@ -104,8 +104,8 @@ def test_the_bound_is_the_same_for_every_law_and_both_sets():
 @pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
 def test_a_shipped_search_comes_out_again(gain_set, law):
     known = result.shipped("duffing", law, gains.OBJECTIVES[gain_set])
-    again = search.tune("duffing", law, budget=12, seed=known.seed, objective=known.definition)
-    assert [e.gains for e in again.history] == [e.gains for e in known.history[:12]]
+    again = search.tune("duffing", law, budget=4, seed=known.seed, objective=known.definition)
+    assert [e.gains for e in again.history] == [e.gains for e in known.history[:4]]
     for one, other in zip(again.history, known.history, strict=False):
         # another processor rounds otherwise, and switching laws under noise magnify it
         assert one.objective == pytest.approx(other.objective, rel=1e-3)

@@ -34,12 +34,20 @@ def found():
     return tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT)
 
 
+@pytest.fixture(scope="module")
+def rival():
+    """Another law's, on equal terms."""
+    return tune("duffing", "classical", budget=64, seed=3, objective=SHORT)
+
+
 # the same seed, a larger budget
 
 
+@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
     assert tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT, threads=1) == found
-    assert tune("duffing", "observer_free", budget=64, seed=4, objective=SHORT).law != found.law
+    other = tune("duffing", "observer_free", budget=4, seed=4, objective=SHORT)
+    assert not {e.gains for e in other.history} & {e.gains for e in found.history}
 
 
 @pytest.mark.parametrize("law", ["observer_free", "adaptive_leak"])
@@ -86,10 +94,9 @@ def test_what_the_best_gains_cost_can_be_had_again(found):
     assert [t.scenario.mismatch.get("mass", 1.0) for t in traces] == [1.0] * 5 + [0.7, 1.3]
 
 
-@pytest.mark.parametrize("law", ["classical", "observer_free"])
-def test_tuning_beats_the_default_gains(law):
-    tuned = tune("duffing", law, budget=96, objective=Objective(duration=2.0))
-    assert tuned.objective < tuned.before
+def test_tuning_beats_the_default_gains(found, rival):
+    for tuned in (found, rival):
+        assert tuned.objective < tuned.before
 
 
 def test_the_front_is_what_no_other_evaluation_beats(found):
@@ -204,12 +211,11 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
 # equal terms
 
 
-def test_a_law_that_got_more_than_its_rivals_is_not_compared(found):
-    rival = tune("duffing", "classical", budget=64, seed=3, objective=SHORT)
+def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival):
     assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
     assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
     unequal = {
-        "budget": tune("duffing", "classical", budget=65, seed=3, objective=SHORT),
+        "budget": dataclasses.replace(rival, budget=65),
         "rule": dataclasses.replace(rival, rule="by hand"),
         "objective": dataclasses.replace(rival, definition=Objective(duration=1.0, u_max=12.0)),
         "seed": dataclasses.replace(rival, seed=4),
