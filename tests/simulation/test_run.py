@@ -20,6 +20,7 @@ import pytest
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
+from smc_mujoco.simulation import model as assembly
 
 UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
 LOGGED = ("x", "v", "u", "applied", "s", "d")
@@ -86,6 +87,11 @@ def test_plants_sizes_and_durations_mix_in_one_call():
     traces = smc.run(many)
     assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1)]
     assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
+
+
+def test_the_model_of_a_run_has_no_picture_to_paint():
+    """MuJoCo paints textures at each compilation, in three quarters of its time."""
+    assert 0 < assembly.model([scenario()]).ntexdata < 100 < scenario().plant.load().ntexdata
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def rival():
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
     assert tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT, threads=1) == found
     other = tune("duffing", "observer_free", budget=4, seed=4, objective=SHORT)
-    assert not {e.gains for e in other.history} & {e.gains for e in found.history}
+    assert other.history[-1].gains not in {e.gains for e in found.history}
 
 
 @pytest.mark.parametrize("law", ["observer_free", "adaptive_leak"])
