@@ -1,10 +1,11 @@
 """Runs of laws over a rig's ensemble of parameter sets, as over conditions: does a ranking survive what is not known?
 
-table = smc.study(ensemble.runs(smc.rig("emps"), ["pid", "super_twisting"]), "emps")
+table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
 print(ensemble.verdict(smc.leaderboard(table)))
 """
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,7 +21,7 @@ PLANT_ALONE = ("x0", "v0")  # fields that the starts of a grid decide
 
 def runs(
     rig: Rig,
-    laws: Sequence[str | Law],
+    laws: Sequence[str | Law] | None = None,
     seeds: int = 20,
     gains: str = "default",
     duration: float = 10.0,
@@ -30,35 +31,41 @@ def runs(
 
     Args:
       rig: a rig with an ensemble.
-      laws: laws or their names.
-      seeds, gains, duration, starts: as in `smc.grid`.
+      laws: laws or their names; None: the rig's own.
+      seeds, gains, duration: as in `smc.grid`.
+      starts: as in `smc.grid`; None: within 20 % of the rig's x0.
 
     Raises:
-      ScenarioError: a rig without an ensemble, or arguments that `smc.grid` refuses.
+      ScenarioError: a rig without an ensemble or, if none are given, without laws; arguments that `smc.grid` refuses.
     """
     if not rig.ensemble:
         raise ScenarioError(f"{rig.name} has one set of parameters: choose a rig with an ensemble, such as qube_servo")
-    found = []
+    if not (chosen := list(rig.laws if laws is None else laws)):
+        raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
+    found, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
         fields: dict[str, Any] = member.machine(Values(**member.values))
         own = {key: value for key, value in fields.items() if key not in PLANT_ALONE}
         plant = own.pop("plant")
-        base = grid([plant], laws, ["nominal"], seeds, gains, duration, starts)
+        base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
         free: dict[str, Any] = {"u_max": None, "physics_step": None} | own
         found += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
     return found
+
+
+def wins(board: Any) -> dict[str, int]:
+    """Return law -> on how many parameter sets it wins, of a `leaderboard.Board` whose conditions are the sets."""
+    return dict(Counter(block.winner for block in board.blocks if block.winner).most_common())
 
 
 def verdict(boards: Sequence[Any]) -> str:
     """Return in a line for each metric whether one law wins on every parameter set."""
     lines = []
     for board in boards:
-        sets = list(board.blocks)
+        count, found = len(board.blocks), wins(board)
         if board.winner:
-            lines.append(f"{board.metric}: {board.winner} wins on all {len(sets)} parameter sets")
+            lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
             continue
-        wins = [f"{block.winner} on {block.condition}" for block in sets if block.winner]
-        lines.append(
-            f"{board.metric}: no law wins on all {len(sets)} parameter sets ({', '.join(wins) or 'none on any'})"
-        )
+        others = ", ".join(f"{law} on {number}" for law, number in found.items()) or "none on any"
+        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
     return "\n".join(lines)

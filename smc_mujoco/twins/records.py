@@ -38,7 +38,7 @@ class Columns:
       u: command, in the unit of the rig's u.
       reference: of the driven joint, where the loop is closed.
       feedforward: what is added to the controller's u; records may lack it.
-      others: further columns with angles that a replay reads.
+      others: references of the other joints; records may lack them.
       state: position, then velocity of each channel as they are, without noise and offset: of simulated runs.
       offset: what is subtracted from each channel's column to get the plant's x; empty for 0.
       torque: of each joint, for records whose torques are predicted from the motion; then x is of these joints.

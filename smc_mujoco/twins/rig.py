@@ -51,6 +51,23 @@ class Quantity:
     most: float = np.inf
 
 
+@dataclasses.dataclass(frozen=True)
+class Reached:
+    """How well a set of quantities fits records that were at hand once; tests find it again where they are.
+
+    Attributes:
+      quantities: "identified", the name of a published set, or "do nothing", see `Rig.idle`.
+      records: which they are, and what the values are of them: their median, ...
+      values: column or joint -> value, in `unit`.
+      unit: "%" of `Rig.fit`, or that of a residual rms.
+    """
+
+    quantities: str
+    records: str
+    values: Mapping[str, float]
+    unit: str = "%"
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rig:
     """A real machine.
@@ -71,6 +88,9 @@ class Rig:
       window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
       published: name of a parameter set -> values of quantities in it, with their source under "source".
       ensemble: sets of quantities that fit about as well, each a mapping name -> value.
+      laws: laws with gains for this machine, which a ranking compares by default.
+      x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
+      reached: how well it fits, of records that the package does not contain.
       about: licence and history of the data, and what the twin predicts well and what not.
     """
 
@@ -88,6 +108,9 @@ class Rig:
     window: float = 1.0
     published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     ensemble: tuple[Mapping[str, float], ...] = ()
+    laws: tuple[Law, ...] = ()
+    x0: tuple[float, ...] | None = None
+    reached: tuple["Reached", ...] = ()
     about: str = ""
 
     def __post_init__(self) -> None:
@@ -201,6 +224,11 @@ class Rig:
             known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
         return Scenario.recorded(**fields | known)
 
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The columns that a record must have."""
+        return self.columns.needed(self.controller is not None)
+
     def checked(self, record: Mapping[str, Any]) -> Record:
         """Return the columns of a record that a replay reads, (K,) each. Raise ScenarioError as `fit` does."""
         return records.checked(record, self.columns, self.period, self.name)
@@ -266,6 +294,29 @@ class Rig:
             parts = {name: each[name][first : first + len(values)] for name, values in predicted.items()}
             found.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
         return found
+
+    def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
+        """Return the fit, as `fit` does, of a machine that does nothing: a baseline for twins.
+
+        In a closed loop its joints are where their references are, and u is the feedforward. In an open loop it stays
+        where it is when the fit begins. A predicted torque is 0.
+        """
+        data, columns = self.checked(record), self.columns
+        if self.dynamics is not None:
+            measured = self.measured_torques(record)
+            return percentages({name: np.zeros_like(values) for name, values in measured.items()}, measured)
+        first = round(self.score_from / (self.period or records.step_of(data, columns)))
+        measured = {name: data[name][first:] for name in columns.x}
+        if self.period is None:
+            return percentages({name: np.full_like(values, values[0]) for name, values in measured.items()}, measured)
+        references = (columns.reference, *columns.others)
+        zero = np.zeros(len(data[columns.time]))
+        predicted = {
+            name: data.get(references[i] if i < len(references) else "", zero)[first:]
+            for i, name in enumerate(columns.x)
+        }
+        predicted["u"], measured["u"] = data.get(columns.feedforward, zero)[first:], data[columns.u][first:]
+        return percentages(predicted, measured)
 
     def predicted(self, trace: Trace) -> Record:
         """Return what the columns of the record would be in a replay, (K,) each, without the columns' offset."""

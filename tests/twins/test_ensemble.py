@@ -42,6 +42,15 @@ def test_a_rig_of_one_set_is_refused():
         ensemble.runs(smc.rig("emps"), LAWS)
 
 
+def test_a_rig_has_laws_and_a_start_of_its_own():
+    qube = smc.rig("qube_servo")
+    runs = ensemble.runs(qube, seeds=1, duration=0.1)
+    assert {run.law.name for run in runs} == {law.name for law in qube.laws}
+    assert {run.resolved.x0 for run in runs} == {(0.0, 0.1)}
+    with pytest.raises(smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"):
+        ensemble.runs(smc.rig("realaigym_acrobot"))
+
+
 def test_a_board_of_a_voltage_is_in_volts(tmp_path):
     fields = {"actuator": smc.DCMotor(command="voltage"), "duration": 0.2}
     runs = [

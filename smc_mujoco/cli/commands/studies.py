@@ -150,7 +150,7 @@ def bench(
         from smc_mujoco.twins import ensemble
         from smc_mujoco.twins.rig import rig as find_rig
 
-        chosen = [options.law(text) for text in options.names(laws, ("pid", "super_twisting"))]
+        chosen = None if laws is None else [options.law(text) for text in options.names(laws)]
         begin, length = options.starts(x0, spread), size.duration if duration is None else duration
         found = ensemble.runs(find_rig(rig), chosen, seeds or size.seeds, "default", length, begin)
         boards = leaderboard(study(found, out, not fresh, executor, threads, progress=True, traces=traces))
@@ -349,11 +349,16 @@ def report(
     seeds: Annotated[
         int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 cannot name a winner.")
     ] = None,
+    records: Annotated[
+        Path | None,
+        typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
+    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
 
-    It has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; films.
+    It has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; real
+    machines; films.
     The file OUT/report.html needs no network and no other file; the data are in the same folder. You can stop the
     command at any time, and continue by starting it again.
 
@@ -362,5 +367,5 @@ def report(
     with held_back():
         from smc_mujoco.studies.report import report as make
 
-    path = make(out, quick, seeds, threads, progress=True)
+    path = make(out, quick, seeds, threads, progress=True, records=records)
     print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -23,6 +23,7 @@ def report(
     threads: int | None = None,
     progress: bool = False,
     plan: "Plan | None" = None,
+    records: str | os.PathLike | None = None,
 ) -> Path:
     """Compute a study and write its report, out/report.html.
 
@@ -33,9 +34,10 @@ def report(
       threads: simulations at once; None for one per available core.
       progress: whether to show a bar a stage.
       plan: how much of everything, instead of `quick`.
+      records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
 
     Raises:
-      ScenarioError: a number of seeds or threads that cannot be, or a folder that cannot be written.
+      ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, or records of no rig.
       MissingPackageError: jinja2 or plotly is not installed.
     """
     from smc_mujoco.common import extras
@@ -50,7 +52,7 @@ def report(
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
     folder = Path(out)
-    html = page.page(stages.find(plan, folder, threads, Bars(progress)))
+    html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
     with replacing(folder / "report.html") as part:
         part.write_text(html, encoding="utf-8")
     return folder / "report.html"

@@ -17,6 +17,7 @@ from smc_mujoco.studies.report.words import style
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
+    from smc_mujoco.studies.report.rigs import Repeated
     from smc_mujoco.studies.report.stages import Front
 
 KEYS = 5  # laws in a line of a legend
@@ -195,3 +196,23 @@ def _curve(curve: Curve) -> list[dict[str, Any]]:
         band = {"fill": "toself", "fillcolor": fill, "line": {"width": 0}, "hoverinfo": "skip"}
         traces.append(line | band | {"x": rounded(around[0], 4), "y": rounded(around[1], 3)})
     return [*traces, line | hover | {"x": rounded(curve.tu), "y": rounded(curve.u)}]
+
+
+def record(shown: "Repeated") -> Figure:
+    """Draw the columns of a record over time, measured and as its twin repeats them: a panel for each, one below."""
+    grid = panels(len(shown.measured), 1, (0.0, 0.13))
+    data: list[dict] = []
+    layout: dict[str, Any] = {"annotations": [], "legend": {"y": 1.0 + 30 / (120 * len(grid))}}
+    for panel, name in zip(grid, shown.measured, strict=True):
+        layout["annotations"].append(panel.title(name))
+        below = {"title": {"text": "t, s"}} if panel is grid[-1] else {"showticklabels": False}
+        layout |= panel.axes(below | ({} if panel is grid[0] else {"matches": "x"}), {})
+        for label, values, line in (
+            ("measured", shown.measured[name], {"color": style.MUTED, "width": 2.4}),
+            ("twin", shown.twin[name], {"color": words.colour(words.PAPER), "width": 1.2}),
+        ):
+            trace = {"type": "scatter", "mode": "lines", "x": rounded(shown.t), "y": rounded(values), "line": line}
+            hover = f"<b>{label}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"
+            trace |= {"name": label, "legendgroup": label, "showlegend": panel is grid[0], "hovertemplate": hover}
+            data.append(trace | panel.trace)
+    return figure(data, layout, 120 + 120 * len(grid), (56, 12, 62, 46), showlegend=True)

@@ -24,7 +24,7 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.papers.gaber import scenarios
-from smc_mujoco.studies.report import answer, charts, maps, words
+from smc_mujoco.studies.report import answer, charts, maps, rigs, words
 from smc_mujoco.studies.report.plan import GAINS
 from smc_mujoco.studies.report.stages import Findings
 
@@ -35,6 +35,7 @@ SECTIONS = {
     "tradeoffs": "Error against effort",
     "margins": "Margins",
     "regions": "Regions of attraction",
+    "rigs": "On the rig",
     "films": "Films and traces",
     "method": "How it was computed",
 }
@@ -68,6 +69,7 @@ def page(findings: Findings) -> str:
         "answer": answer,
         "charts": charts,
         "maps": maps,
+        "rigs": rigs,
         "checks": checks,
         "link": link,
         "uri": uri,

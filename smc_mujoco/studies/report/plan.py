@@ -38,6 +38,7 @@ class Plan(Extent):
       filmed: how many of the scenes are filmed.
       scene_laws: laws side by side in a scene.
       scene: duration of traces and films, s.
+      rigs: machines whose laws are compared on all their sets of quantities.
     """
 
     quick: bool
@@ -54,6 +55,7 @@ class Plan(Extent):
     filmed: int = len(scenarios.PLANTS)
     scene_laws: tuple[str, ...] = scenarios.LAWS
     scene: float = 5.0
+    rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
 
 
 FULL = Plan(quick=False)
@@ -66,6 +68,7 @@ QUICK = Plan(
     points=(16, 16),
     scenes=tuple((plant, "nominal") for plant in QUICK_GRID.plants),
     filmed=1,
+    rigs=("qube_servo",),
 )
 
 

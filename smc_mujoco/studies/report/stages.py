@@ -1,4 +1,4 @@
-"""The stages of a report: grid, claims, margins, maps, scenes, statistics.
+"""The stages of a report: records, grid, claims, margins, maps, rigs, scenes, statistics.
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
@@ -29,7 +29,7 @@ from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.papers.gaber.claims import lyapunov
-from smc_mujoco.studies.report import about, films, scores, words
+from smc_mujoco.studies.report import about, films, rigs, scores, words
 from smc_mujoco.studies.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.studies.report.scores import Place, Score
 from smc_mujoco.studies.study import study
@@ -83,6 +83,8 @@ class Findings:
     margins: tuple[Margin, ...]
     by_set: Mapping[str, tuple[Margin, ...]]
     basins: tuple[Basin, ...]
+    machines: tuple[rigs.Machine, ...]
+    repeated: tuple[rigs.Repeated, ...]
     scenes: tuple[films.Scene, ...]
     about: about.About
 
@@ -102,13 +104,15 @@ class Findings:
         return list(dict.fromkeys(score.condition for score in self.scores))
 
 
-def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
-    """Return everything that a report shows, computed or read from the folder."""
+def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None) -> Findings:
+    """Return everything that a report shows, computed or read from the folder; `records`: folder of rigs' records."""
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
+    repeated = rigs.repeated(work, records)  # first, as bad files are refused
     table = grid(work)
     claims = judged_claims(work, table)
     margins = all_margins(work)
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
+    machines = rigs.machines(work)
     no_film = films.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
@@ -120,6 +124,8 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars) -> Findings:
             margins=margins,
             by_set=by_set,
             basins=basins,
+            machines=machines,
+            repeated=repeated,
             scenes=scenes,
             about=about.about(plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")),
         )

@@ -48,6 +48,7 @@ TINY = dataclasses.replace(
     scenes=(("duffing", "nominal"),),
     scene_laws=("observer_free", "classical"),
     scene=0.6,
+    rigs=("qube_servo",),
 )
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
