@@ -13,7 +13,8 @@ c1 .. c4 are by default those of the library's Furuta pendulum for Q = diag(1, 1
 the nearest upright position.
 Gains: k, bound of the relay [N m]; phi, half-width of its layer [N m]; k1 [(N m)^(1/2)] and k2 [N m/s], of
 super-twisting; w_max, bound of w [N m]; c1 and c2 [N m/rad], c3 and c4 [N m s/rad], of s; pump and most [rad/s^2], of
-the pumping and its bound; w0, of small oscillations when hanging [1/s]; J, inertia of the arm [kg m^2]; catch, |s| where the catch begins [N m].
+the pumping and its bound; w0, of small oscillations when hanging [1/s]; J, inertia of the arm [kg m^2]; catch, |s|
+where the catch begins [N m].
 Sources: K. J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287, 2000 (the pumping);
 S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE Trans. Automatic Control 24(3):437, 1979
 (the surface b'P z = 0).
