@@ -9,16 +9,17 @@ def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
     (law,), (condition,), periods = runs.laws, runs.conditions, runs.values["periods"]
     starts = runs.values.get("starts", [0.5])
+    plants, starts = (runs.plants[:1], starts[:1]) if runs.quick else (runs.plants, starts)
     scenarios = [
         runs.scenario(
             plant, law, condition, x0=x0, control_period=period, duration=runs.values["settled"] + LATE * period
         )
-        for plant in runs.plants
+        for plant in plants
         for period in periods
         for x0 in starts
     ]
-    traces = np.array(runs.traces(scenarios), dtype=object).reshape(len(runs.plants), -1)
-    return dict(zip(runs.plants, traces, strict=True))
+    traces = np.array(runs.traces(scenarios), dtype=object).reshape(len(plants), -1)
+    return dict(zip(plants, traces, strict=True))
 
 
 def accuracy_of_s(runs):

@@ -29,7 +29,7 @@ def winds_up(runs):
 def reaches(runs):
     """Largest |s| of the last quarter of 40 s under d = 1.5 sin 0.6 t, |u| <= 2 N, from three starts."""
     (law,), (condition,), starts = runs.laws, runs.conditions, runs.values["starts"]
-    cells = [(plant, start) for plant in runs.plants for start in starts]
+    cells = [(plant, start) for plant in runs.plants for start in starts][: 1 if runs.quick else None]
     traces = runs.traces(runs.scenario(plant, law, condition, v0=start) for plant, start in cells)
     ends = {
         f"{plant}, from {start:g} m/s": float(np.abs(trace.v[-(len(trace.t) // 4) :]).max())
