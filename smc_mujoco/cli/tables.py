@@ -13,6 +13,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.analysis.chattering import Chattering
+from smc_mujoco.analysis.gains_for import Design
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
@@ -383,6 +384,15 @@ def chattering(
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
         both = map(number, (cycle.amplitude, amplitude, cycle.frequency, frequency))
         table.add_row(law, *both, third, samples)
+    return table
+
+
+def designs(designs: Sequence[Design], unit: str) -> Table:
+    """Return the gains of each design and the constant disturbance, in this unit, that it bears."""
+    table = titled("largest gains", "law", "gains", Column(f"bears ({unit})", justify="right"))
+    for one in designs:
+        gains = ", ".join(f"{name}={number(gain)}" for name, gain in one.law.gains.items() if math.isfinite(gain))
+        table.add_row(Text(one.law.name, style=style.law_colour(one.law.name)), gains, number(one.disturbance))
     return table
 
 

@@ -773,9 +773,19 @@ def test_chatter_prints_predicted_beside_measured_and_writes_what_was_asked_for(
     assert (folder / "chatter.pdf").stat().st_size > 1000
 
 
+def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
+    words = ["--laws", "classical", "--actuator", "lag:0.01", "--gains", "default", "--duration", 2, "--amplitude", 1e-3]
+    code, out, _ = call("chatter", "duffing", *words)
+    assert code == 0
+    assert re.search(r"classical +1\.0e-3 ", out)
+    assert re.search(r"classical +k=2\.12, c=2\.50 +2\.\d+ *\n", out)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["--frequency", "5", "--actuator", "lag:0.01", "--laws", "classical"], "no law has such gains"),
+        (["--laws", ","], "--laws"),
         (["--actuator", "lagg:0.01"], "lag"),
         (["--actuator", "lag"], "lag:0.01"),
         (["--actuator", "lag:-1"], "-1"),

@@ -86,6 +86,12 @@ def unit(law: Component, name: str) -> Unit | None:
     return gain.unit  # pyright: ignore[reportReturnType]
 
 
+def size(law: Component, name: str, scales: Mapping[str, float]) -> float:
+    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is held."""
+    its = unit(law, name)
+    return 1.0 if its is None or _gain(law, name).held else its.of(scales)
+
+
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
     """Return the plant's X, F, M and T in SI units.
 

@@ -1,5 +1,6 @@
 """smc-mujoco tune, margins, basin: one question about a law, answered by many runs."""
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
 
 QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturbance"]}  # of `margins --quick`
@@ -209,6 +211,12 @@ def chatter(
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
+    amplitude: Annotated[
+        float | None, typer.Option(help="Take the largest gains whose predicted amplitude of s stays below this.")
+    ] = None,
+    frequency: Annotated[
+        float | None, typer.Option(help="Take the largest gains whose predicted frequency, Hz, stays below this.")
+    ] = None,
     duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs in which it is measured, s.")] = 8.0,
     out: Annotated[
         Path | None, typer.Option(help="Also draw Nyquist plots and runs, as OUT.svg and OUT.png, or OUT.pdf.")
@@ -223,10 +231,14 @@ def chatter(
     of the third harmonic in s, and "samples" the number of control samples in a period. Where third is above 20 %, or
     samples below 10, the prediction is rough.
 
+    With --amplitude or --frequency the gains of each law are made larger or smaller, in proportion, until the
+    prediction is what was asked for, and the constant disturbance that they bear is measured.
+
     Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
     """
     with held_back():
         from smc_mujoco.analysis.chattering import chattering, save, shared
+        from smc_mujoco.analysis.gains_for import design
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
@@ -249,6 +261,16 @@ def chatter(
     chosen = [options.law(text) for text in options.names(laws, gain_sets.LAWS)]
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
+    designs = []
+    if amplitude is not None or frequency is not None:
+        for one in cases:
+            try:
+                designs.append((one, design(one, amplitude, frequency, channel)))
+            except ScenarioError as error:
+                terminal.note(f"{one.law.name} is left out: {error}", "yellow", wrap=True)
+        if not designs:
+            raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
+        cases = [dataclasses.replace(one, law=chosen.law) for one, chosen in designs]
     with bar("chattering") as drawn:
         cycles = []
         for done, scenario in enumerate(cases):
@@ -257,6 +279,8 @@ def chatter(
         traces = run(cases, threads=threads)
     measured = [of_trace(trace, channel) for trace in traces]
     terminal.print(tables.chattering(cases, channel, cycles, measured))
+    if designs:
+        terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
     if json:

@@ -1,0 +1,200 @@
+"""Gains from a wanted amplitude: the largest gains whose predicted chattering stays below it.
+
+    design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, actuator=smc.Lag(0.01))
+    design.law, design.chattering.frequency, design.disturbance
+
+All gains of a law follow from two numbers, its size q and its speed w. For the same mass, positions become q times as
+large, times 1/w as large, and forces q w^2 times as large. A gain with the unit F^a X^b T^c is multiplied by
+
+    (q w^2)^a q^b w^-c.
+
+Super-twisting has so k1 and k2 in the proportion of its theorem, k1 ~ sqrt(q), k2 ~ q. On a linear mechanism the limit
+cycle of a law that is q times as large is q times as large and has the same frequency. A law that contains a number
+with a unit, such as the width 1 of tanh(s), has no such symmetry, so that the size is searched.
+"""
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+
+from smc_mujoco.analysis import margins
+from smc_mujoco.analysis.chattering import Chattering, chattering
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
+from smc_mujoco.common.progress import bar
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.units import FORCE
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.scenario import Scenario
+
+RANGE = 1e3  # of size: at most so many times the law's own, and at least the inverse
+STEP = 2.0  # from one size to the next until the wanted one lies between
+CLOSE = 1e-3  # relative: the search ends when the size is known so well
+SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Design:
+    """Gains that were chosen by predicted chattering.
+
+    Attributes:
+      law: the law with these gains.
+      chattering: predicted for it.
+      disturbance: the largest constant force that it bears, N m or N, in simulated runs: see `smc.margins`. NaN if it
+        bears none.
+      size, speed: q and w, over the gains that were given.
+    """
+
+    law: Component
+    chattering: Chattering
+    disturbance: float
+    size: float
+    speed: float
+
+
+def gains_for(
+    law: Component | Template | str,
+    plant: Plant | str,
+    amplitude: float | None = None,
+    frequency: float | None = None,
+    channel: int = 0,
+    **fields: object,
+) -> Design:
+    """Return the largest gains whose predicted chattering stays below an amplitude, a frequency or both.
+
+    The amplitude decides the size of the law. A frequency decides its speed, too: the one of 21 speeds, from a tenth of
+    its own to ten times that, that allows the largest forces. Forces among the gains stay at most u_max.
+
+    Args:
+      law: a law or its name. Its gains give the proportions.
+      plant: a plant or its name.
+      amplitude: largest amplitude of s, in its unit.
+      frequency: highest frequency of the limit cycle, Hz. Default: the speed of the law stays.
+      channel: index of a driven channel.
+      fields: other fields of the Scenario, such as actuator, input_delay, control_period, u_max.
+
+    Warns:
+      ScenarioWarning: the law with these gains does not hold the plant.
+
+    Raises:
+      ScenarioError: neither amplitude nor frequency, a gain of unknown unit, or no gains in the range of the search
+        chatter so little.
+    """
+    return design(Scenario(law=law, plant=plant, **fields), amplitude, frequency, channel)  # type: ignore[arg-type]
+
+
+def design(base: Scenario, amplitude: float | None, frequency: float | None = None, channel: int = 0) -> Design:
+    """Return the largest gains for the law of a scenario. Arguments and errors are those of `gains_for`."""
+    if amplitude is None and frequency is None:
+        raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if value is not None:
+            number(name, value, above=0.0)
+    with bar(f"gains of {base.law.name} on {base.plant.name}") as drawn:
+
+        def cycle(size: float, speed: float) -> Chattering:
+            drawn.advance(1.0)
+            return chattering(dataclasses.replace(base, law=_scaled(base.law, size, speed)), channel)
+
+        strength = _strength(base)
+        speed = 1.0 if frequency is None else _speed(lambda w: cycle(1.0, w), amplitude, frequency, strength)
+        size = 1.0
+        if amplitude is not None:
+            size = _largest(lambda q: cycle(q, speed).amplitude, amplitude, strength / speed**2)
+        found = cycle(size, speed)
+        if frequency is not None and found.frequency > frequency:
+            raise ScenarioError(
+                f"{base.law.name} of amplitude {amplitude:g} oscillates at {found.frequency:.3g} Hz, above the wanted "
+                f"{frequency:g}: give a larger frequency, or another amplitude"
+            )
+        chosen = dataclasses.replace(base, law=_scaled(base.law, size, speed))
+        (borne,) = margins.of([chosen], ["disturbance"])
+    if math.isnan(borne.value):
+        warnings.warn(
+            f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",
+            ScenarioWarning,
+            users_frame(),
+        )
+    return Design(law=chosen.law, chattering=found, disturbance=borne.value, size=size, speed=speed)
+
+
+def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, strength: float) -> float:
+    """Return the speed that allows the largest forces, of SPEEDS whose predicted frequency is at most the wanted one.
+
+    The frequency is taken for size 1. It does not depend on the size on a linear mechanism, and is not monotone in the
+    speed.
+    """
+    cycles = {speed: cycle(speed) for speed in SPEEDS if speed**2 <= strength * (1.0 + CLOSE)}
+    slow = {speed: one for speed, one in cycles.items() if not one.frequency > frequency}
+    if not slow:
+        least = min(one.frequency for one in cycles.values())
+        raise ScenarioError(
+            f"frequency is {frequency:g}, and the law oscillates at {least:.3g} Hz at least, at whatever speed: "
+            "give a larger one"
+        )
+
+    def force(speed: float) -> float:
+        allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude
+        size = 1.0 if amplitude is None else min(allowed, RANGE)
+        return min(size * speed**2, strength)
+
+    return max(slow, key=lambda speed: (force(speed), speed))
+
+
+def _scaled(law: Component, size: float, speed: float) -> Component:
+    """Return the law with its size and its speed multiplied; gains that tuning holds stay."""
+    scales = {"F": size * speed**2, "X": size, "T": 1.0 / speed}
+    gains = {name: gain * search_space.size(law, name, scales) for name, gain in law.gains.items()}
+    return dataclasses.replace(law, gains=gains)
+
+
+def _strength(base: Scenario) -> float:
+    """Return how many times larger the forces among the gains can be: until the first is the actuator's limit."""
+    law, u_max = base.law, min(base.limits)
+    rest = np.zeros(base.plant.n)
+    _, g = base.plant.nominal(rest, rest, 0, base.plant.values({}))
+    force = u_max * abs(g) if base.resolved.model == "nominal" else u_max
+    most = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
+    most |= search_space.largest(law, {}, u_max)
+    sizes = [most[name] / abs(gain) for name, gain in law.gains.items() if name in most and 0.0 < abs(gain) < math.inf]
+    return min(sizes, default=math.inf)
+
+
+def _largest(predicted: Callable[[float], float], wanted: float, most: float) -> float:
+    """Return the largest scale up to `most` whose predicted amplitude is at most the wanted one.
+
+    The search begins at the law's own gains and moves in steps until the amplitude, NaN for no limit cycle, crosses the
+    wanted one. If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts
+    as crossing. The amplitude is in proportion to the scale for most laws, so that the first guess is often right.
+    """
+    most = min(most, RANGE)
+    low, high, oscillates = 0.0, math.inf, False
+
+    def tried(scale: float) -> float:
+        nonlocal low, high, oscillates
+        amplitude = predicted(scale)
+        if amplitude > wanted or (oscillates and math.isnan(amplitude)):
+            high = scale
+        else:
+            low, oscillates = scale, not math.isnan(amplitude)
+        return amplitude
+
+    amplitude = tried(min(1.0, most))
+    guess = min(1.0, most) * wanted / amplitude
+    for scale in (guess, guess * (1.0 + CLOSE)):
+        if low < scale < min(high, most * (1.0 + CLOSE)):
+            tried(min(scale, most))
+    while not low:
+        if high < 1.0 / RANGE:
+            raise ScenarioError(
+                f"amplitude is {wanted:g}, and that of gains {RANGE:g} times smaller is {amplitude:.3g}: give more"
+            )
+        amplitude = tried(high / STEP)
+    while low < most and high == math.inf:
+        tried(min(low * STEP, most))
+    while min(high, most) > low * (1.0 + CLOSE):
+        tried(math.sqrt(low * high))
+    return low

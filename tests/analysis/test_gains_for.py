@@ -1,0 +1,69 @@
+"""Gains from a wanted amplitude or frequency of chattering."""
+
+import math
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.metrics.limit_cycle import of_trace
+
+LAG = {"actuator": smc.Lag(0.01)}
+
+
+def test_super_twisting_gets_the_largest_gains_that_keep_the_amplitude_in_the_proportion_of_its_theorem():
+    design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
+    assert 0.99e-3 < design.chattering.amplitude <= 1e-3
+    run = smc.run(smc.Scenario(plant="duffing", law=design.law, x0=0.02, duration=6.0, **LAG))
+    assert of_trace(run)[0] == pytest.approx(1e-3, rel=0.1)
+    own, gains = smc.law("super_twisting").gains, design.law.gains
+    assert gains["k1"] / own["k1"] == pytest.approx(math.sqrt(design.size), rel=1e-9)
+    assert gains["k2"] / own["k2"] == pytest.approx(design.size, rel=1e-9)
+    assert (gains["c"], design.speed) == (own["c"], 1.0)
+    assert 4.0 < design.disturbance <= 6.0  # N, as u is at most 6 N
+
+
+def test_forces_among_the_gains_stay_at_the_actuators_limit():
+    design = smc.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
+    assert design.law.gains["k"] == pytest.approx(2.0)
+    assert design.chattering.amplitude < 1.0
+
+
+def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
+    design = smc.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
+    assert not design.chattering
+    assert design.law.gains["k"] == pytest.approx(10.0)
+    assert design.law.gains["phi"] / smc.law("boundary_layer").gains["phi"] == pytest.approx(design.size)
+
+
+@pytest.mark.filterwarnings("ignore:classical with these gains")
+def test_a_frequency_decides_the_speed():
+    own = smc.law("classical", k=1.0, c=20.0)
+    wanted, fields = 60.0, {"u_max": 10.0, **LAG}
+    with pytest.warns(smc.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
+        design = smc.gains_for(own, "duffing", frequency=wanted, **fields)
+    assert design.chattering.frequency <= wanted
+    assert (design.size, design.law.gains["k"]) == (1.0, pytest.approx(design.speed**2))
+    assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
+    both = smc.gains_for(own, "duffing", amplitude=5e-3, frequency=wanted, **fields)
+    assert 4.95e-3 < both.chattering.amplitude <= 5e-3
+    assert both.chattering.frequency <= wanted
+    assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
+
+
+@smc.law_function(gains={"k": 1.0})
+def without_units(y, gains, memory):
+    return -gains.k * y.v, y.v
+
+
+@pytest.mark.parametrize(
+    ("law", "wanted", "said"),
+    [
+        ("classical", {}, "needs a wanted amplitude, a frequency or both"),
+        ("classical", {"amplitude": -1.0}, "amplitude is -1"),
+        ("classical", {"frequency": 5.0}, "oscillates at 8.* Hz at least"),
+        (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
+    ],
+)
+def test_bad_input_is_one_sentence(law, wanted, said):
+    with pytest.raises(smc.ScenarioError, match=said):
+        smc.gains_for(law, "duffing", **wanted, **LAG)
