@@ -28,6 +28,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.units import FORCE
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.grid import DURATION
 from smc_mujoco.simulation.scenario import Scenario
 
 RANGE = 1e3  # of size: at most so many times the law's own, and at least the inverse
@@ -43,8 +44,8 @@ class Design:
     Attributes:
       law: the law with these gains.
       chattering: predicted for it.
-      disturbance: the largest constant force that it bears, N m or N, in simulated runs: see `smc.margins`. NaN if it
-        bears none.
+      disturbance: the largest constant force that it bears, N m or N, in runs of 10 s: see `smc.margins`. NaN if it
+        does not hold the plant even without one.
       size, speed: q and w, over the gains that were given.
     """
 
@@ -111,7 +112,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
                 f"{frequency:g}: give a larger frequency, or another amplitude"
             )
         chosen = dataclasses.replace(base, law=_scaled(base.law, size, speed))
-        (borne,) = margins.of([chosen], ["disturbance"])
+        (borne,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(borne.value):
         warnings.warn(
             f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",

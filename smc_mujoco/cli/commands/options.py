@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smc_mujoco.common.errors import ScenarioError
+
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -53,8 +55,17 @@ OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or a .json file that `smc-mu
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
-    """Return the names in a,b, or the default if there is no text."""
-    return default if text is None else [name.strip() for name in SEPARATOR.split(text) if name.strip()]
+    """Return the names in a,b, or the default if there is no text.
+
+    Raises:
+      ScenarioError: a text without a name.
+    """
+    if text is None:
+        return default
+    found = [name.strip() for name in SEPARATOR.split(text) if name.strip()]
+    if not found:
+        raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
+    return found
 
 
 def law(text: str) -> "str | Law":
