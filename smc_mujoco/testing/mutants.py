@@ -36,6 +36,7 @@ def survivors(
     gains: str | Sequence[str] | None = None,
     quick: bool = True,
     threads: int | None = None,
+    report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, str]:
     """Return claim -> why no mutant of its first law takes anything from it; none of them should be there.
 
@@ -45,9 +46,11 @@ def survivors(
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
+      report: called with the number of claims done, under a set of gains and a mutant; `evaluations` in all.
     """
     found = as_paper(paper)
-    left = {entry.id: entry for entry in wanted(found, only) if not entry.immune}
+    asked = {entry.id: entry for entry in wanted(found, only) if not entry.immune}
+    left = dict(asked)
     names = sets(found, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
@@ -63,16 +66,30 @@ def survivors(
                     if not mutant:
                         raise
                     yield entry.id, name, None
+                report(1)
 
     true = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
     holding = {id: any(any(sentences(true[id, name] or [], left[id].quantifier)) for name in names) for id in left}
     for mutant in MUTANTS:
+        report((len(asked) - len(left)) * len(names))
         for law in sorted({first_law(entry) for entry in left.values()}):
             about = [entry for entry in left.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
                 if id in left and lost(left[id], true[id, name] or [], evidence, holding[id]):
                     del left[id]
     return {id: KEPT if holding[id] else BLIND for id in left}
+
+
+def evaluations(
+    paper: str | Path | Paper,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = True,
+) -> int:
+    """Return how often `survivors` reports, for a progress bar."""
+    found = as_paper(paper)
+    asked = [entry for entry in wanted(found, only) if not entry.immune]
+    return len(asked) * len(sets(found, gains, quick)) * (1 + len(MUTANTS))
 
 
 def first_law(entry: Entry) -> str:

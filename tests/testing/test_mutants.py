@@ -7,7 +7,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
 from smc_mujoco.studies.audit.paper import new
-from smc_mujoco.testing.mutants import BLIND, KEPT, mutants, survivors
+from smc_mujoco.testing.mutants import BLIND, KEPT, evaluations, mutants, survivors
 
 DATA = """
 title = "t"
@@ -79,7 +79,9 @@ def test_mutants_reverse_the_command_drop_it_or_forget():
      ("moved", "> 2", None), ("picky", "< 2", None)],
 )  # fmt: skip
 def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
-    assert survivors(paper(function, asked)) == ({"1": kept} if kept else {})
+    done = []
+    assert survivors(paper(function, asked), report=done.append) == ({"1": kept} if kept else {})
+    assert sum(done) == evaluations(paper(function, asked)) == 4
 
 
 def test_a_claim_that_says_why_is_not_asked(paper):

@@ -258,6 +258,12 @@ def claims(
     badge: Annotated[
         Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
     ] = None,
+    mutants: Annotated[
+        bool,
+        typer.Option(
+            "--mutants", help="See that the audit can fail: list claims that a law of wrong sign, gain or memory keeps."
+        ),
+    ] = False,
     threads: options.Threads = None,
 ) -> None:
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
@@ -281,6 +287,7 @@ def claims(
         from smc_mujoco.studies.audit.audit import DEFAULT, audit, document, evaluations
         from smc_mujoco.studies.audit.paper import paper as find_paper
         from smc_mujoco.studies.table import Table
+        from smc_mujoco.testing import mutants as testing
 
     terminal = Terminal()
     about = find_paper(paper or DEFAULT)
@@ -304,9 +311,17 @@ def claims(
         print(text)
         return
     tables.print_claims(found, terminal, full=bool(ids))
+    kept: dict[str, str] = {}
+    if mutants:
+        with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
+            kept = testing.survivors(about, ids or None, sets, quick, threads, drawn.advance)
+        lines = [f"claim {id} is {why}" for id, why in kept.items()]
+        terminal.note("\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be.")
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
+    if kept:
+        raise SystemExit(1)
 
 
 @errors_as_sentences()

@@ -22,7 +22,7 @@ from smc_mujoco.common.files import ended, read_json, reading, to_json, write_js
 from smc_mujoco.common.version import __version__
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.audit.paper import Paper
+from smc_mujoco.studies.audit.paper import Paper, shipped
 from smc_mujoco.studies.audit.runs import Used
 from smc_mujoco.studies.run_key import condition, portable_key
 
@@ -67,7 +67,7 @@ def document(audit: "Audit") -> dict[str, Any]:
             "smc_mujoco": __version__,
             **{name: version(name) for name in ("mujoco", "numba", "numpy")},
             "python": f"{sys.version_info.major}.{sys.version_info.minor}",
-            "code": fingerprint.package("studies/papers", "testing", "draw"),
+            "code": fingerprint.package("testing", "draw", *(f"studies/papers/{name}" for name in shipped())),
         },
         "quick": audit.quick,
         "left_out": [id for id in audit.paper.claims if id not in audit.used],

@@ -173,6 +173,10 @@ def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_p
     assert written.exit_code == 0, written.output
     assert "the law is calm" in written.stdout
     assert all(file.is_file() for file in files)
+    asked = CliRunner().invoke(app, ["claims", "1", "--paper", str(folder), "--mutants"])
+    assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), asked.output
+    without = CliRunner().invoke(app, ["claims", "2", "--paper", str(folder), "--mutants"])
+    assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
     checked = CliRunner().invoke(app, ["papers", "--check", str(files[0])])
     assert "the seal is whole: A. Nobody, Small: 1 refuted" in " ".join(checked.stdout.split())
     listed = CliRunner().invoke(app, ["papers"])
