@@ -11,6 +11,9 @@ The conditions are those in which laws are ranked: nominal, noise, delay, a sine
 less and 30 % more mass. Their runs have seeds, noise and initial states (`initial_states`) that no grid uses, so no law
 is judged on runs that it was tuned on.
 
+With a bound on predicted chattering, gains beyond it cost as much as if all runs had failed, and more the further they
+are beyond it.
+
 A failed run has no ITAE. It costs FAILED (2 - t / duration), with t the time of the failure. This is finite, more than
 any other run costs, and decreases with t.
 """
@@ -21,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.chattering import chattering
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
@@ -48,6 +52,8 @@ class Objective:
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
+      chattering: largest predicted amplitude of the limit cycle of s, in its unit, in the first condition, see
+        `smc.chattering`. Gains that exceed it cost more than any others. None: chattering costs its variation only.
       u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or for your own model the limit
         of its strongest motor.
 
@@ -61,6 +67,7 @@ class Objective:
     duration: float = DURATION
     control_period: float = CONTROL_PERIOD
     u_max: float | None = None
+    chattering: float | None = None
 
     def __post_init__(self):
         conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
@@ -70,13 +77,14 @@ class Objective:
         if not isinstance(self.starts, Starts):
             raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
         number("weight", self.weight, least=0.0)
-        for name in ("duration", "control_period", "u_max"):
+        for name in ("duration", "control_period", "u_max", "chattering"):
             if getattr(self, name) is not None:
                 number(name, getattr(self, name), above=0.0)
 
     def __str__(self) -> str:
         terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
         bound = "" if self.u_max is None else f", |u| <= {self.u_max:g}"
+        bound += "" if self.chattering is None else f", predicted chattering of s <= {self.chattering:g}"
         return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
     def describe(self) -> dict[str, Any]:
@@ -118,6 +126,13 @@ class Objective:
         tracking = min(metrics.itae(trace) / start, FAILED)
         bound = trace.scenario.resolved.u_max if self.u_max is None else self.u_max
         return tracking, metrics.tv(trace) / (bound * self.duration)
+
+    def excess(self, case: Scenario) -> float:
+        """Return what predicted chattering above the bound costs, s^2, in proportion to it; 0 below it."""
+        if self.chattering is None:
+            return 0.0
+        amplitude = chattering(case).amplitude
+        return 2.0 * FAILED * len(self.conditions) * amplitude / self.chattering if amplitude > self.chattering else 0.0
 
 
 def restore(data: Mapping[str, Any]) -> Objective:

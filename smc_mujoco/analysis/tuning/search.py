@@ -69,6 +69,7 @@ def tune(
     progress: bool = False,
     conditions: Sequence[Condition | str] | Condition | str | None = None,
     starts: Starts | None = None,
+    chattering: float | None = None,
 ) -> Tuned:
     """Find the law's best gains on the plant, by the rule that is the same for every law.
 
@@ -81,18 +82,21 @@ def tune(
       threads, progress: as in `run`.
       conditions: names or your own conditions, in place of the objective's.
       starts: initial states, see `smc.starts`, in place of the objective's.
+      chattering: largest predicted amplitude of the limit cycle of s, in its unit, in the first condition.
 
     Raises:
       ScenarioError: a law with gains of unknown unit, a plant without scales, or an argument out of range.
 
     Warns:
-      ScenarioWarning: the law's own gains are better than any that were tried.
+      ScenarioWarning: the law's own gains are better than any that were tried, or all chatter more than is wanted.
     """
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     if conditions is not None:
         goal = dataclasses.replace(goal, conditions=conditions)  # pyright: ignore[reportArgumentType]
     if starts is not None:
         goal = dataclasses.replace(goal, starts=starts)
+    if chattering is not None:
+        goal = dataclasses.replace(goal, chattering=chattering)
     budget = whole("budget", budget, 1, MAX_CANDIDATES)
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, coerce.law(law), seed)
@@ -103,7 +107,7 @@ def tune(
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
     tracking, variation = goal.terms(run(cases, threads))
-    before = tracking + goal.weight * variation
+    before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
         ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
         box = _search(ledger, start, seed)
@@ -112,6 +116,13 @@ def tune(
         warnings.warn(
             f"no set of gains tried for {law.name} on {plant.name} is better than the law's own, with an objective of "
             f"{best.objective:.3g} s² instead of {before:.3g} s²: give a larger budget",
+            ScenarioWarning,
+            users_frame(),
+        )
+    if ledger.excess(best.gains):
+        warnings.warn(
+            f"all gains tried for {law.name} on {plant.name} are predicted to chatter with more than "
+            f"{goal.chattering:g}: give a larger budget, or a larger chattering",
             ScenarioWarning,
             users_frame(),
         )
@@ -151,6 +162,7 @@ class _Ledger:
     evaluations: list[Evaluation] = dataclasses.field(default_factory=list)
     finals: list[Evaluation] = dataclasses.field(default_factory=list)
     objectives: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
+    excesses: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
 
     @property
     def best(self) -> Evaluation:
@@ -191,9 +203,16 @@ class _Ledger:
         traces = run([dataclasses.replace(case, law=law) for law in laws for case in cases], self.threads)
         terms = [self.goal.terms(traces[i : i + size]) for i in range(0, len(traces), size)]
         return [
-            Evaluation(gains, tracking + self.goal.weight * variation, tracking, variation)
+            Evaluation(gains, tracking + self.goal.weight * variation + self.excess(gains), tracking, variation)
             for gains, (tracking, variation) in zip(candidates, terms, strict=True)
         ]
+
+    def excess(self, gains: tuple[float, ...]) -> float:
+        """Return what a candidate's predicted chattering costs; it is predicted once."""
+        if gains not in self.excesses:
+            case = self.cases[0]
+            self.excesses[gains] = self.goal.excess(dataclasses.replace(case, law=_with(case.law, self.names, gains)))
+        return self.excesses[gains]
 
 
 def _rounded(gain: float) -> float:

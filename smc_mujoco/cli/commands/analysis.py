@@ -27,6 +27,9 @@ def tune(
     front: Annotated[
         Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
     ] = None,
+    chattering: Annotated[
+        float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
+    ] = None,
     conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b, in place of the seven above.")] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
@@ -61,6 +64,7 @@ def tune(
         progress=True,
         conditions=options.conditions(options.names(conditions), condition) or None,
         starts=options.starts(x0, spread),
+        chattering=chattering,
     )
     terminal.print(tables.tuning(tuned))
     terminal.note(str(tuned.definition))

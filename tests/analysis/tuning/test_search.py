@@ -290,7 +290,11 @@ def test_bad_input_is_one_sentence(changed, message):
 @pytest.mark.parametrize(
     "changed",
     [{"conditions": ("calm",)}, {"conditions": 3}, {"starts": 1.0}, {"conditions": ()}, {"weight": -1.0}]
-    + [{name: value} for name in ("duration", "u_max", "control_period") for value in (0.0, math.inf, "1")],
+    + [
+        {name: value}
+        for name in ("duration", "u_max", "control_period", "chattering")
+        for value in (0.0, math.inf, "1")
+    ],
 )
 def test_a_bad_objective_is_refused(changed):
     with pytest.raises(smc.ScenarioError):
@@ -376,3 +380,25 @@ def test_a_notebook_shows_the_gains_with_their_bounds(found):
     assert f"objective {found.objective:.4g} s²" in shown
     assert f"own gains {found.before:.4g} s²" in shown
     assert "observer_free on duffing" in shown
+
+
+LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))
+LAGGED = Objective(conditions=(LAGGING,), duration=1.0)
+
+
+def predicted(tuned) -> float:
+    return smc.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
+
+
+def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
+    free = tune("duffing", "classical", 20, objective=LAGGED)
+    bound = tune("duffing", "classical", 20, objective=LAGGED, chattering=1e-4)
+    assert predicted(bound) <= 1e-4 < predicted(free)
+    assert bound.objective < FAILED
+    assert "predicted chattering of s <= 0.0001" in str(bound.definition)
+
+
+def test_it_warns_if_all_gains_tried_chatter_too_much():
+    with pytest.warns(smc.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
+        tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12)
+    assert tuned.objective > 2.0 * FAILED
