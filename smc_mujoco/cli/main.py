@@ -29,6 +29,7 @@ COMMANDS = {
     "bench": studies.bench,
     "board": studies.board,
     "identify": rigs.identify,
+    "replay": rigs.replay,
     "margins": analysis.margins,
     "basin": analysis.basin,
     "chatter": analysis.chatter,

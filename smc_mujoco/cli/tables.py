@@ -474,6 +474,14 @@ def _print_claim(claim: Claim, console: Console) -> None:
         console.print(Padding(table, (0, 0, 1, 2)))
 
 
+def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
+    """Return the fit of each twin of a record, percent; one beyond all measure is "falls"."""
+    table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(found.values()))))
+    for name, fit in found.items():
+        table.add_row(name, *(f"{value:z.1f}" if value > -1000.0 else "falls" for value in fit.values()))
+    return table
+
+
 def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     """Return the quantities found, with their errors and what they were, and the fit of each record, by its name."""
     values = titled(

@@ -1,40 +1,57 @@
-"""The figure of an identification: a record beside what the twin predicts, and the residuals."""
+"""The figure of a record beside what twins predict, and their residuals."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smc_mujoco.common.errors import whole
+from smc_mujoco.twins.records import Record
 
-if TYPE_CHECKING:
-    from smc_mujoco.twins.identify import Identified
+MEASURED, PREDICTED = (
+    "#444444",
+    ("#1f77b4", "#d55e00", "#009e73", "#cc79a7"),
+)  # colours that the colour-blind tell apart
 
-MEASURED, PREDICTED = "#444444", "#1f77b4"
 
+def residual_figure(
+    title: str,
+    t: np.ndarray,
+    measured: Record,
+    predicted: Mapping[str, Record],
+    fits: Mapping[str, Mapping[str, float]],
+    path: str | Path,
+) -> list[Path]:
+    """Draw each column of a record, measured and predicted, beside its residuals. Write PATH.svg and PATH.png.
 
-def residual_figure(found: "Identified", path: str | Path, record: int = 0) -> list[Path]:
-    """Draw each column of a record, measured and predicted, above its residual. Write PATH.svg and PATH.png."""
+    Args:
+      t: s, (K,).
+      measured: column -> values, (K,).
+      predicted, fits: name of a twin -> what it predicts, and its fit of each column, percent.
+    """
     from matplotlib.figure import Figure
 
-    whole("record", record, 0, len(found.fits) - 1)
-    predicted, measured, t = found.predictions[record]
-    fit, names = found.fits[record], list(predicted)
-    residuals = {name: measured[name] - predicted[name] for name in names}
+    names = list(measured)
     figure = Figure(figsize=(9.0, 2.6 * len(names)), layout="constrained")
     axes = np.atleast_2d(figure.subplots(len(names), 2, sharex=True, width_ratios=(3, 2)))
-    for (left, right), name in zip(axes, names, strict=True):
-        left.plot(t, measured[name], color=MEASURED, lw=1.0, label="measured")
-        left.plot(t, predicted[name], color=PREDICTED, lw=1.0, label="twin")
+    for k, ((left, right), name) in enumerate(zip(axes, names, strict=True)):
+        left.plot(t, measured[name], color=MEASURED, lw=1.6, label="measured")
+        reached, left_over = [], []
+        for (twin, columns), colour in zip(predicted.items(), PREDICTED * len(predicted), strict=False):
+            residual = measured[name] - columns[name]
+            left.plot(t, columns[name], color=colour, lw=0.9, label=twin)
+            right.plot(t, residual, color=colour, lw=0.7)
+            reached.append(f"{twin} {list(fits[twin].values())[k]:.1f} %")
+            left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
         left.set_ylabel(name)
-        left.set_title(f"fit {fit.get(name, fit.get('u', 0.0)):.1f} %", loc="left", fontsize=9)
-        right.plot(t, residuals[name], color=PREDICTED, lw=0.7)
+        left.set_title(f"fit: {', '.join(reached)}", loc="left", fontsize=9)
         right.axhline(0.0, color=MEASURED, lw=0.6)
-        right.set_title(f"residual, rms {np.sqrt(np.mean(residuals[name] ** 2)):.3g}", loc="left", fontsize=9)
-    axes[0][0].legend(frameon=False, fontsize=8, loc="upper right")
+        right.set_title(f"residual, rms: {', '.join(left_over)}", loc="left", fontsize=9)
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), ncols=5, frameon=False, fontsize=8, loc="outside lower center"
+    )
     for ax in axes[-1]:
         ax.set_xlabel("t (s)")
-    figure.suptitle(found.rig.label, fontsize=10)
+    figure.suptitle(title, fontsize=10)
     base = Path(path).with_suffix("")
     base.parent.mkdir(parents=True, exist_ok=True)
     written = [base.with_suffix(ending) for ending in (".svg", ".png")]

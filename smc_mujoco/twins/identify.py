@@ -104,7 +104,9 @@ class Identified:
         """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png."""
         from smc_mujoco.twins.figure import residual_figure
 
-        return residual_figure(self, path, record)
+        whole("record", record, 0, len(self.fits) - 1)
+        predicted, measured, t = self.predictions[record]
+        return residual_figure(self.rig.label, t, measured, {"twin": predicted}, {"twin": self.fits[record]}, path)
 
 
 Source = Mapping[str, Any] | Trace

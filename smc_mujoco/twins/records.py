@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.simulation import philox
@@ -241,6 +242,11 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     times = period * (np.arange(first, last) - at)
     cubics = [np.polyfit(times, data[name][first:last], 3) for name in columns.x]
     return np.array([cubic[3] for cubic in cubics]), np.array([cubic[2] for cubic in cubics])
+
+
+def rate(values: np.ndarray, period: float) -> np.ndarray:
+    """Return the rate of a column, (K,), by cubics through the samples about each."""
+    return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=1, delta=period))
 
 
 def in_radians(record: Mapping[str, Any], columns: Columns) -> Record:

@@ -189,6 +189,8 @@ class Rig:
             predicted, so `fit` leaves rounding out by default.
           closed: whether to close the loop where the controller is known; else the recorded command is replayed.
         """
+        if self.dynamics is not None:
+            raise ScenarioError(f"records of {self.name} are not repeated, as their torques are predicted: use fit")
         data = self.checked(record)
         period = self.period or records.step_of(data, self.columns)
         first = round((self.start if start is None else start) / period)
@@ -223,6 +225,32 @@ class Rig:
             added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
             known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
         return Scenario.recorded(**fields | known)
+
+    def measured(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Trace:
+        """Return a record as a trace of the machine, for figures and films beside those of twins.
+
+        x and u are what was measured, v is that of cubics through the positions, and what was not measured is 0.
+
+        Args:
+          record, start, duration: as in `replay`, whose scenario the trace has.
+        """
+        scenario = self.replay(record, start, duration, rounded=False)
+        data, period, n = self.checked(record), scenario.control_period, scenario.plant.n
+        first, count = round((self.start if start is None else start) / period), scenario.samples
+        part = slice(first, first + count + 1)
+        bias = scenario.sensor.bias if scenario.sensor else 0.0
+        x, v, u, r = np.zeros((4, count + 1, n))
+        for i, name in enumerate(self.columns.x):
+            x[:, i] = data[name][part] - bias
+            v[:, i] = records.rate(data[name], period)[part]
+        u[:, 0] = data[self.columns.u][part]
+        if self.columns.reference in data:
+            r[:, 0] = data[self.columns.reference][part]
+        t, zero = period * np.arange(count + 1), np.zeros((count + 1, n))
+        return Trace(
+            t=t, x=x, v=v, u=u, applied=u.copy(), s=zero, d=zero.copy(), r=r, force=zero.copy(), reaction=zero.copy(),
+            scenario=scenario,
+        )  # fmt: skip
 
     @property
     def needed(self) -> tuple[str, ...]:

@@ -2,11 +2,14 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import app
 from smc_mujoco.control.rig_controllers import state_feedback
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
@@ -160,3 +163,41 @@ def test_the_delay_is_a_whole_number_of_steps():
     assert late.delay_steps * late.resolved.physics_step == pytest.approx(1e-3)
     assert dataclasses.asdict(QUBE.columns)["x"] == ("theta", "alpha")
     assert qube_servo.PERIOD == 2e-3
+
+
+def test_a_record_is_a_trace_of_what_was_measured(record):
+    """Shifted by the encoder's offset, so that a film shows the machine where its twin counts from."""
+    trace = QUBE.measured(record, start=3.0, duration=1.0)
+    part, bias = slice(1500, 2001), QUBE.values["encoder_offset"]
+    np.testing.assert_allclose(trace.t, record["t"][part] - 3.0, atol=1e-12)
+    np.testing.assert_allclose(trace.x[:, 1], record["alpha"][part] - bias, atol=1e-12)
+    np.testing.assert_array_equal(trace.u[:, 0], record["plant_input"][part])
+    np.testing.assert_array_equal(trace.r[:, 0], record["target_theta"][part])
+    np.testing.assert_allclose(trace.v[:, 0], np.gradient(record["theta"], 2e-3)[part], atol=0.02)
+    assert trace.scenario == QUBE.replay(record, 3.0, 1.0, rounded=False)
+
+
+def test_a_machine_that_does_nothing_follows_its_references(record):
+    idle = QUBE.idle(record | {"theta": record["target_theta"], "alpha": 0.1 * record["target_theta"] + 0.3})
+    assert idle["theta"] == 100.0
+    assert idle["alpha"] < 0.0
+    assert idle["u"] == pytest.approx(0.0, abs=0.5)
+
+
+def test_records_of_torques_are_not_repeated():
+    rig = smc.rig("realaigym_acrobot")
+    with pytest.raises(smc.ScenarioError, match="records of realaigym_acrobot are not repeated, as their torques are"):
+        rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
+
+
+def test_the_command_repeats_a_record(record, tmp_path):
+    np.savez(tmp_path / "run.npz", **record)
+    words = ["replay", "qube_servo", str(tmp_path / "run.npz"), "--quantities", "driver"]
+    done = CliRunner().invoke(app, [*words, "--figure", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    assert re.search(r"twin +(99|100)\.\d +(99|100)\.\d +(99|100)\.\d", done.output)
+    assert re.search(r"driver +-?\d", done.output)
+    assert (tmp_path / "run.svg").stat().st_size > 1000
+    wrong = CliRunner().invoke(app, [*words[:-1], "drivers"])
+    assert wrong.exit_code == 2
+    assert "unknown parameter set of qube_servo 'drivers': did you mean 'driver'?" in wrong.output

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
 
+Columns = Annotated[
+    str | None,
+    typer.Option(help="Names of columns where they differ from the rig's, as theta=arm_angle,plant_input=voltage."),
+]
 Conditions = Annotated[
     list[str] | None,
     typer.Option(
@@ -65,6 +69,19 @@ def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
     found = [name.strip() for name in SEPARATOR.split(text) if name.strip()]
     if not found:
         raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
+    return found
+
+
+def columns(text: str | None) -> dict[str, str]:
+    """Return the rig's name of a column -> the file's, from theta=arm_angle,t=time."""
+    from smc_mujoco.common.errors import ScenarioError
+
+    found = {}
+    for pair in names(text):
+        ours, equals, theirs = pair.partition("=")
+        if not (ours and equals and theirs):
+            raise ScenarioError(f"columns {pair!r} cannot be read: write them as theta=arm_angle,t=time")
+        found[ours.strip()] = theirs.strip()
     return found
 
 

@@ -1,4 +1,4 @@
-"""smc-mujoco identify: quantities of a rig from records of it."""
+"""smc-mujoco identify, replay: quantities of a rig from records of it, and records beside their twins."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,10 +16,7 @@ def identify(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns, or saved traces.")
     ],
-    columns: Annotated[
-        str | None,
-        typer.Option(help="Names of columns where they differ, as theta=arm_angle,plant_input=voltage."),
-    ] = None,
+    columns: options.Columns = None,
     quantities: Annotated[
         str | None, typer.Option(help="Quantities to find, as a,b; default those that the rig's records determine.")
     ] = None,
@@ -41,7 +38,6 @@ def identify(
     """
     with held_back():
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.twins.identify import identify as find
         from smc_mujoco.twins.records import load
@@ -50,12 +46,7 @@ def identify(
     for file in (figure, json):
         if file:
             writable(file)
-    terminal, twin, named = Terminal(), find_rig(rig), {}
-    for pair in options.names(columns):
-        ours, equals, theirs = pair.partition("=")
-        if not (ours and equals and theirs):
-            raise ScenarioError(f"columns {pair!r} cannot be read: write them as theta=arm_angle,t=time")
-        named[ours.strip()] = theirs.strip()
+    terminal, twin, named = Terminal(), find_rig(rig), options.columns(columns)
     found = find(
         twin,
         [load(file, named) for file in files],
@@ -73,3 +64,65 @@ def identify(
         terminal.wrote(found.save(ended(json, ".json")))
     if figure:
         terminal.wrote(*found.figure(figure))
+
+
+@errors_as_sentences()
+def replay(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo or simple_pendulum_ak80.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],
+    columns: options.Columns = None,
+    quantities: Annotated[
+        str | None, typer.Option(help="Published sets of quantities that repeat it too, as a,b; default none.")
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option(min=0.0, help="Where the film starts, s; default where the rig's replays do.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw columns and residuals, as FIGURE.svg and FIGURE.png.")
+    ] = None,
+    film: Annotated[Path | None, typer.Option(help="Also film them side by side, to a .mp4 file.")] = None,
+) -> None:
+    """Repeat a record of a real machine by its twin, and show both side by side.
+
+    The twin starts from the measured state. Where the machine's controller is known, only references come from the
+    record and the loop is closed; else the recorded command is repeated. The table has the fit of the whole record,
+    100 (1 - |y - yhat| / |y - mean y|) percent, beside that of a machine that does nothing.
+
+    Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.cli.scene import filmed
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import writable
+        from smc_mujoco.simulation.run import run
+        from smc_mujoco.simulation.trace import Trace
+        from smc_mujoco.twins.records import load
+        from smc_mujoco.twins.rig import rig as find_rig
+
+    terminal, twin = Terminal(), find_rig(rig)
+    if film and film.suffix != ".mp4":
+        raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
+    for path in (figure, film):
+        if path:
+            writable(path)
+    record = load(file, options.columns(columns))
+    if isinstance(record, Trace):
+        raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")
+    twins = {"twin": twin} | {name: twin.set(name) for name in options.names(quantities)}
+    fits = {"twin": twin.fit(record)} | {name: each.fits([record])[0] for name, each in twins.items() if name != "twin"}
+    terminal.print(tables.fits(twin.label, fits | {"do nothing": twin.idle(record)}))
+    title = f"{twin.name}: {file.stem}"
+    if figure:
+        from smc_mujoco.twins.figure import residual_figure
+
+        shown = {name: each.predictions([record])[0] for name, each in twins.items()}
+        predicted = {name: each[0] for name, each in shown.items()}
+        terminal.wrote(*residual_figure(title, shown["twin"][2], shown["twin"][1], predicted, fits, figure))
+    if film:
+        repeated = run([each.replay(record, start, duration, rounded=False) for each in twins.values()])
+        traces = [twin.measured(record, start, duration), *repeated]
+        terminal.wrote(*filmed(traces, film, ["measured", *twins], title, terminal))
