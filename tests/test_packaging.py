@@ -256,12 +256,17 @@ def test_an_extra_that_is_missing_is_one_sentence_where_it_is_needed(refused, co
 
 
 def test_a_scene_without_the_extra_of_films_says_so_and_does_the_rest(tmp_path):
+    (tmp_path / "short.py").write_text("""
+import smc_mujoco as smc
+run = smc.Scenario(plant="duffing", law="classical", duration=0.05)
+scene = smc.Scene(title="Short", conditions={"nominal": {"only": run}})
+""")
     code = """
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common import gl
 gl.missing = lambda: None
 try:
-    cli.main(["run", "duffing"])
+    cli.main(["run", "short.py"])
 except SystemExit as end:
     assert not end.code
 """

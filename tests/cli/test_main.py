@@ -300,29 +300,15 @@ def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_t
 
 
 def test_where_rendering_is_turned_off_all_but_the_film_is_written_and_one_line_says_so(scene, folder):
+    """And the next process loads the law of the scene's file from numba's cache."""
     code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
-    done = python("-c", code, "run", scene, "--out", "out", cwd=folder, MUJOCO_GL="disabled")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert {path.name for path in (folder / "out").iterdir()} == FILES
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
-    assert "MUJOCO_GL" in line
-
-
-def test_a_scene_files_law_is_loaded_from_numbas_cache_by_the_next_process(scene, folder):
-    code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
-    for out in ("one", "two"):
-        done = python(
-            "-c",
-            code,
-            "run",
-            scene,
-            "--out",
-            out,
-            cwd=folder,
-            MUJOCO_GL="disabled",
-            NUMBA_CACHE_DIR=str(folder / "numba"),
-        )
+    undrawn = f"from smc_mujoco.cli import scene; scene.figures = lambda *_: []; {code}"
+    for out, script in (("first", code), ("next", undrawn)):
+        done = python("-c", script, "run", scene, "--out", out, cwd=folder, MUJOCO_GL="disabled")
         assert (done.returncode, done.stderr) == (0, "")
+        (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
+        assert "MUJOCO_GL" in line
+    assert {path.name for path in (folder / "first").iterdir()} == FILES
 
 
 # show
