@@ -9,6 +9,7 @@ in C counts by its machine code. File names, line numbers and comments do not co
 Python.
 """
 
+import contextlib
 import functools
 import hashlib
 import io
@@ -70,16 +71,25 @@ def package(*without: str) -> str:
 def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
-    That of a function, a class or a tuple is the same as at the first call, whatever has changed since.
+    That of a function or a class of this package is computed once. That of another one is what it is now, until it is
+    compiled: see `hold`.
 
     Raises:
       ScenarioError: it holds something that can be neither read nor pickled.
     """
-    unchanging = isinstance(thing, FunctionType | type | tuple)
     try:
-        return _cached(thing) if unchanging else now(thing)
+        return _held[thing] if thing in _held else _cached(thing) if _ours(thing) else now(thing)
     except TypeError:  # not hashable
         return now(thing)
+
+
+def hold(thing: Any) -> None:
+    """Keep the hash that a function or a class has as it is compiled: its code keeps the globals that it has now.
+
+    The first one stays. What has no hash keeps none.
+    """
+    with contextlib.suppress(ScenarioError):
+        _held.setdefault(thing, of(thing))
 
 
 def now(thing: Any) -> str:
@@ -94,7 +104,12 @@ def now(thing: Any) -> str:
     return hashlib.sha256(buffer.getvalue()).hexdigest()
 
 
-_cached = functools.cache(now)  # a compiled law keeps the globals that it was compiled with, so does its hash
+_held: dict[Any, str] = {}  # functions and classes that were compiled, and their hashes then
+_cached = functools.cache(now)
+
+
+def _ours(thing: Any) -> bool:
+    return isinstance(thing, FunctionType | type) and thing.__module__.startswith(f"{PACKAGE.name}.")
 
 
 class _CodePickler(pickle._Pickler):

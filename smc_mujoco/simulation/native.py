@@ -47,7 +47,9 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
             output[0], output[1] = first, second
         return not ok
 
-    return Function(native, _cached(function, kind, gains, memory))
+    made = Function(native, _cached(function, kind, gains, memory))
+    fingerprint.hold(function)
+    return made
 
 
 @intrinsic
@@ -88,7 +90,9 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    return Function(native, _cached(kind.value, names, random, series, memory))
+    made = Function(native, _cached(kind.value, names, random, series, memory))
+    fingerprint.hold(kind)
+    return made
 
 
 @functools.cache
@@ -107,14 +111,16 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
             output[0], output[1] = f, g
         return not ok
 
-    return Function(native, _cached(function, names))
+    made = Function(native, _cached(function, names))
+    fingerprint.hold(function)
+    return made
 
 
 def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
     """Return the name and the hash under which a compiled function is kept on disk.
 
-    It is False, for none, if the function has no hash, or if a global of it has changed since it was hashed first: the
-    code has the present value.
+    It is False, for none, if the function has no hash, or if a global of it has changed since it was compiled first, as
+    for other gains: the code has the present value.
     """
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function.__qualname__}")
     try:

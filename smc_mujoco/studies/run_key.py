@@ -98,7 +98,7 @@ def _codes(s: Scenario) -> list[str]:
     own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
     if not s.plant.build.__module__.startswith(PACKAGE):
         builds = *s.plant.contacts.items(), *s.plant.mechanisms.items()
-        own.append((s.plant.build, s.plant.fields, s.plant.nominal, builds))
+        own += [s.plant.build, s.plant.fields, s.plant.nominal, builds]
     elif not s.plant.nominal.__module__.startswith(PACKAGE):
         own.append(s.plant.nominal)
     return [fingerprint.of(thing) for thing in (*functions, *signals, *own)]

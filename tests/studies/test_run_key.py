@@ -129,6 +129,22 @@ def test_a_key_does_not_depend_on_the_process():
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
 
 
+def test_a_global_changes_a_run_until_its_law_is_compiled():
+    """Compiled code keeps its globals. A study whose runs are all stored compiles nothing."""
+    space = {"__name__": "users", "G": 3.0}
+    exec("def late(y, gains, memory):\n    return -G * y.e, y.e", space)
+    law = smc.law_function(space["late"])()
+    one, other = (smc.Scenario(plant="duffing", law=law, duration=0.01, x0=x) for x in (0.5, 0.6))
+    before = key(one)
+    space["G"] = 5.0
+    assert key(one) != before
+    made = key(other)
+    assert smc.run(other).u[0, 0] == -5.0 * 0.6
+    space["G"] = 7.0
+    assert key(other) == made
+    assert smc.run(other).u[0, 0] == -5.0 * 0.6
+
+
 def test_a_function_that_reaches_itself_has_a_fingerprint():
     def loop(n):
         return loop(n - 1) if n else 0
