@@ -1,0 +1,1 @@
+"""Paper acary_2012: claims in paper.toml, measured in claims.py."""
