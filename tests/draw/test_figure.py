@@ -76,6 +76,11 @@ def test_writes_svg_and_png_with_names_and_units(pair, tmp_path):
     assert [p.name for p in svg.parent.iterdir()] in (["a.svg", "a.png"], ["a.png", "a.svg"])  # nothing else
 
 
+def test_a_figure_that_was_written_is_laid_out_anew_when_it_is_shown(pair, tmp_path):
+    page = draw_figure.figure(pair, tmp_path / "a", format="svg")
+    assert page.get_layout_engine() is not None
+
+
 def test_same_traces_give_the_same_files(pair, tmp_path):
     first, second = figure(pair, tmp_path / "a", None), figure(pair, tmp_path / "b", None)
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
@@ -95,6 +100,9 @@ def test_a_diverged_run_is_named_and_does_not_squash_the_others(pair, tmp_path):
     traces = [pair[0], broken(pair[1], 400)]
     (svg,) = figure(traces, tmp_path / "a")
     assert "Classical (diverged at 0.4 s)" in words(svg)
+    page = draw_figure.figure(traces)
+    ends = [line.get_xdata()[0] for ax in page.axes for line in ax.lines if line.get_marker() == "X"]
+    assert ends[:3] == [pytest.approx(0.399)] * 3  # in the panels of x, v and u over time
     assert panels.limits(traces, "x") == panels.limits(pair[:1], "x")
     figure([broken(pair[1], 1)], tmp_path / "b")  # one finite sample
 
@@ -389,6 +397,8 @@ def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
     text = words(figure([hit], tmp_path / "a")[0])
     assert f"|reaction| up to {np.abs(hit.reaction).max():.3g} N" in text
     assert "|reaction|" not in words(figure([realistic(friction=Coulomb(0.5))], tmp_path / "b")[0])
+    (ax,) = (ax for ax in draw_figure.figure([hit]).axes if ax.get_ylabel() == "reaction (N)")
+    assert ax.get_ylim()[1] < 0.5 * np.abs(hit.reaction).max()
 
 
 def test_a_realistic_network_has_the_mean_of_its_reactions(tmp_path):

@@ -83,9 +83,10 @@ def test_plants_sizes_and_durations_mix_in_one_call():
         scenario(plant="duffing", duration=0.03),
         scenario(plant="duffing", integrator="Euler"),
         scenario(plant="duffing", control_period=2e-3),
+        scenario(plant="duffing", physics_step=5e-4),
     ]
     traces = smc.run(many)
-    assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1)]
+    assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1), (21, 1)]
     assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
 
 

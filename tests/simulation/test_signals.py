@@ -149,11 +149,12 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
     size = {"n": 3} if smc.plant(name).n > 1 else {}
     common = {"plant": smc.plant(name, **size), "law": "none", "x0": angle, "duration": 1e-3, "physics_step": 1e-5}
     base, gust, push = (
-        smc.run(scenario(**common, disturbance=d)).v[-1]
+        smc.run(scenario(**common, disturbance=d))
         for d in (None, Gust(2.0, -1.0, 2.002), Constant(2.0 * math.cos(angle)))
     )
     length = smc.plant(name).parameters["l"]
-    np.testing.assert_allclose(gust - base, length * (push - base), rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4)  # and is logged as it acts
 
 
 @pytest.mark.parametrize("step", [1e-3, 5e-4, 2.5e-4, 1e-4])
@@ -209,6 +210,8 @@ def test_the_frequencies_of_band_limited_noise_share_the_band_out():
     part = (memory[:TERMS] / (2 * math.pi) - 5.0) / 10.0 * TERMS
     assert np.floor(part).tolist() == list(range(TERMS))
     assert np.std(part % 1.0) > 0.2
+    assert abs(np.corrcoef(part, memory[TERMS:])[0, 1]) < 0.5
+    assert abs(np.corrcoef(part % 1.0, memory[TERMS:])[0, 1]) < 0.5  # a phase does not tell its frequency
     assert np.all((memory[TERMS:] >= 0.0) & (memory[TERMS:] < 2 * math.pi))
 
 
