@@ -1,23 +1,27 @@
-"""Rendering that draws again only the part of the picture that has changed.
+"""Rendering that draws again only the parts of the picture that have changed.
 
-Software OpenGL takes time in proportion to the pixels and the shapes that it draws. A new picture is the one before,
-with a rectangle in it drawn anew: the smallest one around all that moved, where it was and where it is, with shadows.
-Shapes outside the rectangle are left out meanwhile.
+Software OpenGL takes time in proportion to the pixels and the shapes that it draws. So a new picture is a copy of the
+one before, in which some rectangles are drawn again: those around everything that moved, where it was and where it is,
+and around its shadow. Shapes outside a rectangle are left out of its drawing.
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera, scene, shadows
+from smc_mujoco.draw.film.arrows import DRAWN
 
 MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
-MARGIN = 3  # px around what has changed, for smoothed edges and soft shadows
-HIDDEN = 5  # group of geoms and skins that are left out
-GEOM = mujoco.mjtObj.mjOBJ_GEOM
+MARGIN = 3  # px around what has changed, for smoothed edges
+FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, and as each shape in it; measured
+SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
+GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
+ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
+NOTHING = mujoco.mjtGeom.mjGEOM_NONE
 Add = Callable[[mujoco.MjvScene], None]
 Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bottom
 
@@ -32,81 +36,111 @@ class Canvas:
         self.steady = not any(model.light_castshadow & model.light_active)  # where lamps' shadows fall is not foretold
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
         self.casts = shadows.casting(model, middle * camera.pixel(size))
+        if roundness(model) < SMALL * middle * camera.pixel(size):
+            model.vis.quality.numstacks = FEW  # of cylinders too, which are drawn in half the time
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
-        self.groups = model.geom_group.copy(), model.skin_group.copy()
-        self.bounded = np.append(model.geom_type != scene.PLANE, np.ones(model.nskin, bool))
-        self.shapes = self.others = np.empty((0, 0, 2))
+        bounded = [model.geom_type != scene.PLANE, np.ones(model.nskin, bool), self.casts & (self.sun is not None)]
+        self.bounded = np.concatenate(bounded)
+        self.shapes = self.others = np.empty((0, 8, 2))
         self.picture = np.empty(0, np.uint8)
 
     def close(self) -> None:
         """Close the renderer."""
         self.renderer.close()
 
-    def draw(self, add: Add = lambda scene: None, anew: bool = False) -> np.ndarray:
+    def draw(self, add: Add = lambda scene: None, whole: bool = False) -> np.ndarray:
         """Return the picture of `data` as it is, (height, width, 3) uint8, read-only.
 
         Args:
           add: adds shapes to the scene, such as arrows.
-          anew: whether all of it is drawn, as after changes of the model that are no motion.
+          whole: whether to draw the whole picture, as after a change of colours.
         """
+        shown = self.renderer.scene
         self.renderer.update_scene(self.data, camera="film")
-        add(self.renderer.scene)
-        shapes, others = self.seen_shapes(), self.seen_others()
-        whole = 0, 0, *self.size
-        first = not self.picture.size
-        area = whole if anew or first or not self.steady else self.changed(shapes, others)
-        if area is None:
-            return self.picture
-        if area == whole:
-            self.shapes, self.others = shapes, others
+        add(shown)
+        geoms = list(shown.geoms[: shown.ngeom])
+        others = [geom for geom in geoms if geom.objtype not in (GEOM, SKIN)]
+        shapes, loose = self.seen_shapes(), self.seen_others(others)
+        if whole or not self.picture.size or not self.steady:
+            areas = [(0, 0, *self.size)]
+            self.shapes, self.others = shapes, loose
         else:
-            self.hide(self.bounded & outside(around(shapes), area))
-            self.renderer.update_scene(self.data, camera="film")
-            add(self.renderer.scene)
-            self.model.geom_group[:], self.model.skin_group[:] = self.groups
+            areas = self.changed(shapes, loose)
+        if not areas:
+            return self.picture
+        casting = []
         if self.sun is not None:
-            shadows.draw(self.renderer.scene, self.sun, self.casts, self.model.stat.extent)
-        left, top, right, bottom = area
-        picture = np.empty((self.size[1], self.size[0], 3), np.uint8) if area == whole else self.picture.copy()
-        picture[top:bottom, left:right] = self.render(area)
+            casting = shadows.draw(shown, self.sun, self.casts, self.model.stat.extent)
+        boxes = self.boxes(geoms, casting, around(shapes), around(loose))
+        areas = joined(areas, lambda area: pixels(area) + FIXED + SHAPE * int((~outside(boxes, area)).sum()))
+        geoms = list(shown.geoms[: shown.ngeom])
+        picture = self.picture.copy() if self.picture.size else np.empty((self.size[1], self.size[0], 3), np.uint8)
+        views = [eye.frustum_top for eye in shown.camera]
+        for area in areas:
+            left, top, right, bottom = area
+            away = [geoms[i] for i in np.flatnonzero(outside(boxes, area))]
+            kinds = [geom.type for geom in away]
+            for geom in away:
+                geom.type = NOTHING
+            picture[top:bottom, left:right] = self.render(area, views)
+            for geom, kind in zip(away, kinds, strict=True):
+                geom.type = kind
         picture.flags.writeable = False
         self.picture = picture
         return picture
 
-    def hide(self, away: np.ndarray) -> None:
-        """Leave some geoms and skins, a mask (geoms + skins,), out of the scene."""
-        self.model.geom_group[away[: self.model.ngeom]] = HIDDEN
-        self.model.skin_group[away[self.model.ngeom :]] = HIDDEN
+    def boxes(self, geoms: Sequence, casting: Sequence[int], shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Return the rectangle of each geom of a scene and then of their shadows, (geoms + shadows, 4) px.
+
+        Args:
+          geoms: those of the scene, without shadows.
+          casting: index in `geoms` of what casts each shadow.
+          shapes, others: rectangles of what `seen_shapes` and `seen_others` return, (n, 4) px.
+        """
+        model, loose, found, cast = self.model, iter(range(len(others))), [], {}
+        for i, geom in enumerate(geoms):
+            if geom.objtype == GEOM and model.geom_type[geom.objid] == scene.PLANE:
+                found.append(np.array([-np.inf, -np.inf, np.inf, np.inf]))
+            elif geom.objtype in (GEOM, SKIN):
+                found.append(shapes[geom.objid + model.ngeom * (geom.objtype == SKIN)])
+            else:
+                found.append(others[next(loose)])
+            if geom.objtype == GEOM:
+                cast[i] = shapes[model.ngeom + model.nskin + geom.objid]
+        tendons = [i for i, geom in enumerate(geoms) if geom.objtype == TENDON]
+        cast |= {i: others[next(loose)] for i in tendons}
+        return np.array([*found, *(cast[i] for i in casting)]).reshape(-1, 4)
 
     def seen_shapes(self) -> np.ndarray:
-        """Return corners of each geom and skin and of its shadow in the picture, (geoms + skins, m, 2) px."""
+        """Return where each geom, each skin and the shadow of each geom is in the picture: (shapes, 8, 2) px."""
         seen, found = self.renderer.scene, [scene.boxes(self.model, self.data)]
         vertices = np.asarray(seen.skinvert, float).reshape(-1, 3)
         for start, count in zip(seen.skinvertadr[: seen.nskin], seen.skinvertnum[: seen.nskin], strict=True):
             part = vertices[start : start + count]
             found.append(corners(part.min(axis=0), part.max(axis=0))[None])
-        return self.seen(np.concatenate(found))
+        return self.seen(np.concatenate([*found, self.cast(found[0])]))
 
-    def seen_others(self) -> np.ndarray:
-        """Return the same, (shapes, m, 2) px, of what is no geom of the model, such as arrows and tendons."""
-        geoms = [geom for geom in self.renderer.scene.geoms[: self.renderer.scene.ngeom] if geom.objtype != GEOM]
-        half = [np.array(geom.size) * (2.0, 2.0, 2.0) + 2.0 * geom.size[0] for geom in geoms]  # an arrow is inside
-        points = [corners(-h, h) @ geom.mat.T + geom.pos for geom, h in zip(geoms, half, strict=True)]
-        return self.seen(np.array(points).reshape(-1, 8, 3))
+    def seen_others(self, others: Sequence) -> np.ndarray:
+        """Return the same of geoms of the scene that are not the model's, such as arrows and tendons."""
+        points = [corners(*reach(geom)) @ geom.mat.T + geom.pos for geom in others]
+        boxes = np.array(points).reshape(-1, 8, 3)
+        return self.seen(np.concatenate([boxes, self.cast(boxes[[geom.objtype == TENDON for geom in others]])]))
+
+    def cast(self, points: np.ndarray) -> np.ndarray:
+        """Return the shadows of points (n, 8, 3) on the floor, (n, 8, 3); the points themselves if there are none."""
+        if self.sun is None:
+            return points
+        return points - np.maximum(points[..., 2:], 0.0) / self.sun[2] * self.sun
 
     def seen(self, points: np.ndarray) -> np.ndarray:
-        """Return where points (shapes, m, 3) and their shadows on the floor are in the picture, (shapes, k m, 2) px."""
-        height = np.maximum(points[..., 2:], 0.0)
-        if self.sun is not None:
-            points = np.concatenate([points, points - height / self.sun[2] * self.sun], axis=1)
-        flat = camera.project(points.reshape(-1, 3), self.turn, self.place, self.size)
-        return flat.reshape(*points.shape[:2], 2)
+        """Return where points (n, 8, 3) are in the picture, (n, 8, 2) px."""
+        return camera.project(points.reshape(-1, 3), self.turn, self.place, self.size).reshape(-1, 8, 2)
 
-    def changed(self, shapes: np.ndarray, others: np.ndarray) -> Area | None:
-        """Return the rectangle that must be drawn again; None if nothing has moved since it was last drawn."""
+    def changed(self, shapes: np.ndarray, others: np.ndarray) -> list[Area]:
+        """Return the rectangles that must be drawn again: none if nothing has moved since it was last drawn."""
         moved = self.bounded & (np.abs(shapes - self.shapes).max(axis=(1, 2)) > MOVED)
-        parts = [around(shapes[moved]), around(self.shapes[moved])]
+        parts = [around(np.concatenate([shapes[moved], self.shapes[moved]], axis=1))]
         self.shapes[moved] = shapes[moved]
         gap = np.full((len(others), len(self.others)), np.inf)
         if gap.size:
@@ -114,19 +148,17 @@ class Canvas:
         new, gone = gap.min(axis=1, initial=np.inf) > MOVED, gap.min(axis=0, initial=np.inf) > MOVED
         parts += [around(others[new]), around(self.others[gone])]
         self.others = np.concatenate([self.others[~gone], others[new]]) if gap.size else others
-        parts = np.concatenate(parts)
-        if not len(parts):
-            return None
-        low, high = np.floor(parts[:, :2].min(axis=0)) - MARGIN, np.ceil(parts[:, 2:].max(axis=0)) + MARGIN
-        left, top, right, bottom = np.clip([*low, *high], 0, [*self.size, *self.size]).astype(int).tolist()
-        return (left, top, right, bottom) if left < right and top < bottom else None
+        boxes = np.concatenate(parts)
+        boxes = np.concatenate([np.floor(boxes[:, :2]) - MARGIN, np.ceil(boxes[:, 2:]) + MARGIN], axis=1)
+        boxes = boxes.clip(0, [*self.size, *self.size]).astype(int)
+        inside = [(a, b, c, d) for a, b, c, d in boxes.tolist() if a < c and b < d]
+        return joined(inside, lambda area: pixels(area) + FIXED)
 
-    def render(self, area: Area) -> np.ndarray:
-        """Return a part of the picture."""
+    def render(self, area: Area, views: Sequence[float]) -> np.ndarray:
+        """Return a part of the picture; the whole view of each of the scene's cameras is from -`view` to `view`."""
         left, top, right, bottom = area
         (width, height), renderer = self.size, self.renderer
-        for eye in renderer.scene.camera:
-            high = eye.frustum_top  # before, the view is from -high to high
+        for eye, high in zip(renderer.scene.camera, views, strict=True):
             px = 2 * high / height
             eye.frustum_top, eye.frustum_bottom = high - px * top, high - px * bottom
             eye.frustum_center, eye.frustum_width = px * ((left + right) - width) / 2, px * (right - left) / 2
@@ -152,10 +184,51 @@ def around(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
 
 
+def joined(areas: Sequence[Area], load: Callable[[Area], int]) -> list[Area]:
+    """Return fewer rectangles that cover all: two are joined where this lowers their load, the time to draw them."""
+    found: list[Area] = []
+    for area in areas:
+        new, k = area, 0
+        while k < len(found):
+            a, b, c, d = found[k]
+            one = min(a, new[0]), min(b, new[1]), max(c, new[2]), max(d, new[3])
+            k += 1
+            if load(one) <= load(found[k - 1]) + load(new):
+                del found[k - 1]
+                new, k = one, 0  # it may now be close to those that were too far away
+        found.append(new)
+    return found
+
+
+def pixels(area: Area) -> int:
+    """Return the number of pixels in an area."""
+    return (area[2] - area[0]) * (area[3] - area[1])
+
+
+def roundness(model: mujoco.MjModel) -> float:
+    """Return the largest radius of the model's round shapes, m; 0 without any."""
+    size = np.where(
+        model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE, model.geom_size[:, 0], model.geom_size.max(axis=1)
+    )
+    return float(size[np.isin(model.geom_type, ROUND)].max(initial=0.0))
+
+
 def outside(boxes: np.ndarray, area: Area) -> np.ndarray:
     """Return which rectangles (n, 4) have nothing in common with an area, (n,)."""
     left, top, right, bottom = area
     return (boxes[:, 0] > right) | (boxes[:, 2] < left) | (boxes[:, 1] > bottom) | (boxes[:, 3] < top)
+
+
+def reach(geom: mujoco.MjvGeom) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest corner of a box in a geom's frame, (3,) m, that has all of the geom in it."""
+    width, _, long = geom.size
+    if geom.type == mujoco.mjtGeom.mjGEOM_ARROW:  # its head is 1.75 times as wide
+        return np.array([-2.0 * width, -2.0 * width, 0.0]), np.array([2.0 * width, 2.0 * width, DRAWN * long])
+    if geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        half = np.array([width, width, long + width])
+    else:
+        half = 2.0 * (geom.size + width)  # sizes of some kinds are not in all directions
+    return -half, half
 
 
 def corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:

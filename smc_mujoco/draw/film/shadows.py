@@ -30,17 +30,20 @@ def casting(model: mujoco.MjModel, pixel: float) -> np.ndarray:
     return (np.sort(model.geom_aabb[:, 3:], axis=1)[:, 1] > least) & (model.geom_type != PLANE)
 
 
-def draw(scene: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> None:
-    """Add the shadows of a scene's geoms, (geoms,) as `casting` returns, and of its tendons."""
+def draw(scene: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> list[int]:
+    """Add the shadows of a scene's geoms, (geoms,) as `casting` returns, and of its tendons; return what casts each."""
     cast, rise = flattening(way), np.array([0.0, 0.0, HEIGHT * extent])
     rgba = np.array([*np.array(TINT) / EMISSION, 1.0], np.float32)
-    for shape in list(scene.geoms[: scene.ngeom]):
+    casting: list[int] = []
+    for i, shape in enumerate(list(scene.geoms[: scene.ngeom])):
         if shape.rgba[3] < 1.0 or not (casts[shape.objid] if shape.objtype == GEOM else shape.objtype == TENDON):
             continue
         if scene.ngeom >= scene.maxgeom:
-            return
+            return casting
         shadow = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(shadow, shape.type, shape.size, cast @ shape.pos + rise, (cast @ shape.mat).ravel(), rgba)
         shadow.dataid, shadow.objtype, shadow.emission = shape.dataid, mujoco.mjtObj.mjOBJ_UNKNOWN, EMISSION
         shadow.specular = 0.0
         scene.ngeom += 1
+        casting.append(i)
+    return casting

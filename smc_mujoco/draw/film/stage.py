@@ -147,8 +147,8 @@ class Stage:
             for k, i, arrow in drawn:
                 arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
 
-        anew, self.changed = self.changed, False
-        return self.canvas.draw(add, anew)
+        whole, self.changed = self.changed, False
+        return self.canvas.draw(add, whole)
 
     def ghost(self, shown: mujoco.MjvScene, links: np.ndarray) -> None:
         """Add translucent copies of geoms, posed as the reference wants them."""

@@ -5,7 +5,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, shadows
+from smc_mujoco.draw.film import camera, canvas, shadows
 from smc_mujoco.draw.film.arrows import Arrow
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.stage import Stage
@@ -16,7 +16,7 @@ SEEN = 24  # of 255: a sample of a smoothed edge more or less is no difference
 
 
 def stage(plant: str, **fields) -> Stage:
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=1.0, **fields))
+    trace = smc.run(smc.Scenario(plant=plant, duration=1.0, **{"law": "none"} | fields))
     return Stage([trace, trace], ["#0072B2", "#D55E00"], SIZE, ROOM)
 
 
@@ -40,7 +40,7 @@ def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
 )
 def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypatch):
     """Shadows and springs too; the first machine stands still."""
-    areas, whole = [], lambda *_: (0, 0, *SIZE)
+    areas, whole = [], lambda *_: [(0, 0, *SIZE)]
     changed = Canvas.changed
 
     def noted(self, *shapes):
@@ -52,10 +52,37 @@ def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypat
         parts = pictures(shown, push)
         monkeypatch.setattr(Canvas, "changed", whole)
         wholes = pictures(shown, push)
-    assert all((area[2] - area[0]) * (area[3] - area[1]) < 0.8 * SIZE[0] * SIZE[1] for area in areas)
+    assert all(sum(map(canvas.pixels, found)) < 0.8 * SIZE[0] * SIZE[1] for found in areas)
     assert np.abs(parts[0].astype(int) - parts[-1]).max() > 100  # it moves
     for part, full in zip(parts, wholes, strict=True):
         assert (np.abs(part.astype(int) - full).max(axis=2) > SEEN).mean() < 3e-4
+
+
+def test_rectangles_are_joined_where_one_takes_less_time_than_two():
+    near, far = [(0, 0, 10, 10), (12, 0, 20, 10)], [(0, 0, 10, 10), (500, 0, 510, 10)]
+    assert canvas.joined(near, lambda area: canvas.pixels(area) + 50) == [(0, 0, 20, 10)]
+    assert canvas.joined(far, lambda area: canvas.pixels(area) + 50) == far
+    chain = [(0, 0, 10, 10), (100, 0, 110, 10), (10, 0, 100, 10)]  # the third joins the others
+    assert canvas.joined(chain, canvas.pixels) == [(0, 0, 110, 10)]
+
+
+def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatch):
+    drawn, render = [], Canvas.render
+    monkeypatch.setattr(Canvas, "render", lambda self, area, *rest: drawn.append(area) or render(self, area, *rest))
+    with stage("overhead_crane", law=smc.law("hierarchical")) as shown:
+        for x in (0.2, 0.25):
+            for k in range(2):
+                shown.pose(k, np.array([x, 0.1])[: shown.shown[k]])
+            shown.render()
+    assert drawn[0] == (0, 0, *SIZE)
+    assert len(drawn) == 3
+    assert sum(map(canvas.pixels, drawn[1:])) < 0.3 * SIZE[0] * SIZE[1]
+
+
+def test_cylinders_have_few_stacks_unless_the_model_has_large_round_shapes():
+    for plant, few in (("van_der_pol", True), ("inverted_pendulum", False)):
+        with stage(plant) as shown:
+            assert (shown.model.vis.quality.numstacks == canvas.FEW) is few
 
 
 def test_a_picture_in_which_nothing_moves_is_not_drawn_again(monkeypatch):
