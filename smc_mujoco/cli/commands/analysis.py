@@ -104,6 +104,7 @@ def margins(
     ] = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
+    out: Annotated[Path | None, typer.Option(help="Also write the table to a .csv file.")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -118,7 +119,7 @@ def margins(
     Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
     """
     with held_back():
-        from smc_mujoco.analysis.margins import KINDS, save
+        from smc_mujoco.analysis.margins import KINDS, save, save_csv
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
@@ -127,6 +128,8 @@ def margins(
         from smc_mujoco.studies.papers.gaber import scenarios
 
     terminal = Terminal()
+    if out:
+        writable(ended(out, ".csv"))
     if json:
         writable(ended(json, ".json"))
     machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else scenarios.PLANTS)]
@@ -139,6 +142,8 @@ def margins(
         terminal.print(tables.margins(name, [margin for margin in found if margin.kind == name]))
     count = f"{len(found)} margin{'s' * (len(found) != 1)}"
     terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
+    if out:
+        terminal.wrote(save_csv(found, out))
     if json:
         terminal.wrote(save(found, json))
 
