@@ -62,6 +62,7 @@ class Advice:
       others: names of the laws that the screening left out, in its order.
       comparison: of the finalists that are fit, or of all if none is; its blocks are those of `blocks`.
       table: the finalists' runs.
+      effort: unit of u, "N m", "N" or "V"; "" for that of a force, or where conditions differ.
     """
 
     plant: Plant
@@ -72,6 +73,7 @@ class Advice:
     others: tuple[str, ...]
     comparison: Comparison
     table: Table
+    effort: str = ""
 
     @property
     def law(self) -> Component:
@@ -148,7 +150,9 @@ class Advice:
     @property
     def heads(self) -> list[str]:
         """The headings of the table."""
-        units = [f"{need}: {NEEDS[need].label}, {NEEDS[need].unit_for(self.plant.unit)}" for need in self.needs]
+        units = [
+            f"{need}: {NEEDS[need].label}, {NEEDS[need].unit_for(self.plant.unit, self.effort)}" for need in self.needs
+        ]
         return ["law", "place", "settles", *units]
 
     @property
@@ -301,7 +305,9 @@ class Advice:
 
     def _number(self, choice: Choice, need: str) -> str:
         median = choice.medians[need].median
-        return number(median) + (f" {NEEDS[need].unit_for(self.plant.unit)}" if math.isfinite(median) else "")
+        return number(median) + (
+            f" {NEEDS[need].unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""
+        )
 
     def _where(self, conditions: Sequence[str]) -> str:
         return "" if len(conditions) == len(self.conditions) else f" under {joined(conditions)}"

@@ -124,8 +124,8 @@ def which(
     asked = [find_condition(one) for one in _conditions(conditions, machine, duration)]
     if NO_VELOCITY in properties:
         asked = [_without_velocity(one) for one in asked]
-    for one in asked:  # refuses what the plant cannot have before gains are searched
-        case(machine, "none", one, duration, starts=starts)
+    # refuses what the plant cannot have before gains are searched
+    efforts = {case(machine, "none", one, duration, starts=starts).efforts[0] for one in asked}
     chosen = _suited(machine, [name for name in properties if name != NO_VELOCITY], laws)
     found = _with_gains(machine, chosen, extent.budget, starts, folder / "gains", threads, progress)
     candidates = {candidate.law.name: candidate for candidate in found}
@@ -152,6 +152,7 @@ def which(
         others=tuple(others),
         comparison=finals.comparison,
         table=finals.table,
+        effort=efforts.pop() if len(efforts) == 1 else "",
     )
 
 

@@ -1,5 +1,6 @@
 """Boards as tables in HTML and LaTeX: a line for each law, a column for each metric, its median with its interval."""
 
+import dataclasses
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -56,8 +57,8 @@ def heading(board: "Board") -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
         return "settles (%)"
-    metric = CATALOGUE[board.metric]
     units = {plant.unit for block in board.blocks if (plant := catalogue().get(block.plant))}
+    metric = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V where commands are voltages
     unit = metric.unit_for(units.pop()) if len(units) == 1 else "" if "{" in metric.unit else metric.unit
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 

@@ -149,6 +149,8 @@ def identify(
     whole("seed", seed, 0, 2**53 - 1)
     checked = [twin.checked(record) for record in data]
     fits_before = tuple(twin.fits(data))  # also refuses records that are too short
+    for record, fit in zip(data, fits_before, strict=True):
+        twin.refuse_degrees(record, fit)
     with bar(f"identify {twin.name}", most * (2 * len(names) + 1), shown=progress) as drawn:
         search = Search(twin, names, data, checked, drawn.advance)
         stages = ("pieces", "whole") if twin.dynamics is None and twin.window else ("whole",)

@@ -7,7 +7,7 @@ import csv
 import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -249,9 +249,9 @@ def rate(values: np.ndarray, period: float) -> np.ndarray:
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=1, delta=period))
 
 
-def in_radians(record: Mapping[str, Any], columns: Columns) -> Record:
-    """Return the record with its angles taken for degrees, and converted."""
-    angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in columns.angles if name in record}
+def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
+    """Return the record with these columns taken for degrees, and converted."""
+    angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
     return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
 
 

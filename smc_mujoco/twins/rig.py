@@ -283,15 +283,31 @@ class Rig:
             angles in degrees.
         """
         found = self.fits([record], rounded)[0]
-        if min(found.values()) < 100.0 - FAR_BETTER and "rad" in self.scenario("none").plant.units:
-            other = self.fits([records.in_radians(record, self.columns)], rounded)[0]
-            if min(other.values()) > max(FAR_BETTER, min(found.values()) + FAR_BETTER):
-                raise ScenarioError(
-                    f"the angles of the record of {self.name} look like degrees, as it fits by "
-                    f"{records.percent(other)} with them in radians and by {records.percent(found)} as they are: "
-                    "give radians"
-                )
+        self.refuse_degrees(record, found)
         return found
+
+    def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
+        """Raise ScenarioError if a record, of this fit, has degrees for radians.
+
+        Then it fits far better with all its angles, or those of a joint, in radians. A record that fits well is not
+        simulated again.
+        """
+        if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
+            return
+        references = (self.columns.reference, *self.columns.others)
+        each = [
+            tuple(name for name in (x, *references[i : i + 1]) if name in record) for i, x in enumerate(self.columns.x)
+        ]
+        suspects = list(dict.fromkeys([self.columns.angles, *((x,) for x in self.columns.x), *each]))
+        others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
+        best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
+        if min(others[best].values()) > max(FAR_BETTER, min(fit.values()) + FAR_BETTER):
+            which = "angles" if best == 0 else f"values of {' and '.join(suspects[best])}"
+            raise ScenarioError(
+                f"the {which} of the record of {self.name} look like degrees, as it fits by "
+                f"{records.percent(others[best])} with them in radians and by {records.percent(fit)} as they are: "
+                "give radians"
+            )
 
     def fits(self, many: list[Mapping[str, Any]], rounded: bool = False) -> list[dict[str, float]]:
         """Return `fit` of several records, without the check for degrees; they are simulated at once."""

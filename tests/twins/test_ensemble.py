@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
+from smc_mujoco.studies.board_tables import heading
 from smc_mujoco.twins import ensemble
 
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -60,6 +61,7 @@ def test_a_board_of_a_voltage_is_in_volts(tmp_path):
     ]
     (board,) = smc.leaderboard(smc.study(runs, tmp_path, progress=False), metrics=("tv_rate",))
     assert board.unit == "V/s"
+    assert heading(board) == "TV rate (V/s)"
 
 
 def test_the_command_identifies_from_files(tmp_path):

@@ -5,7 +5,8 @@ channel 0 is the elbow's angle q2; channel 1, which is only measured, the should
 upright. Dry friction is left out of the nominal f and g.
 """
 
-from smc_mujoco.mechanisms.plant import Plant
+import dataclasses
+
 from smc_mujoco.mechanisms.plants import double_pendulum as both
 
 
@@ -22,19 +23,12 @@ def nominal(x, v, i, p):
     return (f2, g2) if i == 0 else (f1, g1)
 
 
-ACROBOT = Plant(
+ACROBOT = dataclasses.replace(
+    both.DOUBLE_PENDULUM,
     name="acrobot",
-    parameters=both.MODEL_1_1,
-    mass="m2",
-    unit="rad",
     x0=(0.5, 1.0),
-    n=2,
-    sizes=(2, 2),
     build=build,
-    fields=both.fields,
     nominal=nominal,
-    lane=(0.9, 0.0, 0.0),
     underactuated=True,
     limits=(both.LIMIT,),
-    dry=("cf1", "cf2"),
 )

@@ -13,6 +13,7 @@ from smc_mujoco.twins.rig import Quantity, Rig
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual"
 IP02 = "Quanser, IP02 linear servo, user manual"
+LONG = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN"
 SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals"
 
 
@@ -73,22 +74,30 @@ def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia
     }
 
 
-QUBE_SERVO_2 = Rig(
-    name="qube_servo_2",
-    label="QUBE-Servo 2 with rotary pendulum, by its published parameters",
-    quantities=electric(DRIVER, 8.4, 1.16e-3, 0.042, 4e-6)
-    | pendulum(DRIVER, 0.095 * 0.085**2 / 12, 0.085, 5e-5, 0.024, 0.129 / 2, 0.024 * 0.129**2 / 12, 2.5e-6, 2048.0),
-    machine=rotary,
-    about="The arm's inertia is m r^2/12: with m r^2/3 a controller that balances the machine lets the twin fall.",
-)
-QUBE_SERVO_3 = Rig(
-    name="qube_servo_3",
-    label="QUBE-Servo 3 with rotary pendulum, by its published parameters",
-    quantities=electric(QUBE_3, 7.5, 1.15e-3, 0.0422, 1.4e-6)
-    | pendulum(QUBE_3, 0.095 * 0.085**2 / 3, 0.085, 1e-3, 0.024, 0.129 / 2, 0.024 * 0.129**2 / 12, 5e-5, 2048.0),
-    machine=rotary,
-    about="As published, with m r^2/3 for the arm, which records of the first QUBE-Servo speak against.",
-)
+def qube(version, source, motor, divisor, arm_damping, pendulum_damping, about):
+    """Return a QUBE-Servo with its rotary pendulum; `divisor`: what divides m r^2 in the inertia of its arm."""
+    arm, pole = (0.095, 0.085), (0.024, 0.129)  # kg, m
+    return Rig(
+        name=f"qube_servo_{version}",
+        label=f"QUBE-Servo {version} with rotary pendulum, by its published parameters",
+        quantities=electric(source, *motor)
+        | pendulum(
+            source, arm[0] * arm[1] ** 2 / divisor, arm[1], arm_damping, pole[0], pole[1] / 2,
+            pole[0] * pole[1] ** 2 / 12, pendulum_damping, 2048.0,
+        ),
+        machine=rotary,
+        about=about,
+    )  # fmt: skip
+
+
+QUBE_SERVO_2 = qube(
+    2, DRIVER, (8.4, 1.16e-3, 0.042, 4e-6), 12.0, 5e-5, 2.5e-6,
+    "The arm's inertia is m r^2/12: with m r^2/3 a controller that balances the machine lets the twin fall.",
+)  # fmt: skip
+QUBE_SERVO_3 = qube(
+    3, QUBE_3, (7.5, 1.15e-3, 0.0422, 1.4e-6), 3.0, 1e-3, 5e-5,
+    "As published, with m r^2/3 for the arm, which records of the first QUBE-Servo speak against.",
+)  # fmt: skip
 SRV02_PENDULUM = Rig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",
@@ -103,11 +112,12 @@ IP02_CART = Rig(
     | {
         "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
         "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
-        "pole_mass": Quantity(0.23, "kg", "Quanser, linear pendulum of 64 cm, user manual", 1e-3),
-        "pole_half_length": Quantity(0.3302, "m", "Quanser, linear pendulum of 64 cm, user manual", 1e-3),
-        "pole_damping": Quantity(2.4e-3, "N m s/rad", "Quanser, linear pendulum, user manual", 0.0),
+        "pole_mass": Quantity(0.23, "kg", LONG, 1e-3),
+        "pole_half_length": Quantity(0.3302, "m", f"{LONG}, pivot to centre of gravity", 1e-3),
+        "pole_damping": Quantity(2.4e-3, "N m s/rad", LONG, 0.0),
         "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
     },
     machine=linear,
-    about="The cart is read with the pendulum's 4096 counts, a metre in place of a turn; the machine's are 22.75 um.",
+    about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
+    "hinge. The cart is read with the pendulum's 4096 counts, a metre in place of a turn; the machine's are 22.75 um.",
 )
