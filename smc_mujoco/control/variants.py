@@ -1,4 +1,4 @@
-"""Variants of laws: other gains, a reversed command, no memory, or an input gain that varies with x.
+"""Variants of laws: other gains, a reversed command, a relay, no memory, or an input gain that varies with x.
 
 A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
 multiplied by g at each sample is therefore the law on a plant with that gain. This is exact if |g| <= 1, except that g
@@ -40,6 +40,11 @@ def squeezed(law: Component) -> Component:
     return with_input_gain(law, "squeezed")
 
 
+def relay(law: Component) -> Component:
+    """Return the law as a relay: the actuator's bound with the sign of its command."""
+    return dataclasses.replace(law, name=f"{law.name}_relay", function=_signed(law.function))
+
+
 def forgetful(law: Component) -> Component:
     """Return the law without memory: it is 0 at every sample. A law that keeps nothing stays as it is."""
     return dataclasses.replace(law, name=f"{law.name}_forgetful", function=_without_memory(law.function))
@@ -72,3 +77,15 @@ def _without_memory(function: Callable) -> Callable:
         return body(y, gains, memory)
 
     return without_memory
+
+
+@functools.cache
+def _signed(function: Callable) -> Callable:
+    """Return the function with the bound, and the sign of what it returns; compiled once."""
+    body = njit(function)
+
+    def signed(y, gains, memory):
+        u, s = body(y, gains, memory)
+        return y.limit if u > 0.0 else -y.limit if u < 0.0 else 0.0, s
+
+    return signed

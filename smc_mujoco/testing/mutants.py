@@ -2,8 +2,8 @@
 
     assert survivors("./my_paper") == {}      # in a test: each claim that holds is lost by some mutant of its first law
 
-A law with the wrong sign, without gain or without memory is not what a paper writes about. A claim that such a law
-keeps measures something else. A claim that no mutant can lose says why, in its field `immune`.
+A law with the wrong sign, without gain, without memory, or as a relay is not what a paper writes about. A claim that
+each of them keeps measures something else. A claim that no mutant can lose says why, in its field `immune`.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component
-from smc_mujoco.control.variants import forgetful, reversed_gain, zero_gain
+from smc_mujoco.control.variants import forgetful, relay, reversed_gain, zero_gain
 from smc_mujoco.studies.audit.audit import as_paper, measure, sets, wanted
 from smc_mujoco.studies.audit.paper import Entry, Paper
 from smc_mujoco.studies.audit.runs import Result, Runs
@@ -21,12 +21,13 @@ MUTANTS: dict[str, Callable[[Component], Component]] = {
     "wrong sign": reversed_gain,
     "zero gain": zero_gain,
     "no memory": forgetful,
+    "relay": relay,
 }
 KEPT, BLIND = "kept by every mutant", "refuted, and no mutant changes its numbers"
 
 
 def mutants(law: Component) -> dict[str, Component]:
-    """Return the mutants of a law: with the wrong sign, without gain, and without memory."""
+    """Return the mutants of a law: with the wrong sign, without gain, without memory, and as a relay."""
     return {name: mutant(law) for name, mutant in MUTANTS.items()}
 
 

@@ -261,7 +261,8 @@ def claims(
     mutants: Annotated[
         bool,
         typer.Option(
-            "--mutants", help="See that the audit can fail: list claims that a law of wrong sign, gain or memory keeps."
+            "--mutants",
+            help="See that the audit can fail: list claims that broken laws keep.",
         ),
     ] = False,
     threads: options.Threads = None,
@@ -368,6 +369,10 @@ def report(
         Path | None,
         typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
     ] = None,
+    paper: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
+    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
@@ -377,10 +382,22 @@ def report(
     The file OUT/report.html needs no network and no other file; the data are in the same folder. You can stop the
     command at any time, and continue by starting it again.
 
+    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html, evidence.json, badge.svg
+    and checks.svg.
+
     Example: smc-mujoco report --quick --out look
+
+    Example: smc-mujoco report --paper ./my_paper --out audit
     """
     with held_back():
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.studies.report import paper as of_paper
         from smc_mujoco.studies.report import report as make
 
-    path = make(out, quick, seeds, threads, progress=True, records=records)
+    if paper and (seeds or records):
+        raise ScenarioError("--seeds and --records are of the study: leave them out with --paper")
+    if paper:
+        path = of_paper.report(paper, out, quick, threads, progress=True)
+    else:
+        path = make(out, quick, seeds, threads, progress=True, records=records)
     print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -22,6 +22,8 @@ from smc_mujoco.studies.audit.paper import paper as find_paper
 from smc_mujoco.studies.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
     from smc_mujoco.studies.audit.runs import Result, Runs, Substitute, Used
     from smc_mujoco.studies.table import Table
 
@@ -66,6 +68,12 @@ class Audit:
         from smc_mujoco.studies.audit import badge
 
         return badge.save(self.paper.name, self.claims, path)
+
+    def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
+        """Draw every check as a multiple of its threshold, a row for each claim; options as of `smc.figure`."""
+        from smc_mujoco.studies.audit.figure import figure
+
+        return figure(self.claims, f"Claims of {self.paper.authors}: {self.paper.title}", path, **options)
 
     def _repr_html_(self) -> str:
         return self.claims._repr_html_()

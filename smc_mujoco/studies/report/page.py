@@ -14,7 +14,7 @@ import re
 from collections.abc import Hashable, Iterable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
 from smc_mujoco.analysis.ranking import SEEDS
@@ -27,6 +27,9 @@ from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.report import answer, charts, maps, rigs, words
 from smc_mujoco.studies.report.plan import GAINS
 from smc_mujoco.studies.report.stages import Findings
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 TEMPLATES = Path(__file__).parent / "templates"
 SECTIONS = {
@@ -45,37 +48,43 @@ Column = TypeVar("Column", bound=Hashable)
 Cell = TypeVar("Cell")
 
 
-def page(findings: Findings) -> str:
-    """Return the report as HTML."""
+def environment() -> "Environment":
+    """Return what renders the templates, with their filters and the functions that they share."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from jinja2.utils import htmlsafe_json_dumps
-    from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
-    environment = Environment(
+    made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
-    environment.globals |= {
+    made.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
+    made.globals |= {"words": words, "checks": checks}
+    return made
+
+
+def page(findings: Findings) -> str:
+    """Return the report as HTML."""
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    made = environment()
+    made.globals |= {
         "f": findings,
         "about": findings.about,
         "gains_set": GAINS,
         "infinity": math.inf,
-        "words": words,
         "answer": answer,
         "charts": charts,
         "maps": maps,
         "rigs": rigs,
-        "checks": checks,
         "link": link,
         "uri": uri,
         "plants": plants(),
     }
-    return environment.get_template("page.jinja").render(
+    return made.get_template("page.jinja").render(
         css=Markup((TEMPLATES / "style.css").read_text()),
         js=Markup((TEMPLATES / "page.js").read_text()),
         plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
