@@ -316,8 +316,15 @@ def claims(
     if mutants:
         with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
             kept = testing.survivors(about, ids or None, sets, quick, threads, drawn.advance)
-        lines = [f"claim {id} is {why}" for id, why in kept.items()]
-        terminal.note("\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be.")
+        terminal.note(
+            "\n".join(
+                [f"claim {id} is {why}" for id, why in kept.items()]
+                or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
+            )
+        )
+        asked = [about.claims[claim.id] for claim in found]
+        for entry in [entry for entry in asked if entry.immune]:
+            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")

@@ -113,6 +113,8 @@ def _claim(audit: "Audit", claim: Any, names: Mapping[str, str]) -> dict[str, An
     """Return what is sealed of a claim."""
     entry = audit.paper.claims[claim.id]
     told = {name: getattr(claim, name) for name in ("id", "text", "where", "measured", "holds_if", "quantifier")}
+    if entry.immune:
+        told["immune"] = entry.immune
     if entry.varies:
         return told | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
     runs = {name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()}
