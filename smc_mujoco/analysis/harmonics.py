@@ -80,7 +80,7 @@ class Loop:
         self.scenario, self.channel, s = scenario, channel, scenario.resolved
         plant = s.plant
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
-        self.controller = Controller(s.velocity, s.surface, s.law)
+        self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise()
         self._answer = functools.lru_cache(maxsize=64)(self._solve)  # all amplitudes of a frequency have one answer
 
@@ -281,7 +281,7 @@ def describing_function(
     samples = whole("samples", samples, 2, MAX_SAMPLES)
     h = math.tau / omega / samples
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
-    controller = Controller(resolved.velocity, None, resolved.law)
+    controller = Controller(resolved.velocity, None, resolved.law.of_channel(0))
     memories, total = controller.memories(), 0j
     for first in range(0, 2 * samples, CHUNK):
         at = np.arange(first, min(first + CHUNK, 2 * samples))

@@ -258,7 +258,7 @@ def reason(error: Exception) -> str:
 
 
 # Raises out of bounds and at division by zero. Without wrappers for Python, which would take half the time to compile.
-_checked = njit(error_model="python", boundscheck=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+checked = njit(error_model="python", boundscheck=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once for all laws
 
 
@@ -268,7 +268,7 @@ def jit(function: Callable) -> Callable:
     with global_compiler_lock:
         copies = dict(_shared)
         try:
-            made = rebuild(function, _checked, copies)
+            made = rebuild(function, checked, copies)
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
         # only now, as copies that were cut short lack functions that they call

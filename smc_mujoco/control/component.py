@@ -13,16 +13,19 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypedDict
 
+import numpy as np
+
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
+Value = float | tuple[float, ...]  # of a gain: one number for all channels, or one for each driven channel
 FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
 RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # options in version 0.1 -> present names
 
@@ -67,6 +70,7 @@ class LawOptions(SurfaceOptions, total=False):
     family: str
     continuous: bool
     finite_time: str
+    joint: bool
 
 
 OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
@@ -91,25 +95,30 @@ class Component:
     """A function bound to its gains.
 
     Attributes:
+      gains: name -> value; of a law also a tuple with a value for each driven channel.
       function: None if a loaded trace names one that is not available.
+      joint: whether it is a law of many joints.
+      shared: gains of which a law of many joints has one number for all joints.
       template: the Template it was made from; None if that is not available.
     """
 
     kind: str
     name: str
-    gains: Mapping[str, float]
+    gains: Mapping[str, Any]  # of Value
     memory: int
     function: Callable | None
     relative_degree: int = 1
     plants: tuple[str, ...] = ()
     requires_model: bool = False
+    joint: bool = False
+    shared: tuple[str, ...] = ()
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
 
     degree = renamed("degree", RENAMED["degree"])
     modelled = renamed("modelled", RENAMED["modelled"])
 
     def __repr__(self) -> str:
-        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={v:g}' for k, v in self.gains.items())])})"
+        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={written(v)}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
         """Pickle the name of the template: a decorated function's own name leads to its template, not to itself."""
@@ -120,7 +129,7 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        gains = {name: number(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
+        gains = {name: _value(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.template and (self.template.function is not self.function or self.template.name != self.name):
             object.__setattr__(self, "template", None)  # the function or the name was replaced
@@ -138,8 +147,40 @@ class Component:
         template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
         return dataclasses.replace(self, name=name, template=template)
 
+    @property
+    def uniform(self) -> bool:
+        """Whether every gain is one number for all channels."""
+        return not any(isinstance(value, tuple) for value in self.gains.values())
+
+    def of_channel(self, i: int) -> "Component":
+        """Return the component of channel i, with one number for each gain.
+
+        Raises:
+          ScenarioError: it is a law of many joints.
+        """
+        if self.joint:
+            raise ScenarioError(f"law {self.name!r} is of many joints: give a law of one channel")
+        if self.uniform:
+            return self
+        return dataclasses.replace(self, gains={name: at(value, i) for name, value in self.gains.items()})
+
     def __str__(self):
-        return f"{self.name}({', '.join(f'{k}={v:g}' for k, v in self.gains.items())})"
+        return f"{self.name}({', '.join(f'{k}={written(v)}' for k, v in self.gains.items())})"
+
+
+def written(value: Value) -> str:
+    """Return a gain as text, such as 3 or (3, 4.5)."""
+    return f"({', '.join(f'{one:g}' for one in value)})" if isinstance(value, tuple) else f"{value:g}"
+
+
+def _value(name: str, value: object, **limits: Any) -> Value:
+    """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        listed = value.tolist() if isinstance(value, np.ndarray) else taken(name, value)
+        if not isinstance(listed, Sequence) or not listed:
+            raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
+        return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))
+    return number(name, value, **limits)
 
 
 def _template_at(module: str, name: str) -> "Template | None":
@@ -172,6 +213,7 @@ class Template:
       label, short, colour: as in the decorator; "" means automatic, see `smc_mujoco.draw.style`.
       rest: its linear part; None if it is not linear at rest.
       family, continuous, finite_time: as in the decorator; `smc_mujoco.control.properties` chooses laws by them.
+      joint: whether it is a law of many joints.
     """
 
     kind: str
@@ -190,6 +232,7 @@ class Template:
     family: str = ""
     continuous: bool = False
     finite_time: str = ""
+    joint: bool = False
 
     degree = renamed("degree", RENAMED["degree"])
     modelled = renamed("modelled", RENAMED["modelled"])
@@ -216,15 +259,15 @@ class Template:
         own = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
 
-    def __call__(self, **gains: float) -> Component:
+    def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
         return self.bind(gains, warn=True)
 
-    def bind(self, gains: Mapping[str, float], warn: bool = False) -> Component:
+    def bind(self, gains: Mapping[str, float | Sequence[float]], warn: bool = False) -> Component:
         """Bind the function to these gains, and to the defaults of the others.
 
         Args:
-          gains: name -> value.
+          gains: name -> value; of a law also a sequence with a value for each driven channel.
           warn: whether to warn of gains that violate a condition.
 
         Raises:
@@ -233,7 +276,7 @@ class Template:
         Warns:
           GainWarning: gains violate a condition of the theorem.
         """
-        values = self.defaults
+        values: dict[str, Value] = dict(self.defaults)
         for key, value in gains.items():
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
@@ -241,10 +284,12 @@ class Template:
             above = 0.0 if gain.positive else -math.inf
             least = 0.0 if gain.nonnegative else -math.inf
             infinite = math.isinf(gain.default)
-            values[key] = number(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
+            values[key] = _value(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
+            if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
+                raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
         for words, condition in self.conditions.items():
-            if warn and not _holds(condition, SimpleNamespace(**values)):
-                text = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+            if warn and not all(_holds(condition, one) for one in _per_channel(values)):
+                text = ", ".join(f"{name} = {written(value)}" for name, value in values.items())
                 warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
         return Component(
             kind=self.kind,
@@ -255,8 +300,22 @@ class Template:
             relative_degree=self.relative_degree,
             plants=self.plants,
             requires_model=self.requires_model,
+            joint=self.joint,
+            shared=tuple(name for name, gain in self.gains.items() if gain.shared),
             template=self,
         )
+
+
+def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
+    """Yield the gains of each channel that tuples among them tell apart."""
+    count = max((len(value) for value in gains.values() if isinstance(value, tuple)), default=1)
+    for i in range(count):
+        yield SimpleNamespace(**{name: at(value, i) for name, value in gains.items()})
+
+
+def at(value: Value, i: int) -> float:
+    """Return a gain's value in channel i. Of too short a tuple it is the last one, which a scenario refuses."""
+    return value[min(i, len(value) - 1)] if isinstance(value, tuple) else value
 
 
 def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace) -> bool:
@@ -332,6 +391,8 @@ def template(
             raise ScenarioError(f"{word} is {shown(words[word])}: give a text")
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
+    if not isinstance(words.get("joint", False), bool):
+        raise ScenarioError(f"joint is {shown(words['joint'])}: give True or False")
     if words.get("finite_time", "") not in FINITE:
         raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):

@@ -16,7 +16,7 @@ law, otherwise with f = 0 and g = 1.
 import functools
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Unpack, overload
 
 from numba import njit, types
@@ -24,6 +24,7 @@ from numba.extending import overload_attribute
 
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.registry import discover
+from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, LawOptions, Template, decorated, renamed
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -146,6 +147,8 @@ def law_function(
         the control period. Default: no.
       finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e", the error; "s", the
         sliding variable, so that e then decays as on the surface; "", the default, neither.
+      joint: whether it is a law of many joints: the function then gets the measurement of all channels, a
+        `smc_mujoco.control.joint_law.JointMeasurement`, and returns two vectors u and s, one number for each channel.
 
     The function must be pure: state belongs in memory, parameters in gains. A compiled function keeps the values that
     its globals and closure had at compilation, and its random numbers would come from a shared generator. Each new
@@ -165,9 +168,14 @@ def catalogue() -> dict[str, Template]:
     return discover("smc_mujoco.control.laws", Template)
 
 
+def known_laws() -> dict[str, Template]:
+    """Return every law of the library, of one channel and of many joints, by name."""
+    return catalogue() | joint_law.catalogue()
+
+
 def checked_name(law: Law) -> Law:
     """Return the law. Raise ScenarioError if it is a user's with the name of a library law."""
-    known = catalogue().get(law.name) if law.kind == "law" else None
+    known = known_laws().get(law.name) if law.kind == "law" else None
     if known is None or law.function in (None, known.function):
         return law
     raise ScenarioError(
@@ -176,13 +184,15 @@ def checked_name(law: Law) -> Law:
     )
 
 
-def law(name: str, **gains: float) -> Law:
+def law(name: str, **gains: float | Sequence[float]) -> Law:
     """Return the library's law `name` with these gains. `law(...).named("slow")` gives it another name.
+
+    A gain is one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
       ScenarioError: an unknown law or gain, or a gain out of range.
     """
-    return find("law", name, catalogue()).bind(gains, warn=True)
+    return find("law", name, known_laws()).bind(gains, warn=True)
 
 
 def fits(law: Law | Template, plant: Plant) -> bool:

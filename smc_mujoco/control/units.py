@@ -55,6 +55,7 @@ class Gain:
       nonnegative: whether it must be at least 0.
       held: whether tuning leaves it at its default, such as an initial value, an exponent or the size of a table.
       over: name of the gain that the law divides it by, b in the force k / b. Tuning then bounds k by u_max b.
+      shared: whether a law of many joints has one number of it for all joints, instead of a vector.
     """
 
     default: float
@@ -63,6 +64,7 @@ class Gain:
     nonnegative: bool = False
     held: bool = False
     over: str | None = None
+    shared: bool = False
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit at these values of all gains."""

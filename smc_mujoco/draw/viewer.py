@@ -201,8 +201,8 @@ def model_with_sliders(scenario: Scenario) -> mujoco.MjModel:
 
 
 def slider_gains(law: Law) -> dict[str, float]:
-    """Return the gains that have sliders: all finite ones."""
-    return {name: gain for name, gain in law.gains.items() if math.isfinite(gain)}
+    """Return the gains that have sliders: all finite ones with one number for all channels."""
+    return {name: gain for name, gain in law.gains.items() if not isinstance(gain, tuple) and math.isfinite(gain)}
 
 
 def slider_range(gain: float) -> list[float]:

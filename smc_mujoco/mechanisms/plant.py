@@ -60,6 +60,14 @@ class Native(NamedTuple):
     kept: tuple
 
 
+class Dynamics(NamedTuple):
+    """The nominal M x'' + h = force of all channels: M (n, n), h (n,), and g (n,), the h at rest."""
+
+    M: np.ndarray
+    h: np.ndarray
+    g: np.ndarray
+
+
 class Coupled(abc.ABC):
     """Base of nominal models that also depend on the last commands of the other channels."""
 
@@ -72,6 +80,22 @@ class Coupled(abc.ABC):
     @abc.abstractmethod
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function of the nominal model for one simulation."""
+
+    @abc.abstractmethod
+    def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
+        """Return M, h and g of all channels, at their x and v, (n,) each."""
+
+    @abc.abstractmethod
+    def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
+        """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
+
+    @abc.abstractmethod
+    def native_dynamics(self, parameters: Mapping[str, float]) -> Native:
+        """Return the C function of `dynamics` for one simulation. Its values serve that of `coriolis`, too."""
+
+    @abc.abstractmethod
+    def native_coriolis(self) -> int:
+        """Return the address of the C function of `coriolis`, at the state of the last call of `dynamics`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
@@ -192,9 +193,8 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
             case state.SURFACE_RAISED if s.surface is not None:
                 call(s.surface, Measurement(*record["y"].tolist()))
             case state.LAW_RAISED | state.NOT_FINITE as failure:
-                call(s.law, Measurement(*record["y"].tolist()))
+                u, sliding = call_law(s, record, packed, memory(record["law"], s.law.memory))
                 if failure == state.NOT_FINITE:
-                    u, sliding = record["control"].tolist()
                     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
             case state.REFERENCE_RAISED:
                 reference.evaluate(s.reference, t)
@@ -211,3 +211,18 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     except reference.Failure as failure:
         return str(failure)
     return None
+
+
+def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray) -> tuple[float, float]:
+    """Call the law that failed once more. Return the u and s that it returned before."""
+    n, i = s.plant.n, int(state.view(packed.numbers, int(record["joints"]), (1,))[0])
+    function = reference.PythonComponent(s.law, n)
+    function.memory = memory
+    if not s.law.joint:
+        function(i, Measurement(*record["y"].tolist()))
+        return record["control"].tolist()
+    stored = state.view(packed.numbers, int(record["joint"]), (joint_law.numbers(n),)).copy()
+    y = joint_law.stored_measurement(stored, None)
+    function.together(y._replace(dynamics=reference.Coriolis(s, y.x, y.v)))
+    u, sliding = state.view(packed.numbers, int(record["torques"]), (2, n))[:, i].tolist()
+    return u, sliding

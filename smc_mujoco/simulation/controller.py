@@ -21,6 +21,7 @@ from typing import NamedTuple
 from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.control.joint_law import HEADER, VECTORS
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at
@@ -72,7 +73,7 @@ def control(at, sim, data):
         elif within == 0:
             failure = _measure(at, sim, data, k)
             if failure == record.FINE:
-                failure = _decide(at, sim, k)
+                failure = _decide(at, sim, k) if sim.joint == 0 else _decide_together(at, sim, k)
         _actuate(sim, data, step)
     if sim.signal_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
@@ -210,6 +211,90 @@ def _decide(at, sim, k):
         if not (math.isfinite(wanted) and math.isfinite(asked.s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
             return record.NOT_FINITE
         buffer[i], sample.u, sample.s, sample.r = u, u, asked.s, y.r
+        last[i] = u
+    return record.FINE
+
+
+@njit(error_model="numpy")
+def _own_equations(at, sim, M, h):
+    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal. Return a failure code."""
+    n, v, kept = sim.n, pointer(sim.v), pointer(sim.joint + 8 * (HEADER + sim.n))  # kept: the law's own copy of v
+    mass = pointer(M)
+    for i in range(n * n):
+        mass[i] = 0.0
+    for part in range(2):  # h at v, then g at rest
+        into = pointer(h + 8 * n * part)
+        for i in range(n):
+            if _evaluate_model(at, sim, i) != 0:
+                return record.NOMINAL_RAISED
+            mass[(n + 1) * i], into[i] = 1.0 / sim.model.g, -sim.model.f / sim.model.g
+        for i in range(n):
+            v[i] = 0.0 if part == 0 else kept[i]
+    return record.FINE
+
+
+@njit(error_model="numpy")
+def _model(at, sim, M, h):
+    """Write nominal M, h and g of all channels, per unit of u, to the addresses M and h, and behind h.
+
+    Return a failure code.
+    """
+    n, v, mass, force, failure = sim.n, pointer(sim.v), pointer(M), pointer(h), record.FINE
+    rest = pointer(h + 8 * n)
+    if sim.uses_model == 0.0:
+        for i in range(n * n):
+            mass[i] = 1.0 if i % (n + 1) == 0 else 0.0
+        for i in range(n):
+            force[i], rest[i] = 0.0, 0.0
+        return failure
+    if sim.dynamics.address == 0:
+        failure = _own_equations(at, sim, M, h)
+    elif _call(sim.dynamics, 0, sim.x, M) != 0:
+        failure = record.NOMINAL_RAISED
+    for i in range(n * n):
+        mass[i] /= sim.drive_gain
+    for i in range(n):
+        force[i], rest[i] = (force[i] + sim.drive_drag * v[i]) / sim.drive_gain, rest[i] / sim.drive_gain
+    return failure
+
+
+@njit(error_model="numpy")
+def _decide_together(at, sim, k):
+    """Run a law of many joints at sample k, as `_decide` runs one of one channel. Return a failure code."""
+    n, step, t = sim.n, 8 * sim.n, k * sim.period
+    sim.instant.t = t
+    if _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+        return record.REFERENCE_RAISED
+    added, motion = 0.0, sim.motion
+    r, dr, ddr = motion.value, motion.rate, motion.acceleration
+    if sim.feedforward.address != 0:
+        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            return record.FEEDFORWARD_RAISED
+        added = motion.value
+    head, first = pointer(sim.joint), sim.joint + 8 * HEADER
+    head[0], head[1], head[2], head[3], head[4] = t, sim.period, sim.uses_model, sim.coriolis, n
+    y = pointer(first)
+    x, v, a, limits = pointer(sim.x), pointer(sim.v), pointer(sim.a), pointer(sim.limits)
+    for i in range(n):
+        y[i], y[n + i], y[2 * n + i], y[3 * n + i] = x[i], v[i], x[i] - r, v[i] - dr
+        y[4 * n + i], y[5 * n + i], y[6 * n + i] = r, dr, ddr
+        y[7 * n + i], y[8 * n + i] = ddr if math.isnan(a[i]) else a[i], limits[i]
+    M = first + VECTORS * step
+    failure = _model(at, sim, M, M + n * step)
+    if failure != record.FINE:
+        return failure
+    law = sim.law
+    if call(law.address, sim.joint, law.parameters, law.memory, sim.torques) != 0:
+        return record.LAW_RAISED
+    asked, last, buffer = pointer(sim.torques), pointer(sim.u), pointer(sim.delay_buffer + step * (k % sim.delay_slots))
+    for i in range(n):
+        wanted, s, limit = asked[i] + added, asked[n + i], limits[i]
+        u = min(max(wanted, -limit), limit)
+        if not (math.isfinite(wanted) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+            pointer(sim.joints)[0] = i
+            return record.NOT_FINITE
+        sample = log_at(sim.log, k * n + i)
+        buffer[i], sample.u, sample.s, sample.r = u, u, s, r
         last[i] = u
     return record.FINE
 

@@ -22,9 +22,21 @@ from numba.extending import intrinsic
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import AtAddress, Function, NotCompilable, Uncompiled, attempt, jit, loader, named, pointer
+from smc_mujoco.common.jit import (
+    AtAddress,
+    Function,
+    NotCompilable,
+    Uncompiled,
+    attempt,
+    checked,
+    jit,
+    loader,
+    named,
+    pointer,
+)
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
@@ -50,6 +62,42 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
     made = Function(native, _cached(function, kind, gains, memory))
     fingerprint.hold(function)
     return made
+
+
+@functools.cache
+def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int) -> Function:
+    """Compile (y, gains, memory) -> two vectors, of a law of many joints.
+
+    Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u and s, (n,) each.
+    """
+    body, values = jit(function), _vectors(gains, shared)
+
+    @checked
+    def law(y, g, m, out):
+        u, s = body(y, g, m)
+        if len(u) != len(y.x) or len(s) != len(y.x):
+            raise ValueError
+        for i in range(len(u)):
+            out[i], out[len(u) + i] = u[i], s[i]
+        return 0
+
+    def native(y, g, m, out):
+        n = int(carray(pointer(y), (5,))[4])
+        memories, output = carray(pointer(m), (n, memory)), carray(pointer(out), (2 * n,))
+        ok, _ = attempt(law, (measurement_at(y), values(g, n), memories, output))
+        return not ok
+
+    return Function(native, _cached(function, gains, shared, memory))
+
+
+@functools.cache
+def _vectors(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
+    """Return a compiled function (address, n) -> gains by name: a vector (n,) of each, one number of a shared one."""
+    vector = "carray(pointer(address + 8 * n * {0}), (n,))"
+    read = [(vector + "[0]" * (name in shared)).format(i) for i, name in enumerate(names or ("unused",))]
+    space = {"carray": carray, "pointer": pointer, "Gains": named(names)}
+    exec(f"def gains_at(address, n): return Gains({', '.join(read)})", space)
+    return checked(space["gains_at"])
 
 
 @intrinsic
@@ -141,6 +189,8 @@ def component(c: Component) -> Function | AtAddress:
     who = f"{c.kind} {c.name!r}"
     if isinstance(c.function, Uncompiled):
         raise NotCompilable(f"{who} {c.function.why}")
+    if c.joint:
+        return _named(who, _joint, c.function, tuple(c.gains), c.shared, c.memory)
     return _named(who, _component, c.function, c.kind, tuple(c.gains), c.memory)
 
 

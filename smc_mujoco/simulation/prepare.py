@@ -15,6 +15,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
+from smc_mujoco.control import joint_law
+from smc_mujoco.control.component import Component, at
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state
@@ -61,6 +63,7 @@ class Prepared:
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
+        numbers += joint_law.numbers(s.plant.n) if s.law.joint else 0
         log = state.LOG.itemsize * (s.samples + 1) * s.plant.n
         return int(log + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
 
@@ -142,13 +145,20 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         places = buffer.put(values), buffer.reserve(memory * channels)
         return {"address": made.address, "parameters": places[0], "memory": places[1], "stride": 8 * memory}
 
-    own = s.plant.nominal.native(s.plant.parameters) if isinstance(s.plant.nominal, Coupled) else None
+    coupled, joint = s.plant.nominal if isinstance(s.plant.nominal, Coupled) else None, s.law.joint
+    modelled = s.model == "nominal"
+    own = None
+    if coupled is not None and (modelled or not joint):
+        own = coupled.native_dynamics(s.plant.parameters) if joint else coupled.native(s.plant.parameters)
     functions = {
-        "law": function(compiled.law, s.law.gains.values(), s.law.memory),
+        "law": function(compiled.law, joint_gains(s.law, n) if joint else s.law.gains.values(), s.law.memory),
         "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
-        "nominal": function(own or compiled.nominal, own.values if own else s.plant.parameters.values()),
         "reference": function(compiled.reference, native.values_of(s.reference)),
     }
+    if own is not None:
+        functions["dynamics" if joint else "nominal"] = function(own, own.values)
+    elif compiled.nominal is not None:
+        functions["nominal"] = function(compiled.nominal, s.plant.parameters.values())
     if s.feedforward is not None:
         functions["feedforward"] = function(compiled.feedforward, native.values_of(s.feedforward))
     if s.surface is not None:
@@ -161,6 +171,9 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
     states = buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n)
     limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
+    measurement = buffer.reserve(joint_law.numbers(n)) if joint else None
+    torques = buffer.reserve(2 * n) if joint else None
+    coriolis = buffer.reserve(3) if joint and own is not None else None
     numbers = buffer.array()
 
     def placed(found: dict[str, int]) -> dict[str, int]:
@@ -174,7 +187,14 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         state.SIGNAL,
     )
     at = buffer.address(joints)
-    values = {name: placed(found) for name, found in functions.items()} | {
+    values: dict[str, Any] = {name: placed(found) for name, found in functions.items()}
+    if measurement is not None and torques is not None:
+        values |= {"joint": buffer.address(measurement), "torques": buffer.address(torques)}
+    if coriolis is not None and coupled is not None:
+        called = coupled.native_coriolis(), values["dynamics"]["parameters"], s.drive.gain
+        numbers[coriolis : coriolis + 3] = called
+        values["coriolis"] = buffer.address(coriolis)
+    values |= {
         "n": n,
         "driven": int(np.sum(channels["ctrl"] >= 0)),
         "nq": nq,
@@ -205,7 +225,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "dropout": sensor.dropout,
         "read_period": sensor.period or 0.0,
         "read_delay": sensor.delay,
-        "uses_model": s.model == "nominal",
+        "uses_model": modelled,
         "drive_gain": s.drive.gain,
         "drive_drag": s.drive.drag,
         "joints": at,
@@ -215,3 +235,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "u": at + 16 + 24 * n,
     }
     return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, own)
+
+
+def joint_gains(law: Component, n: int) -> list[float]:
+    """Return n numbers for each gain of a law of many joints, one after the other."""
+    return [at(value, i) for value in law.gains.values() for i in range(n)]

@@ -14,11 +14,12 @@ import numpy as np
 from smc_mujoco.common import jit
 from smc_mujoco.common.errors import one_line, shown
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.control.component import Component
+from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.plant import Coupled, Plant, Values
+from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Plant, Values
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
@@ -184,6 +185,8 @@ class Loop:
     def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Return saturated commands and sliding variables, (n,) each, for measured x and v at sample k."""
         scenario = self.scenario
+        if scenario.law.joint:
+            return self.decide_together(x, v, k)
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         limits = scenario.limits
         r, dr, ddr = evaluate(scenario.reference, t)
@@ -205,13 +208,31 @@ class Loop:
                 sliding, v_eq = self.surface(i, y)
                 y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
             u[i], s[i] = self.law(i, y)
-            u[i] += added
-            self.latest[i] = min(max(u[i], -limits[i]), limits[i])
-            asked = min(abs(u[i]), limits[i]) * max(1.0, self.scale)
-            if not (math.isfinite(u[i]) and math.isfinite(s[i]) and asked < MAX_CONTROL):
-                raise Failure(f"{self.law.name} returned u = {u[i]:g}, s = {s[i]:g} in channel {i}")
-            u[i] = self.latest[i]
+            u[i] = self.bounded(i, u[i] + added, s[i])
         return u, s
+
+    def bounded(self, i: int, u: float, s: float) -> float:
+        """Return the command u of channel i within its bound, which becomes the channel's latest."""
+        limit = self.limits[i]
+        self.latest[i] = min(max(u, -limit), limit)
+        if not (math.isfinite(u) and math.isfinite(s) and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL):
+            raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
+        return self.latest[i]
+
+    def decide_together(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `decide` returns, under a law of many joints."""
+        scenario, n = self.scenario, len(x)
+        t = k * scenario.control_period
+        r, dr, ddr = (np.full(n, value) for value in evaluate(scenario.reference, t))
+        self.r[:] = r
+        added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
+        a = np.where(np.isnan(self.a), ddr, self.a)
+        y = JointMeasurement(
+            t, scenario.control_period, float(scenario.model == "nominal"), Coriolis(scenario, x, v), x.copy(),
+            v.copy(), x - r, v - dr, r, dr, ddr, a, self.limits.copy(), *dynamics(scenario, x, v),
+        )  # fmt: skip
+        u, s = self.law.together(y)
+        return np.array([self.bounded(i, u[i] + added, s[i]) for i in range(n)]), s
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""
@@ -250,9 +271,15 @@ class Loop:
             self.forces[1, self.rubs] += data.actuator_force[self.channels["friction"][self.rubs]]
 
 
-def gains_of(c: Component) -> tuple:
-    """Return the gains of a component as the record that its function reads."""
-    return jit.named(tuple(c.gains))(*(c.gains.values() or [0.0]))
+def gains_of(c: Component, n: int) -> tuple:
+    """Return the gains of a component as the record that its function reads: vectors (n,) for a law of many joints."""
+    values: list[Any] = list(c.gains.values())
+    if c.joint:
+        each = c.gains.items()
+        values = [
+            at(value, 0) if name in c.shared else np.array([at(value, i) for i in range(n)]) for name, value in each
+        ]
+    return jit.named(tuple(c.gains))(*(values or [0.0]))
 
 
 class PythonComponent:
@@ -273,7 +300,7 @@ class PythonComponent:
 
     def bind(self, c: Component) -> None:
         """Take the gains of a component with the same function."""
-        self.gains = gains_of(c)
+        self.gains = gains_of(c, len(self.memory))
 
     def __call__(self, i: int, y: tuple) -> list[float]:
         """Return its two numbers for channel i; NaN for an acceleration that is not estimated.
@@ -291,6 +318,55 @@ class PythonComponent:
         if isinstance(y, Reading) and not isinstance(out, tuple):
             out = out, math.nan
         return numbers(self.name, out, self.returns, 2)
+
+    def together(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
+        """Return u and s of a law of many joints, (n,) each; raises as a call."""
+        try:
+            out = self.function(y, self.gains, self.memory)
+        except RAISES as error:
+            raise raised(self.name, error) from error
+        n = len(self.memory)
+        try:
+            u, s = (np.asarray(values, float) for values in out)
+        except (TypeError, ValueError, OverflowError):
+            u = s = np.empty(())
+        if u.shape != (n,) or s.shape != (n,):
+            raise Failure(f"{self.name} returned {shown(out)} instead of two vectors u, s of {n} numbers each")
+        return u, s
+
+
+class Coriolis:
+    """What `control.joint_law.coriolis` calls in the reference loop."""
+
+    def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
+        self.scenario, self.x, self.v = scenario, x, v
+
+    def coriolis(self, w: np.ndarray) -> np.ndarray:
+        """Return C(x, v) w per unit of u, (n,)."""
+        plant = self.scenario.plant
+        if self.scenario.resolved.model == "none" or not isinstance(plant.nominal, Coupled):
+            return np.zeros(len(self.x))
+        return plant.nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.drive.gain
+
+
+def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
+    """Return the M, h and g that a law of many joints sees at measured x and v, (n,) each, per unit of u."""
+    plant, n, (gain, drag) = scenario.plant, len(x), scenario.drive
+    if scenario.resolved.model == "none":
+        return Dynamics(np.eye(n), np.zeros(n), np.zeros(n))
+    values = Values(**plant.parameters)
+    if isinstance(plant.nominal, Coupled):
+        try:
+            found = plant.nominal.dynamics(x, v, values)
+        except RAISES as error:
+            raise raised(f"the nominal model of {plant.name}", error) from error
+    else:
+        moving, resting = (
+            np.array([nominal(plant, x, rate, i, values, np.zeros(n)) for i in range(n)], float)
+            for rate in (v, np.zeros(n))
+        )
+        found = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
+    return Dynamics(found.M / gain, (found.h + drag * v) / gain, found.g / gain)
 
 
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:

@@ -19,6 +19,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.control.component import written
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
@@ -28,7 +29,7 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
@@ -45,6 +46,7 @@ MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
 MAX_RATE = 100.0  # rad/s: chosen, 16 turns a second
 MAX_GAP = 0.5  # rad: chosen, 29 degrees of play
 MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here on may be percent
+MAX_CONDITION = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates as much, so it may be ms
 
 REST = Constant(0.0)
@@ -357,6 +359,7 @@ def check(s: Resolved) -> None:
 def check_new(s: Resolved) -> None:
     """Raise ScenarioError, or warn, for what recorded runs may have and new ones should not."""
     check_ranges(s.plant.name, s.plant.ranges, s.x0)
+    check_inertia(s)
     check_names(s)
     warn_of_degrees(s)
     warn_of_units(s)
@@ -410,6 +413,7 @@ def check_signals(s: Resolved) -> None:
 
 def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
+    check_channels(s)
     if not fits(s.law, s.plant):
         paired = dataclasses.replace(s.plant, underactuated=True)
         hint = ": give each channel a partner" if s.plant.direct and fits(s.law, paired) else ""
@@ -426,6 +430,36 @@ def check_law(s: Resolved) -> None:
             f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.relative_degree}, "
             f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another surface, or leave it out"
         )
+
+
+def check_channels(s: Resolved) -> None:
+    """Check that the law has as many numbers of each gain as channels, and that a law of many joints can run."""
+    for name, value in s.law.gains.items():
+        if isinstance(value, tuple) and len(value) != s.plant.driven:
+            raise ScenarioError(
+                f"gain {name} of {s.law.name} has {len(value)} values, {written(value)}, and {s.plant.name} has "
+                f"{s.plant.driven} driven channels: give one number, or {s.plant.driven}"
+            )
+    if not s.law.joint:
+        return
+    if s.plant.free:
+        raise ScenarioError(
+            f"law {s.law.name!r} is of many joints and commands them all, and {s.plant.name} has {s.plant.free} "
+            "without an actuator: give a law of one channel"
+        )
+    if s.surface is not None:
+        raise ScenarioError(f"law {s.law.name!r} is of many joints and has its own surface: leave the surface out")
+
+
+def check_inertia(s: Resolved) -> None:
+    """Check that the M which a law of many joints sees can be inverted at the start."""
+    if s.law.joint and s.model == "nominal" and isinstance(s.plant.nominal, Coupled):
+        M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
+        if not np.linalg.cond(M) < MAX_CONDITION:
+            raise ScenarioError(
+                f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two joints move the same "
+                "bodies in the same way: drive one of them, or give another x0"
+            )
 
 
 def check_names(s: Resolved) -> None:

@@ -13,7 +13,7 @@ from smc_mujoco.common.registry import present_place, subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import catalogue as laws
+from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.rig_controllers import CONTROLLERS
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
@@ -76,7 +76,7 @@ def restore(data: dict) -> Scenario:
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _find(data["law"], "law", laws() | CONTROLLERS | _laws_elsewhere(data["law"]["module"])),
+        "law": _find(data["law"], "law", known_laws() | CONTROLLERS | _laws_elsewhere(data["law"]["module"])),
         "velocity": _find(data["velocity"], "estimator", estimators()),
         "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),

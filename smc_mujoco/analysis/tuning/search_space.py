@@ -122,6 +122,8 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
       ScenarioError: a gain without a known unit, or no gain to tune.
     """
     bounds = {}
+    if not law.uniform:
+        raise ScenarioError(f"tuning searches one number for each gain of all channels, not {law}: give one for each")
     for name in law.gains:
         if (its := unit(law, name)) is not None and not _gain(law, name).held:
             scale = its.of(plant_scales)

@@ -17,7 +17,7 @@ from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.c import build
 from smc_mujoco.control.c.translate import MATH, Untranslatable, plain, rows, translate
-from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.component import Component, Template, written
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
 
@@ -43,6 +43,8 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
         raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
     if isinstance(law.function, AtAddress):
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
+    if law.of_channel(0) is not law:
+        raise ScenarioError(f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)")
     if numbers == "q15":
         law = _in_q15(law)
         slots, code = 0, _fixed_point(law)
@@ -106,7 +108,7 @@ def _head(law: Component, numbers: str, slots: int, size: str) -> str:
     template = catalogue().get(law.name)
     ours = template is not None and template.function is law.function
     doc = template.doc if template is not None and ours else inspect.cleandoc(law.function.__doc__ or "")
-    gains = ", ".join(f"{name} = {value:g}" for name, value in law.gains.items()) or "none"
+    gains = ", ".join(f"{name} = {written(value)}" for name, value in law.gains.items()) or "none"
     facts = {
         "gains": f"{gains}; gains[] in this order",
         "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),

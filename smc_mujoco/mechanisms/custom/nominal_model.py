@@ -11,7 +11,15 @@ sweeps converge for every positive definite M. A joint q without an actuator tha
 (M^-1)_qi.
 
 The compiled path calls MuJoCo's own functions by address, with a copy of the model that has the nominal parameters and
-an mjData for each simulation. Constraints are left out: contacts, limits, dry friction. A state that is not measured,
+an mjData for each simulation.
+
+Laws of many joints see the mechanism as a whole instead,
+
+    M x'' + h = u,    h = qfrc_bias - qfrc_passive - qfrc_actuator at ctrl = 0,    g = h at v = 0,
+
+and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels, and the rest is quadratic in v.
+
+Constraints are left out: contacts, limits, dry friction. A state that is not measured,
 in another kinematic tree, is taken to be the model's initial one.
 """
 
@@ -30,7 +38,7 @@ from smc_mujoco.common import libmujoco
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, integers, pointer
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import Coupled, Field, Native, Values, ready, write
+from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
@@ -78,18 +86,69 @@ class NominalModel(Coupled):
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         if self.why_not:
             return Native(unknown().address, (), ())
-        model, places, _, spare = prepared(self, frozen(parameters))
-        try:
-            data = spare.pop()  # used before, but a simulation writes every field before it reads it
-        except IndexError:
-            data = mujoco.MjData(model)
-        borrowed, seen = BorrowedData(data, spare), np.full(2 * len(places.qpos), np.nan)
+        model, places, borrowed = self._borrow(parameters)
+        data, seen = borrowed.data, np.full(2 * len(places.qpos), np.nan)
         table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
         solved = np.zeros(2 * model.nv)
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places.qpos), len(places.ctrl), model.nv
         return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays))
+
+    def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, Places, BorrowedData]":
+        """Return the model, its channels' indices, and an mjData for one simulation."""
+        model, places, _, spare = prepared(self, frozen(parameters))
+        try:
+            data = spare.pop()  # used before, but a simulation writes every field before it reads it
+        except IndexError:
+            data = mujoco.MjData(model)
+        return model, places, BorrowedData(data, spare)
+
+    def dynamics(self, x, v, p):
+        """Return M, h and g of all channels."""
+        model, places, data, _ = prepared(self, frozen(vars(p)))
+        dense, found = np.zeros((model.nv, model.nv)), {}
+        with _lock:
+            data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
+            data.qpos[places.qpos] = x
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_fullM(model, data, dense)
+            for name, velocity in (("g", np.zeros(len(x))), ("h", v)):
+                data.qvel[places.qvel] = velocity
+                mujoco.mj_fwdVelocity(model, data)
+                mujoco.mj_fwdActuation(model, data)
+                found[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places.qvel]
+        return Dynamics(dense[np.ix_(places.qvel, places.qvel)], found["h"], found["g"])
+
+    def coriolis(self, x, v, w, p):
+        """Return C(x, v) w."""
+        model, places, data, _ = prepared(self, frozen(vars(p)))
+        found = np.zeros(len(x))
+        with _lock:
+            data.qpos[:], data.qvel[:] = model.qpos0, 0.0
+            data.qpos[places.qpos] = x
+            mujoco.mj_fwdPosition(model, data)
+            for sign in (1.0, -1.0):
+                data.qvel[places.qvel] = v + sign * w
+                mujoco.mj_fwdVelocity(model, data)
+                found += sign * 0.25 * data.qfrc_bias[places.qvel]
+        return found
+
+    def native_dynamics(self, parameters: Mapping[str, float]) -> Native:
+        """Return the C function, and the addresses of one simulation's model, data and arrays."""
+        model, places, borrowed = self._borrow(parameters)
+        data = borrowed.data
+        data.ctrl[:] = 0.0
+        table = np.concatenate([places.qpos, places.qvel]).astype(np.int64)
+        dense, state = np.zeros(model.nv**2), np.zeros(2 * len(places.qpos))
+        arrays = data.qpos, data.qvel, data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator, table, dense, state
+        addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
+        values = (len(places.qpos), model.nv, *addresses)
+        return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
+
+    def native_coriolis(self) -> int:
+        """Return the address of the C function of `coriolis`."""
+        return native_coriolis().address
 
 
 @dataclasses.dataclass(eq=False)
@@ -127,6 +186,76 @@ def unknown() -> Function:
     def native(y, p, m, out):
         output = carray(pointer(out), (2,))
         output[0], output[1] = np.nan, np.nan
+        return 0
+
+    return Function(native)
+
+
+def _called(name: str, more: int = 0) -> Callable:
+    """Return a function of MuJoCo's library, for numba. It takes model, data and as many more addresses."""
+    function = libmujoco.library()[name]  # a new object, so that its types are its own
+    function.restype, function.argtypes = None, [ctypes.c_int64] * (2 + more)
+    return function
+
+
+@functools.cache
+def native_dynamics() -> Function:
+    """Return the C function of M, h and g.
+
+    Its inputs are x and v, (n,) each; its outputs M (n, n), h and g, (n,) each.
+    """
+    positions, velocities, actuation = map(_called, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
+    full = _called("mj_fullM", 1)
+
+    def native(y, p, m, out):
+        own = carray(pointer(p), (12,))
+        n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
+        given, state = carray(pointer(y), (2 * n,)), carray(pointer(int(own[11])), (2 * n,))
+        qpos, qvel = carray(pointer(int(own[4])), (1 << 40,)), carray(pointer(int(own[5])), (nv,))
+        bias, passive = carray(pointer(int(own[6])), (nv,)), carray(pointer(int(own[7])), (nv,))
+        actuator, table = carray(pointer(int(own[8])), (nv,)), carray(integers(int(own[9])), (2 * n,))
+        dense, output = carray(pointer(int(own[10])), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
+        for j in range(n):
+            state[j], state[n + j] = given[j], given[n + j]
+            qpos[table[j]] = given[j]
+        positions(model, data)
+        full(model, data, int(own[10]))
+        for i in range(n):
+            for j in range(n):
+                output[n * i + j] = dense[table[n + i], table[n + j]]
+        for part in range(2):  # g, then h, so that the velocities are those of the sample afterwards
+            for j in range(n):
+                qvel[table[n + j]] = part * given[n + j]
+            velocities(model, data)
+            actuation(model, data)
+            for j in range(n):
+                k = table[n + j]
+                output[n * n + (1 - part) * n + j] = bias[k] - passive[k] - actuator[k]
+        return 0
+
+    return Function(native)
+
+
+@functools.cache
+def native_coriolis() -> Function:
+    """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its input is w, (n,)."""
+    velocities = _called("mj_fwdVelocity")
+
+    def native(y, p, m, out):
+        own = carray(pointer(p), (12,))
+        n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
+        w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
+        state, qvel = carray(pointer(int(own[11])), (2 * n,)), carray(pointer(int(own[5])), (nv,))
+        bias, table = carray(pointer(int(own[6])), (nv,)), carray(integers(int(own[9])), (2 * n,))
+        for j in range(n):
+            output[j] = 0.0
+        for part in range(2):
+            sign = 1.0 - 2.0 * part
+            for j in range(n):
+                qvel[table[n + j]] = state[n + j] + sign * w[j]
+            velocities(model, data)
+            for j in range(n):
+                output[j] += sign * 0.25 * bias[table[n + j]]
         return 0
 
     return Function(native)

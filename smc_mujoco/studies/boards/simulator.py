@@ -191,11 +191,11 @@ class Machine:
                 f"the robustness test of {scenario.plant.name} is one of the law and its estimator alone: leave out "
                 "surface, reference and feedforward"
             )
+        law, velocity = scenario.law.of_channel(0), resolved.velocity
         try:
-            self.law, self.estimator = native.component(scenario.law), native.component(resolved.velocity)
+            self.law, self.estimator = native.component(law), native.component(velocity)
         except NotCompilable as error:
             raise ScenarioError(f"the robustness test runs compiled laws only, and {error}") from None
-        law, velocity = scenario.law, resolved.velocity
         self.gains, self.filter = np.array([*law.gains.values(), 0.0]), np.array([*velocity.gains.values(), 0.0])
         self.sizes = law.memory, velocity.memory
         self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])

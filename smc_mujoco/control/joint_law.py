@@ -1,0 +1,163 @@
+"""Laws of many joints: pure functions of the measurement of all channels, which return a command for each.
+
+    @law_function(joint=True, gains={"lam": 6.0, "k1": 3.0})
+    def my_law(y, gains, memory):
+        s = y.de + gains.k1 * y.e                     # vectors (n,), one number for each channel
+        return -gains.lam * saturate(s), s
+
+The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d,
+where a law of one channel sees x'' = f + g u. M and h come from MuJoCo's own functions for your own models and for
+`double_pendulum`. The other plants have one equation per channel, so their M is diagonal.
+
+A gain is a vector (n,), too, unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays
+are copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.
+"""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import carray, njit
+from numba.extending import overload
+
+from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.common.registry import discover
+from smc_mujoco.control.component import Template
+
+
+class JointMeasurement(NamedTuple):
+    """The inputs of a law of many joints: all channels at a sample, in SI units. Vectors are (n,)."""
+
+    t: float  # time of the sample
+    dt: float  # control period
+    model: float  # 1 if the scenario lets the law use M, h and g, else 0
+    dynamics: Any  # what `coriolis` calls
+    x: np.ndarray  # measured positions
+    v: np.ndarray  # measured or estimated velocities
+    e: np.ndarray  # x - r
+    de: np.ndarray  # v - r'
+    r: np.ndarray  # references
+    dr: np.ndarray
+    ddr: np.ndarray
+    a: np.ndarray  # estimated accelerations; r'' if the estimator gives none
+    limit: np.ndarray  # bounds on |u|
+    M: np.ndarray  # nominal mass matrix of M x'' + h = u, (n, n), at the measured x
+    h: np.ndarray  # all forces but inertia and u: c(x, v) of Coriolis, gravity, springs, dampers; in the unit of u
+    g: np.ndarray  # those of them that hold at rest, h(x, 0): gravity and springs
+
+
+VECTORS = 9  # x to limit
+HEADER = 5  # t, dt, model, dynamics, n: numbers before the vectors where a measurement is stored
+
+
+def numbers(n: int) -> int:
+    """Return how many numbers store the measurement of n channels."""
+    return HEADER + (VECTORS + 2) * n + n * n
+
+
+@njit
+def measurement_at(address):
+    """Return the measurement that is stored at an address: HEADER numbers, the vectors, M, h and g."""
+    head = carray(pointer(address), (5,))
+    n, at = int(head[4]), address + 40
+    step = 8 * n
+    end = at + 9 * step
+    return JointMeasurement(
+        head[0],
+        head[1],
+        head[2],
+        int(head[3]),
+        carray(pointer(at), (n,)),
+        carray(pointer(at + step), (n,)),
+        carray(pointer(at + 2 * step), (n,)),
+        carray(pointer(at + 3 * step), (n,)),
+        carray(pointer(at + 4 * step), (n,)),
+        carray(pointer(at + 5 * step), (n,)),
+        carray(pointer(at + 6 * step), (n,)),
+        carray(pointer(at + 7 * step), (n,)),
+        carray(pointer(at + 8 * step), (n,)),
+        carray(pointer(end), (n, n)),
+        carray(pointer(end + n * step), (n,)),
+        carray(pointer(end + (n + 1) * step), (n,)),
+    )
+
+
+def stored_measurement(numbers: np.ndarray, dynamics: Any) -> JointMeasurement:
+    """Return the measurement that is stored in an array, for Python."""
+    n = int(numbers[HEADER - 1])
+    vectors, end = numbers[HEADER:], VECTORS * n
+    M, rest = vectors[end : end + n * n].reshape(n, n), vectors[end + n * n :].reshape(2, n)
+    return JointMeasurement(*numbers[:3].tolist(), dynamics, *vectors[:end].reshape(VECTORS, n), M, *rest)
+
+
+def coriolis(y, w):
+    """Return C(x, v) w, (n,), for a vector w (n,), with the C of Christoffel's symbols: M' - 2 C is skew-symmetric.
+
+    c(x, v) = C(x, v) v is part of y.h. C follows from c alone, as C(x, v) w = (c(x, v + w) - c(x, v - w)) / 4. It is 0
+    without the model, and for plants with one equation per channel.
+    """
+    return y.dynamics.coriolis(np.asarray(w, float))
+
+
+@overload(coriolis)
+def _coriolis(y, w):
+    def compiled(y, w):
+        n = len(y.x)
+        given, found = np.empty(n), np.zeros(n)
+        for i in range(n):
+            given[i] = w[i]
+        if y.dynamics != 0:
+            own = carray(pointer(y.dynamics), (3,))  # function, parameters, force per unit of u
+            call(int(own[0]), given.ctypes.data, int(own[1]), 0, found.ctypes.data)
+            for i in range(n):
+                found[i] /= own[2]
+        return found
+
+    return compiled
+
+
+@njit
+def product(M, w):
+    """Return M w. It adds in the same order in Python and compiled, as `M @ w` may not."""
+    found = np.zeros(len(w))
+    for i in range(len(w)):
+        for j in range(len(w)):
+            found[i] += M[i, j] * w[j]
+    return found
+
+
+@njit
+def torque(y, v):
+    """Return the u for the accelerations v of the errors: M (v + r'') + h with the model, v without."""
+    if y.model == 0.0:
+        return v
+    return product(y.M, v + y.ddr) + y.h
+
+
+@njit
+def saturate(a):
+    """Return a clipped to -1 .. 1, element by element."""
+    return np.minimum(np.maximum(a, -1.0), 1.0)
+
+
+@njit
+def norm(a):
+    """Return the Euclidean norm of a vector. It adds in the same order in Python and compiled."""
+    total = 0.0
+    for each in a:
+        total += each * each
+    return math.sqrt(total)
+
+
+@functools.cache
+def catalogue() -> dict[str, Template]:
+    """Return every law of smc_mujoco.control.joint_laws, by name."""
+    return discover("smc_mujoco.control.joint_laws", Template)
+
+
+def joint_laws() -> list[str]:
+    """List the laws of many joints that `smc.law` knows. `smc.laws` lists those of one channel."""
+    return list(catalogue())

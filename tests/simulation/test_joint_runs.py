@@ -1,0 +1,206 @@
+"""Laws of many joints: the compiled callback against the Python loop, threads, and bad input."""
+
+import math
+import pickle
+import re
+
+import mujoco
+import numpy as np
+import pytest
+from helpers import arms
+from helpers.runs import assert_same, plainly
+
+import smc_mujoco as smc
+from smc_mujoco.control.joint_law import coriolis, norm, product, saturate, torque
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.plant import Values
+from smc_mujoco.simulation import reference
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return arms.arm()
+
+
+@smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0}, memory=3, requires_model=True)
+def curious(y, gains, memory):
+    """Reads everything that a law of many joints may read, and remembers."""
+    s = y.de + gains.c * y.e
+    memory[:, 0] += y.dt * saturate(s)
+    memory[0, 1] = y.t
+    for i in range(len(s)):
+        memory[i, 2] = math.tanh(y.a[i] / y.limit[i])
+    u = torque(y, -gains.c * y.de - gains.k * s) - coriolis(y, 0.1 * s) - product(y.M, memory[:, 0])
+    return u + 1e-3 * (norm(y.x) * y.g + y.v + y.r - y.dr + memory[:, 2] + memory[0, 1]), s
+
+
+def cases(arm):
+    """Scenarios that differ in all that the law's road touches, most in one Batch."""
+    common = {"duration": 0.05, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2)}
+    loaded = {"velocity": "levant", "input_delay": 2e-3, "mismatch": {"m": 1.4}, "feedforward": smc.Constant(0.3)}
+    for name in smc.joint_laws():
+        yield smc.Scenario(plant=arm, law=name, x0=(0.1, -0.3, 0.2), **common)
+        yield smc.Scenario(plant="double_pendulum", law=name, **common)
+    yield smc.Scenario(plant=arm, law=curious(k=[10.0, 20.0, 30.0]), u_max=20.0, **common | loaded)
+    yield smc.Scenario(plant=arm, law=curious, model="none", **common)
+    yield smc.Scenario(plant="pendulum_network", law=curious, control_period=2e-3, **common)
+    yield smc.Scenario(plant="servo_axis", law=curious, **common)
+    yield smc.Scenario(plant="servo_axis", law=curious, actuator=smc.DCMotor(command="voltage", gear=50.0), **common)
+
+
+def test_callback_equals_plain_loop_under_laws_of_many_joints(arm):
+    scenarios = list(cases(arm))
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        assert_same(trace, reference.run(scenario))
+
+
+def test_bits_do_not_depend_on_threads(arm):
+    scenarios = [
+        smc.Scenario(plant=arm, law="computed_torque_sliding", seed=i, noise=smc.Noise(1e-3), duration=0.05)
+        for i in range(9)
+    ]
+    first = smc.run(scenarios, threads=1)
+    for threads in (2, 4):
+        for one, other in zip(first, smc.run(scenarios, threads=threads), strict=True):
+            assert_same(one, other)
+
+
+def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
+    """M a + h is the force that MuJoCo's inverse dynamics ask for at random states; g is h at rest."""
+    rng = np.random.default_rng(1)
+    model = arm.load()
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
+    data, dofs = mujoco.MjData(model), [2, 0, 1]
+    for _ in range(10):
+        x, v, a = rng.normal(size=(3, 3))
+        data.qpos[dofs], data.qvel[dofs], data.qacc[dofs] = x, v, a
+        mujoco.mj_inverse(model, data)
+        values = Values(**arm.parameters)
+        found = arm.nominal.dynamics(x, v, values)
+        np.testing.assert_allclose(found.M @ a + found.h, data.qfrc_inverse[dofs], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(found.g, arm.nominal.dynamics(x, 0 * v, values).h, rtol=1e-12, atol=1e-12)
+
+
+def test_coriolis_is_christoffels(arm):
+    """C v is the part of h that is quadratic in v, and M' - 2 C is skew-symmetric: w' M' w = 2 w' C w."""
+    rng = np.random.default_rng(2)
+    values, h = Values(**arm.parameters), 1e-5
+    nominal = arm.nominal
+    assert isinstance(nominal, NominalModel)
+    damping = np.array([0.3, 0.1, 0.0])
+    for _ in range(5):
+        x, v, w = rng.normal(size=(3, 3))
+        found = nominal.dynamics(x, v, values)
+        quadratic = found.h - found.g - damping * v
+        np.testing.assert_allclose(nominal.coriolis(x, v, v, values), quadratic, rtol=1e-9, atol=1e-9)
+        after, before = (nominal.dynamics(x + sign * h * v, v, values).M for sign in (1, -1))
+        rate = w @ (after - before) @ w / (2 * h)
+        assert rate == pytest.approx(2 * w @ nominal.coriolis(x, v, w, values), abs=1e-7)
+
+
+def test_a_law_that_numba_refuses_runs_in_the_reference_loop():
+    @smc.law_function(joint=True, gains={"k": 4.0})
+    def listed(y, gains, memory):
+        return [*(-gains.k * y.e)], np.array([f"{a}" for a in y.e]).astype(float)
+
+    trace = plainly(smc.Scenario(plant="double_pendulum", law=listed, duration=0.02))
+    assert trace.failure is None
+    np.testing.assert_array_equal(trace.u, np.clip(-4.0 * trace.x, -6, 6))
+
+
+@smc.law_function(joint=True)
+def short(y, gains, memory):
+    return y.e[:1], y.e
+
+
+@smc.law_function(joint=True, gains={"when": 0.01})
+def late(y, gains, memory):
+    """Returns NaN for its second joint after a time in s."""
+    u = -y.e
+    if y.t > gains.when[1]:
+        u[1] = math.nan
+    return u, y.e
+
+
+@smc.law_function(joint=True, memory=1)
+def beyond(y, gains, memory):
+    memory[len(y.e), 0] = 1.0
+    return -y.e, y.e
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (short, "instead of two vectors u, s of 2 numbers each, at t = 0 s"),
+        (late, "law 'late' returned u = nan, s = 0.5"),
+        (beyond, "law 'beyond' raised IndexError"),
+    ],
+)
+def test_a_failing_law_ends_its_own_run_with_the_reason(law, said):
+    common = {"plant": "double_pendulum", "duration": 0.03}
+    failed, other = smc.run([smc.Scenario(law=law, **common), smc.Scenario(law="classical", **common)])
+    assert said in str(failed.failure)
+    assert other.failure is None
+
+
+def test_a_joint_law_pickles_and_survives_a_file(tmp_path, arm):
+    law = smc.law("computed_torque_sliding", k=[3, 4, 5])
+    assert pickle.loads(pickle.dumps(law)) == law
+    trace = smc.run(smc.Scenario(plant=arm, law=law, duration=0.02))
+    loaded = smc.load(trace.save(tmp_path / "a.npz"))
+    assert loaded.scenario == trace.scenario
+    assert_same(smc.run(loaded.scenario), trace)
+
+
+TWICE = """
+<mujoco><worldbody><body>
+  <joint name="a" axis="0 1 0"/><joint name="b" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/>
+</body></worldbody></mujoco>
+"""
+WELDED = """
+<mujoco><worldbody>
+  <body name="one"><joint name="a" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/></body>
+  <body name="two" pos="1 0 0"><joint name="b" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1"/></body>
+</worldbody><equality><weld body1="one" body2="two"/></equality></mujoco>
+"""
+TORQUE = "computed_torque_sliding"
+REFUSED = {
+    "gain of another length": (
+        lambda: smc.Scenario(plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])),
+        "gain k of computed_torque_sliding has 3 values, (1, 2, 3), and double_pendulum has 2 driven channels",
+    ),
+    "no gain": (lambda: smc.law(TORQUE, k=[]), "computed_torque_sliding's k is []"),
+    "bad gain": (lambda: smc.law(TORQUE, k=[1.0, -1.0]), "computed_torque_sliding's k[1] is -1: give"),
+    "free joint": (
+        lambda: smc.Scenario(plant="cart_pole", law=TORQUE),
+        "commands them all, and cart_pole has 1 without an actuator",
+    ),
+    "surface": (
+        lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),
+        "is of many joints and has its own surface",
+    ),
+    "singular": (
+        lambda: smc.Scenario(
+            plant=smc.plant_from(TWICE, channels={n: smc.Channel(motor=True) for n in "ab"}, name="twice"), law=TORQUE
+        ),
+        "the mass matrix of twice is singular at x0",
+    ),
+    "welded": (
+        lambda: smc.Scenario(
+            plant=smc.plant_from(WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"), law=TORQUE
+        ),
+        "welded has no nominal model: equality constraints hold its joints together",
+    ),
+    "in C": (lambda: smc.law_to_c(TORQUE), "law 'computed_torque_sliding' is of many joints"),
+    "chattering": (lambda: smc.chattering(TORQUE, plant="double_pendulum"), "is of many joints"),
+}
+
+
+@pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input_is_one_sentence(case):
+    make, said = REFUSED[case]
+    with pytest.raises(smc.ScenarioError, match=re.escape(said)) as caught:
+        make()
+    assert "\n" not in str(caught.value)
