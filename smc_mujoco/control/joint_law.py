@@ -144,6 +144,15 @@ def saturate(a):
 
 
 @njit
+def tanh(a):
+    """Return the hyperbolic tangents of a vector: the same in Python and compiled, as numpy's may not be."""
+    found = np.empty(len(a))
+    for i in range(len(a)):
+        found[i] = math.tanh(a[i])
+    return found
+
+
+@njit
 def norm(a):
     """Return the Euclidean norm of a vector. It adds in the same order in Python and compiled."""
     total = 0.0

@@ -271,7 +271,7 @@ class Loop:
             self.forces[1, self.rubs] += data.actuator_force[self.channels["friction"][self.rubs]]
 
 
-def gains_of(c: Component, n: int) -> tuple:
+def gains_of(c: Component, n: int = 1) -> tuple:
     """Return the gains of a component as the record that its function reads: vectors (n,) for a law of many joints."""
     values: list[Any] = list(c.gains.values())
     if c.joint:

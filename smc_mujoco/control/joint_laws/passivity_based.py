@@ -1,0 +1,37 @@
+"""Passivity-based sliding law: u = M v_r' + C v_r + g - K s - k sat(s / width), v_r = r' - c e, s = v - v_r.
+
+s = de + c e, and g has springs and the nominal damping, too. The law cancels no Coriolis forces but keeps the
+mechanism passive: with M' - 2 C skew-symmetric,
+
+    V = s' M s / 2,    V' = -s' (K s + k sat(s / width) - d),
+
+so that V falls while each |s_i| > width if k_i > |d_i|, in the unit of the force: no bound on M^-1 d is needed. A
+constant d leaves |s| = |d| / (K + k / width) at rest. M need not be inverted.
+Gains: K, damping of s [N m s/rad]; k, switching gain [N m]; c, slope of the surface [1/s]; width, of the boundary
+layer [rad/s].
+Source: J.-J. E. Slotine & W. Li, "On the adaptive control of robot manipulators", Int. J. Robotics Research 6(3):49,
+1987; the same, Applied Nonlinear Control, Prentice Hall 1991, section 9.2. The switching term has a boundary layer
+here.
+"""
+
+from smc_mujoco.control.joint_law import coriolis, product, saturate
+from smc_mujoco.control.law import law_function
+from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, SPEED, Gain
+
+
+@law_function(
+    joint=True,
+    family="first-order",
+    continuous=True,
+    requires_model=True,
+    gains={
+        "K": Gain(1.0, FORCE_PER_SPEED, positive=True),
+        "k": Gain(1.0, FORCE, nonnegative=True),
+        "c": Gain(5.0, RATE, positive=True),
+        "width": Gain(0.1, SPEED, positive=True),
+    },
+)
+def passivity_based(y, gains, memory):
+    s = y.de + gains.c * y.e
+    feedforward = product(y.M, y.ddr - gains.c * y.de) + y.h - coriolis(y, s)  # C v_r = C v - C s, and h has C v
+    return feedforward - gains.K * s - gains.k * saturate(s / gains.width), s
