@@ -206,7 +206,7 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     if final or stays:
         return CONVERGES if stays else UNDECIDED if home.any() else DOES_NOT
     moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
-    limits = STILL * np.array([*far, trace.scenario.resolved.u_max])
+    limits = STILL * np.array([*far, float(np.max(trace.scenario.resolved.u_max))])
     return DOES_NOT if (moved <= limits).all() and not home.any() else None
 
 

@@ -13,6 +13,7 @@ import numpy as np
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
+MAX_LISTED = 850  # characters of the names to choose from; chosen: the sentence stays below 1000
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path
 
 
@@ -56,7 +57,8 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """Return the error for a name that is not among `known`, with the nearest that is."""
     names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
-    hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(names)}" if names else "there are none"
+    listed = one_line(", ".join(names), MAX_LISTED)
+    hint = f"did you mean {near[0]!r}?" if near else f"choose from {listed}" if names else "there are none"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 

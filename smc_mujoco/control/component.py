@@ -99,6 +99,7 @@ class Component:
       function: None if a loaded trace names one that is not available.
       joint: whether it is a law of many joints.
       shared: gains of which a law of many joints has one number for all joints.
+      each: the laws of the driven channels, where they are not the same law; then this has no function of its own.
       template: the Template it was made from; None if that is not available.
     """
 
@@ -112,6 +113,7 @@ class Component:
     requires_model: bool = False
     joint: bool = False
     shared: tuple[str, ...] = ()
+    each: "tuple[Component, ...]" = ()
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
 
     degree = renamed("degree", RENAMED["degree"])
@@ -149,8 +151,13 @@ class Component:
 
     @property
     def uniform(self) -> bool:
-        """Whether every gain is one number for all channels."""
-        return not any(isinstance(value, tuple) for value in self.gains.values())
+        """Whether all channels have the same law with the same gains."""
+        return not self.each and not any(isinstance(value, tuple) for value in self.gains.values())
+
+    @property
+    def parts(self) -> "tuple[Component, ...]":
+        """The components whose functions it needs: itself, or the laws of its channels."""
+        return self.each or (self,)
 
     def of_channel(self, i: int) -> "Component":
         """Return the component of channel i, with one number for each gain.
@@ -162,6 +169,8 @@ class Component:
             raise ScenarioError(f"law {self.name!r} is of many joints: give a law of one channel")
         if self.uniform:
             return self
+        if self.each:
+            return self.each[min(i, len(self.each) - 1)]
         return dataclasses.replace(self, gains={name: at(value, i) for name, value in self.gains.items()})
 
     def __str__(self):
@@ -311,6 +320,34 @@ def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
     count = max((len(value) for value in gains.values() if isinstance(value, tuple)), default=1)
     for i in range(count):
         yield SimpleNamespace(**{name: at(value, i) for name, value in gains.items()})
+
+
+def by_channel(laws: "Sequence[Component]") -> Component:
+    """Return the law that gives each driven channel one of these laws of one channel.
+
+    Raises:
+      ScenarioError: a law of many joints, or one that has gains by channel itself.
+    """
+    first = laws[0]
+    for i, law in enumerate(laws):
+        if law.joint or not law.uniform:
+            kind = "of many joints" if law.joint else f"{law}, with gains by channel,"
+            raise ScenarioError(f"the law of channel {i} is {law.name!r}, {kind}: give it a law of one channel")
+    if all(law == first for law in laws):
+        return first
+    if all(law.function is first.function and law.name == first.name for law in laws):
+        gains = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
+        return dataclasses.replace(first, gains={k: v if len(set(v)) > 1 else v[0] for k, v in gains.items()})
+    return Component(
+        kind=first.kind,
+        name=" + ".join(dict.fromkeys(law.name for law in laws)),
+        gains={f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()},
+        memory=max(law.memory for law in laws),
+        function=None,
+        relative_degree=max(law.relative_degree for law in laws),
+        requires_model=any(law.requires_model for law in laws),
+        each=tuple(laws),
+    )
 
 
 def at(value: Value, i: int) -> float:

@@ -158,7 +158,7 @@ class Chunk:
             state.NOT_FINITE: f"{law} returned NaN, inf or a command above {controller.MAX_CONTROL:g}",
             state.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
             state.ESTIMATOR_RAISED: f"{estimator} raised an exception",
-            state.REFERENCE_RAISED: f"reference {type(scenario.reference).__name__} raised an exception",
+            state.REFERENCE_RAISED: "a reference raised an exception",
             state.FEEDFORWARD_RAISED: f"feedforward {type(scenario.feedforward).__name__} raised an exception",
             state.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
             state.LAW_RAISED: f"{law} raised an exception",
@@ -197,7 +197,8 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
                 if failure == state.NOT_FINITE:
                     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
             case state.REFERENCE_RAISED:
-                reference.evaluate(s.reference, t)
+                for signal in s.references:
+                    reference.evaluate(signal, t)
             case state.FEEDFORWARD_RAISED if s.feedforward is not None:
                 reference.evaluate(s.feedforward, t)
             case state.NOMINAL_RAISED:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown
-from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.law import law as find_law
@@ -18,11 +18,11 @@ from smc_mujoco.control.surface import surface as find_surface
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
-from smc_mujoco.simulation.signals import Signal
+from smc_mujoco.simulation.signals import PerChannel, Signal
 
 P = TypeVar("P", bound=Part)
 T = TypeVar("T")
@@ -31,9 +31,71 @@ INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
 
 
+ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels
+Laws = Law | Template | str | ByChannel[Law | Template | str]
+
+
 def law(value: Law | Template | str) -> Law:
     """Return a law, from itself, its template or its name."""
     return component("law", find_law(value) if isinstance(value, str) else value)
+
+
+def laws(value: Laws, plant: Plant) -> Law:
+    """Return the law of a plant's driven channels, from one law for all or one for each."""
+    if not isinstance(value, Mapping | list | tuple):
+        return law(value)  # pyright: ignore[reportArgumentType]
+    return by_channel([law(one) for one in each("law", value, plant)])  # pyright: ignore[reportArgumentType]
+
+
+def unchanged_law(value: Laws) -> Law:
+    """Return a law as given. `laws` converts it when the plant is known."""
+    return value  # pyright: ignore[reportReturnType]
+
+
+def unchanged_reference(value: Signal | ByChannel[Signal]) -> Signal:
+    """Return a reference as given. `reference` converts it when the plant is known."""
+    return value  # pyright: ignore[reportReturnType]
+
+
+def unchanged_bound(value: float | ByChannel[float] | None) -> float | tuple[float, ...] | None:
+    """Return a bound as given. `bound` converts it when the plant is known."""
+    return value  # pyright: ignore[reportReturnType]
+
+
+def each(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
+    """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping by joint.
+
+    Raises:
+      ScenarioError: too few or too many, or a joint that is no driven channel, or that is missing.
+    """
+    if isinstance(value, Mapping):
+        joints = joint_names(plant)[: plant.driven]
+        for joint in value:
+            if joint not in joints:
+                raise unknown(f"driven joint of {plant.name} in {name}", joint, joints)
+        for joint in joints:
+            if joint not in value:
+                raise ScenarioError(f"{name} has nothing for joint {joint!r} of {plant.name}: give one for each")
+        return [value[joint] for joint in joints]
+    if len(value) != plant.driven:
+        raise ScenarioError(
+            f"{name} has {len(value)} values for the {plant.driven} driven channels of {plant.name}: give one, or "
+            f"{plant.driven}"
+        )
+    return list(value)
+
+
+def bound(value: float | ByChannel[float] | None, plant: Plant) -> float | tuple[float, ...] | None:
+    """Return the bound on |u| of all channels, or of each driven one if they differ."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, Mapping | list | tuple):
+        return None if value is None else number("u_max", value, above=0.0, infinite=True)
+    joints = list(value) if isinstance(value, Mapping) else range(plant.driven)
+    listed = each("u_max", value, plant)
+    checked = [
+        number(f"u_max[{shown(i)}]", one, above=0.0, infinite=True) for i, one in zip(joints, listed, strict=True)
+    ]
+    return checked[0] if len(set(checked)) == 1 else tuple(checked)
 
 
 def surface(value: Surface | Template | str | None) -> Surface | None:
@@ -133,12 +195,14 @@ def sensor(value: Encoder | None) -> Encoder | None:
     return instance("sensor", value, Encoder, "smc.Encoder(counts=...)")
 
 
-def reference(value: Signal | Sequence[Signal]) -> Signal:
-    """Return one signal, also from a list of one."""
-    items = several(value)
-    if len(items) != 1 or not isinstance(items[0], Signal):
-        raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
-    return items[0]
+def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
+    """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each."""
+    listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
+    items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
+    for item in items:
+        if not isinstance(item, Signal):
+            raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
+    return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 
 def feedforward(value: Signal | None) -> Signal | None:

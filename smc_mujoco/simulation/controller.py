@@ -25,7 +25,7 @@ from smc_mujoco.control.joint_law import HEADER, VECTORS
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at
-from smc_mujoco.simulation.state import log_at, signal_at, state_at
+from smc_mujoco.simulation.state import function_at, log_at, signal_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -154,6 +154,10 @@ def _inform(at, sim, y, i, partner):
     Channel `partner` moves with channel i and has no actuator; 0 for none. The nominal model has the force of channel
     i's drive, gain u - drag v, in place of u.
     """
+    if sim.references != 0:
+        if _call(function_at(sim.references, i), 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            return record.REFERENCE_RAISED
+        y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
     x, v, a = pointer(sim.x), pointer(sim.v), pointer(sim.a)
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     if partner > 0:
@@ -203,7 +207,11 @@ def _decide(at, sim, k):
         failure = _inform(at, sim, y, i, i + driven if i + driven < n else 0)
         if failure != record.FINE:
             return failure
-        if _call(sim.law, i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT) != 0:
+        if sim.laws == 0:
+            raised = _call(sim.law, i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT)
+        else:
+            raised = _call(function_at(sim.laws, i), i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT)
+        if raised != 0:
             return record.LAW_RAISED
         limit = pointer(sim.limits)[i]
         wanted = asked.u + added
@@ -259,34 +267,42 @@ def _model(at, sim, M, h):
 
 
 @njit(error_model="numpy")
-def _decide_together(at, sim, k):
-    """Run a law of many joints at sample k, as `_decide` runs one of one channel. Return a failure code."""
-    n, step, t = sim.n, 8 * sim.n, k * sim.period
-    sim.instant.t = t
-    if _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-        return record.REFERENCE_RAISED
-    added, motion = 0.0, sim.motion
-    r, dr, ddr = motion.value, motion.rate, motion.acceleration
-    if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-            return record.FEEDFORWARD_RAISED
-        added = motion.value
+def _inform_together(at, sim, t):
+    """Write into the record what a law of many joints reads at time t, s. Return a failure code."""
+    n, step, motion, r, dr, ddr = sim.n, 8 * sim.n, sim.motion, 0.0, 0.0, 0.0
     head, first = pointer(sim.joint), sim.joint + 8 * HEADER
     head[0], head[1], head[2], head[3], head[4] = t, sim.period, sim.uses_model, sim.coriolis, n
     y = pointer(first)
     x, v, a, limits = pointer(sim.x), pointer(sim.v), pointer(sim.a), pointer(sim.limits)
     for i in range(n):
+        if sim.references != 0 or i == 0:
+            function = function_at(sim.references, i) if sim.references != 0 else sim.reference
+            if _call(function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+                return record.REFERENCE_RAISED
+            r, dr, ddr = motion.value, motion.rate, motion.acceleration
         y[i], y[n + i], y[2 * n + i], y[3 * n + i] = x[i], v[i], x[i] - r, v[i] - dr
         y[4 * n + i], y[5 * n + i], y[6 * n + i] = r, dr, ddr
         y[7 * n + i], y[8 * n + i] = ddr if math.isnan(a[i]) else a[i], limits[i]
     M = first + VECTORS * step
-    failure = _model(at, sim, M, M + n * step)
+    return _model(at, sim, M, M + n * step)
+
+
+@njit(error_model="numpy")
+def _decide_together(at, sim, k):
+    """Run a law of many joints at sample k, as `_decide` runs one of one channel. Return a failure code."""
+    n, added, law = sim.n, 0.0, sim.law
+    sim.instant.t = k * sim.period
+    failure = _inform_together(at, sim, k * sim.period)
     if failure != record.FINE:
         return failure
-    law = sim.law
+    if sim.feedforward.address != 0:
+        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            return record.FEEDFORWARD_RAISED
+        added = sim.motion.value
     if call(law.address, sim.joint, law.parameters, law.memory, sim.torques) != 0:
         return record.LAW_RAISED
-    asked, last, buffer = pointer(sim.torques), pointer(sim.u), pointer(sim.delay_buffer + step * (k % sim.delay_slots))
+    asked, last, limits = pointer(sim.torques), pointer(sim.u), pointer(sim.limits)
+    buffer, r = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots)), pointer(sim.joint + 8 * (HEADER + 4 * n))
     for i in range(n):
         wanted, s, limit = asked[i] + added, asked[n + i], limits[i]
         u = min(max(wanted, -limit), limit)
@@ -294,7 +310,7 @@ def _decide_together(at, sim, k):
             pointer(sim.joints)[0] = i
             return record.NOT_FINITE
         sample = log_at(sim.log, k * n + i)
-        buffer[i], sample.u, sample.s, sample.r = u, u, s, r
+        buffer[i], sample.u, sample.s, sample.r = u, u, s, r[i]
         last[i] = u
     return record.FINE
 

@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import Recorded
+from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
 PERFECT = Encoder(counts=math.inf)
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
@@ -31,11 +31,11 @@ DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: wh
 class Compiled:
     """The compiled functions of a scenario. `nominal` is None for a model that MuJoCo itself computes."""
 
-    law: Function | AtAddress
+    laws: tuple[Function | AtAddress, ...]  # one for all channels, or one for each driven channel
     surface: Function | AtAddress | None
     estimator: Function | AtAddress
     nominal: Function | None
-    reference: Function
+    references: tuple[Function, ...]  # one for all channels, or one for each driven channel
     feedforward: Function | None
     disturbances: tuple[Function, ...]
 
@@ -79,8 +79,9 @@ def prepare(scenario: object) -> Prepared:
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
     resolved = scenario.resolved
-    known = (scenario.reference,) if scenario.feedforward is None else (scenario.reference, scenario.feedforward)
-    for part in (scenario.law, scenario.surface, resolved.velocity):
+    known = dict.fromkeys(scenario.references)
+    known |= {} if scenario.feedforward is None else {scenario.feedforward: None}
+    for part in (*scenario.law.parts, scenario.surface, resolved.velocity):
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     for signal in (*known, *scenario.disturbance):
@@ -99,17 +100,27 @@ def prepare(scenario: object) -> Prepared:
 def _compile(s: Resolved) -> Compiled:
     """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
     plant = s.plant
-    for signal in (s.reference, *s.disturbance, *([] if s.feedforward is None else [s.feedforward])):
+    for signal in (*dict.fromkeys(s.references), *s.disturbance, *([] if s.feedforward is None else [s.feedforward])):
         native.values_of(signal)  # refuses data that compiled code would misread
     return Compiled(
-        law=native.component(s.law),
+        laws=tuple(native.component(law) for law in laws(s)),
         surface=s.surface and native.component(s.surface),
         estimator=native.component(s.velocity),
         nominal=None if isinstance(plant.nominal, Coupled) else native.nominal(plant.nominal, tuple(plant.parameters)),
-        reference=native.of_signal(s.reference),
+        references=tuple(native.of_signal(signal) for signal in references(s)),
         feedforward=s.feedforward and native.of_signal(s.feedforward),
         disturbances=tuple(map(native.of_signal, s.disturbance)),
     )
+
+
+def laws(s: Resolved) -> list[Component]:
+    """Return the law of all channels, or those of the driven channels if they differ or have other gains."""
+    return [s.law] if s.law.joint or s.law.uniform else [s.law.of_channel(i) for i in range(s.plant.driven)]
+
+
+def references(s: Resolved) -> tuple[Signal, ...]:
+    """Return the reference of all channels, or those of the driven channels if they differ."""
+    return s.references if isinstance(s.reference, PerChannel) else (s.reference,)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -119,11 +130,14 @@ class Packed:
     Attributes:
       numbers: gains, memories and all else that is float64.
       signals: the disturbances, (m,) SIGNAL.
+      laws, references: those of the driven channels, (driven,) FUNCTION; (0,) where all have the same.
       nominal: the data of MuJoCo's own nominal model, or None.
     """
 
     numbers: np.ndarray
     signals: np.ndarray
+    laws: np.ndarray
+    references: np.ndarray
     nominal: Any
 
 
@@ -151,10 +165,19 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     if coupled is not None and (modelled or not joint):
         own = coupled.native_dynamics(s.plant.parameters) if joint else coupled.native(s.plant.parameters)
     functions = {
-        "law": function(compiled.law, joint_gains(s.law, n) if joint else s.law.gains.values(), s.law.memory),
         "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
-        "reference": function(compiled.reference, native.values_of(s.reference)),
     }
+    law_functions = [
+        function(made, joint_gains(law, n) if joint else law.gains.values())
+        for made, law in zip(compiled.laws, laws(s), strict=True)
+    ]
+    memory = buffer.reserve(s.law.memory * n)
+    law_functions = [one | {"memory": memory, "stride": 8 * s.law.memory} for one in law_functions]
+    signal_functions = [
+        function(made, native.values_of(signal))
+        for made, signal in zip(compiled.references, references(s), strict=True)
+    ]
+    functions |= {"law": law_functions[0], "reference": signal_functions[0]}
     if own is not None:
         functions["dynamics" if joint else "nominal"] = function(own, own.values)
     elif compiled.nominal is not None:
@@ -186,6 +209,12 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         ],
         state.SIGNAL,
     )
+    tables = {
+        name: np.array(
+            [state.as_tuple(state.FUNCTION, placed(one)) for one in listed] if len(listed) > 1 else [], state.FUNCTION
+        )
+        for name, listed in (("laws", law_functions), ("references", signal_functions))
+    }
     at = buffer.address(joints)
     values: dict[str, Any] = {name: placed(found) for name, found in functions.items()}
     if measurement is not None and torques is not None:
@@ -194,6 +223,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         called = coupled.native_coriolis(), values["dynamics"]["parameters"], s.drive.gain
         numbers[coriolis : coriolis + 3] = called
         values["coriolis"] = buffer.address(coriolis)
+    values |= {name: state.address(table) for name, table in tables.items() if len(table)}
     values |= {
         "n": n,
         "driven": int(np.sum(channels["ctrl"] >= 0)),
@@ -234,7 +264,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "a": at + 16 + 16 * n,
         "u": at + 16 + 24 * n,
     }
-    return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, own)
+    return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, **tables, nominal=own)
 
 
 def joint_gains(law: Component, n: int) -> list[float]:

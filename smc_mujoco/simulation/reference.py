@@ -26,7 +26,7 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Signal
+from smc_mujoco.simulation.signals import PerChannel, Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
@@ -189,13 +189,14 @@ class Loop:
             return self.decide_together(x, v, k)
         t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
         limits = scenario.limits
-        r, dr, ddr = evaluate(scenario.reference, t)
-        self.r[:] = r
+        known = [evaluate(signal, t) for signal in references(scenario)]  # one for all, or one for each
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
         for i in range(len(x)):
             if not self.driven[i]:  # only measured
                 u[i] = s[i] = self.r[i] = 0.0
                 continue
+            r, dr, ddr = known[i % len(known)]
+            self.r[i] = r
             xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
             y = Measurement(
                 t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
@@ -223,7 +224,8 @@ class Loop:
         """Return what `decide` returns, under a law of many joints."""
         scenario, n = self.scenario, len(x)
         t = k * scenario.control_period
-        r, dr, ddr = (np.full(n, value) for value in evaluate(scenario.reference, t))
+        known = [evaluate(signal, t) for signal in references(scenario)]
+        r, dr, ddr = np.array([known[i % len(known)] for i in range(n)]).T.copy()
         self.r[:] = r
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
         a = np.where(np.isnan(self.a), ddr, self.a)
@@ -287,20 +289,28 @@ class PythonComponent:
 
     Attributes:
       name: its kind and name, for messages.
-      function: the function, and all that it calls, not compiled.
-      gains: the record that it reads.
+      functions: the function of each channel, and all that it calls, not compiled.
+      gains: the record that each reads.
       memory: one row for each channel, (n, c.memory).
     """
 
     def __init__(self, c: Component, n: int):
         self.name, self.returns = f"{c.kind} {c.name!r}", RETURNS[c.kind]
-        self.function = rebuild(c.function, lambda function: function)
         self.memory = np.zeros((n, c.memory))
+        parts = self._parts(c)
+        plain = {part.function: rebuild(part.function, lambda function: function) for part in dict.fromkeys(parts)}
+        self.functions, self.sizes = [plain[part.function] for part in parts], [part.memory for part in parts]
         self.bind(c)
 
+    def _parts(self, c: Component) -> list[Component]:
+        """Return the component of each channel; of a law of many joints itself."""
+        return [c if c.joint else c.of_channel(i) for i in range(len(self.memory))]
+
     def bind(self, c: Component) -> None:
-        """Take the gains of a component with the same function."""
-        self.gains = gains_of(c, len(self.memory))
+        """Take the gains of a component with the same functions."""
+        parts = self._parts(c)
+        made = {part: gains_of(part, len(parts)) for part in dict.fromkeys(parts)}
+        self.gains = [made[part] for part in parts]
 
     def __call__(self, i: int, y: tuple) -> list[float]:
         """Return its two numbers for channel i; NaN for an acceleration that is not estimated.
@@ -312,7 +322,7 @@ class PythonComponent:
           Failure: it raised an exception, or did not return numbers.
         """
         try:
-            out = self.function(y, self.gains, self.memory[i])
+            out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
         except RAISES as error:
             raise raised(self.name, error, f" in channel {i}") from error
         if isinstance(y, Reading) and not isinstance(out, tuple):
@@ -322,7 +332,7 @@ class PythonComponent:
     def together(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
         """Return u and s of a law of many joints, (n,) each; raises as a call."""
         try:
-            out = self.function(y, self.gains, self.memory)
+            out = self.functions[0](y, self.gains[0], self.memory)
         except RAISES as error:
             raise raised(self.name, error) from error
         n = len(self.memory)
@@ -367,6 +377,12 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
         )
         found = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
     return Dynamics(found.M / gain, (found.h + drag * v) / gain, found.g / gain)
+
+
+def references(scenario: Scenario) -> tuple[Signal, ...]:
+    """Return the reference of all channels, or those of the driven channels if they differ."""
+    one = scenario.reference
+    return one.signals if isinstance(one, PerChannel) else (one,)
 
 
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:

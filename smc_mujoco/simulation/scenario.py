@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, Signal
+from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, PerChannel, Signal
 
 MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -73,7 +73,8 @@ class Scenario:
 
     Attributes:
       plant: a Plant or the name of one.
-      law: a Law (`smc.law(name, **gains)` or your own), or the name of one.
+      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. Or one for each driven channel: a list in
+        their order, or a mapping from the joints' names, as also for u_max and reference.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
         for a law that requires it, else "none".
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
@@ -84,7 +85,7 @@ class Scenario:
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
-      reference: r(t), the same for every channel.
+      reference: r(t), the same for every channel, or one for each driven channel.
       feedforward: a known signal that is added to the law's u before its bound, the same for every driven channel: an
         excitation, or the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t), one signal or several to be added, or None.
@@ -119,16 +120,16 @@ class Scenario:
     """
 
     plant: Plant = field(converter=as_plant)
-    law: Law = field(converter=coerce.law)
+    law: Law = field(converter=coerce.unchanged_law)
     model: str | None = None
     surface: Surface | None = field(converter=coerce.surface, default=None)
     duration: float = 10.0
     control_period: float = 1e-3
     physics_step: float | None = None
-    u_max: float | None = None
+    u_max: float | tuple[float, ...] | None = field(converter=coerce.unchanged_bound, default=None)
     x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
     v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
-    reference: Signal = field(converter=coerce.reference, default=REST)
+    reference: Signal = field(converter=coerce.unchanged_reference, default=REST)
     feedforward: Signal | None = field(converter=coerce.feedforward, default=None)
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
@@ -176,6 +177,8 @@ class Scenario:
             kinds = ", ".join(self.plant.contacts)
             raise ScenarioError(f"contact is {shown(self.contact)}: give smc.Contact(...) or one of {kinds}")
         self.contact.check(self.plant)
+        put(law=coerce.laws(self.law, self.plant))
+        put(reference=coerce.reference(self.reference, self.plant))
         put(model=coerce.one_of("model", self.model, coerce.MODELS))
         put(integrator=coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS))
         put(mechanism=coerce.mechanism(self.mechanism, self.plant))
@@ -185,7 +188,7 @@ class Scenario:
         put(x0=coerce.per_channel("x0", self.x0, self.plant.n))
         put(v0=coerce.per_channel("v0", self.v0, self.plant.n))
         put(physics_step=coerce.physics_step(self.physics_step, self.control_period, MIN_TIME))
-        put(u_max=None if self.u_max is None else number("u_max", self.u_max, above=0.0, infinite=True))
+        put(u_max=coerce.bound(self.u_max, self.plant))
         put(input_delay=number("input_delay", self.input_delay, least=0.0, most=self.duration))
 
     def __eq__(self, other: object) -> bool:
@@ -239,9 +242,17 @@ class Scenario:
     def limits(self) -> tuple[float, ...]:
         """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's own limit."""
         u_max = self.resolved.u_max
+        bounds = u_max if isinstance(u_max, tuple) else (u_max,) * self.plant.driven
         if self.amplifier is not None:
-            return (min(u_max, self.amplifier.voltage),) * self.plant.driven
-        return tuple(min(u_max, limit) for limit in self.plant.limits) or (u_max,) * self.plant.driven
+            return tuple(min(bound, self.amplifier.voltage) for bound in bounds)
+        limits = self.plant.limits or bounds
+        return tuple(min(bound, limit) for bound, limit in zip(bounds, limits, strict=True))
+
+    @property
+    def references(self) -> tuple[Signal, ...]:
+        """The reference of each driven channel."""
+        one = self.reference
+        return one.signals if isinstance(one, PerChannel) else (one,) * self.plant.driven
 
     @functools.cached_property
     def steps(self) -> int:
@@ -311,7 +322,7 @@ class Resolved(Scenario):
 
     model: str
     physics_step: float
-    u_max: float
+    u_max: float | tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
     x0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
     v0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
     velocity: Estimator  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -402,10 +413,11 @@ def check_signals(s: Resolved) -> None:
             f"disturbance {shown(forces[0])} is a force on a body, but {s.plant.name} is your own model, whose "
             "disturbances act on its joints: give another signal"
         )
-    if s.reference.cartesian:
-        raise ScenarioError(f"reference is a {type(s.reference).__name__}, which is a force: give a signal")
-    if s.reference.random:
-        raise ScenarioError(f"reference is {type(s.reference).__name__}, which is noise: give a smooth signal")
+    for reference in dict.fromkeys(s.references):
+        if reference.cartesian:
+            raise ScenarioError(f"reference is a {type(reference).__name__}, which is a force: give a signal")
+        if reference.random:
+            raise ScenarioError(f"reference is {type(reference).__name__}, which is noise: give a smooth signal")
     if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random):
         kind = "noise" if s.feedforward.random else "a force on a body"
         raise ScenarioError(f"feedforward is {type(s.feedforward).__name__}, which is {kind}: give a known signal of u")
@@ -414,21 +426,29 @@ def check_signals(s: Resolved) -> None:
 def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
     check_channels(s)
-    if not fits(s.law, s.plant):
-        paired = dataclasses.replace(s.plant, underactuated=True)
-        hint = ": give each channel a partner" if s.plant.direct and fits(s.law, paired) else ""
-        raise ScenarioError(f"law {s.law.name!r} is only for {', '.join(s.law.plants)}, not for {s.plant.name}{hint}")
+    for law in s.law.parts:
+        if not fits(law, s.plant):
+            paired = dataclasses.replace(s.plant, underactuated=True)
+            hint = ": give each channel a partner" if s.plant.direct and fits(law, paired) else ""
+            raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}{hint}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
-    if s.surface is not None and s.law.relative_degree > 1:
+    for law in s.law.parts:
+        if s.surface is not None:
+            check_surface(s.surface, law)
+
+
+def check_surface(surface: Surface, law: Law) -> None:
+    """Check that a surface suits a law."""
+    if law.relative_degree > 1:
         raise ScenarioError(
-            f"law {s.law.name!r} acts on the error and its rates, and takes no surface such as {s.surface.name!r}: "
+            f"law {law.name!r} acts on the error and its rates, and takes no surface such as {surface.name!r}: "
             "leave the surface out, or give a law of relative degree 1"
         )
-    if s.surface is not None and s.surface.relative_degree != s.law.relative_degree:
+    if surface.relative_degree != law.relative_degree:
         raise ScenarioError(
-            f"law {s.law.name!r} needs a sliding variable of relative degree {s.law.relative_degree}, "
-            f"and surface {s.surface.name!r} has {s.surface.relative_degree}: give another surface, or leave it out"
+            f"law {law.name!r} needs a sliding variable of relative degree {law.relative_degree}, "
+            f"and surface {surface.name!r} has {surface.relative_degree}: give another surface, or leave it out"
         )
 
 
@@ -510,8 +530,8 @@ def check_contact(contact: Contact, plant: Plant, factors: Mapping[str, float]) 
 
 def warn_of_degrees(s: Resolved) -> None:
     """Warn of a start or a reference's amplitude of several turns. Ramps and time series may reach as far."""
-    amplitude = s.reference.parameters().get("amplitude", 0.0)
-    for what, values in (("x0", s.x0), ("the reference's amplitude", (amplitude,) * s.plant.driven)):
+    amplitudes = tuple(one.parameters().get("amplitude", 0.0) for one in s.references)
+    for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 warnings.warn(
@@ -540,7 +560,7 @@ def _other_units(s: Resolved) -> Iterator[tuple[str, str]]:
             )
     if s.input_delay >= MIN_MILLISECONDS:
         yield f"input_delay is {s.input_delay:g} s", f"if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
-    for signal in (s.reference, *s.disturbance):
+    for signal in (*dict.fromkeys(s.references), *s.disturbance):
         phase = signal.parameters().get("phase", 0.0)
         if MAX_ANGLE < abs(phase) <= MAX_DEGREES:
             yield f"a phase is {phase:g} rad", f"if it is {phase:g} degrees, give math.radians({phase:g})"

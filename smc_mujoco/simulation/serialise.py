@@ -11,7 +11,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import present_place, subclasses
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.rig_controllers import CONTROLLERS
@@ -24,7 +24,7 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import time_series  # noqa: F401  # whose signals a file may name
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Recorded, Signal
+from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0")  # None where not given
@@ -76,7 +76,7 @@ def restore(data: dict) -> Scenario:
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _find(data["law"], "law", known_laws() | CONTROLLERS | _laws_elsewhere(data["law"]["module"])),
+        "law": _restore_law(data["law"]),
         "velocity": _find(data["velocity"], "estimator", estimators()),
         "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),
@@ -109,10 +109,18 @@ def _restore_plant(data: dict) -> Plant:
 
 
 def _component(c: Component) -> dict:
+    if c.each:
+        return {"name": c.name, "each": [_component(one) for one in c.each]}
     return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
         "degree": c.relative_degree,
         "module": getattr(c.function, "__module__", ""),
     }
+
+
+def _restore_law(data: dict) -> Component:
+    if "each" in data:
+        return by_channel([_restore_law(one) for one in data["each"]])
+    return _find(data, "law", known_laws() | CONTROLLERS | _laws_elsewhere(data["module"]))
 
 
 def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
@@ -145,10 +153,14 @@ def _laws_elsewhere(module: str) -> dict[str, Template]:
 def _signal(signal: Signal) -> dict:
     if isinstance(signal, Recorded):
         return {"kind": signal.kind, "module": signal.module, "values": signal.parameters()}
+    if isinstance(signal, PerChannel):
+        return {"each": [_signal(one) for one in signal.signals]}
     return _thing(signal)
 
 
 def _restore_signal(data: dict) -> Signal:
+    if "each" in data:
+        return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
     kind, values = _kinds(Signal).get((data["kind"], present_place(data["module"]))), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 

@@ -63,6 +63,20 @@ class Signal:
 
 
 @dataclasses.dataclass(frozen=True)
+class PerChannel(Signal):
+    """A reference of its own for each driven channel. A scenario makes it of several references."""
+
+    signals: tuple[Signal, ...]
+
+    def __post_init__(self):
+        pass
+
+    def parameters(self) -> dict[str, float]:
+        """Return no parameters: each signal has its own."""
+        return {}
+
+
+@dataclasses.dataclass(frozen=True)
 class Constant(Signal):
     """r(t) = amplitude."""
 

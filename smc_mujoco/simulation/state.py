@@ -64,6 +64,8 @@ SIMULATION = np.dtype(
         # functions, and whether the law may use the nominal model
         ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
+        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: `law` and `reference` are of all
+        ("laws", "i8"), ("references", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"), ("drive_drag", "f8"),
         # addresses of the nominal model's input (i, n, x, v, a, u; the last four (n,) each) and of x, v, a and u in it
@@ -80,7 +82,9 @@ SIMULATION = np.dtype(
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, state_at, log_at, signal_at = map(record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL))
+simulation_at, state_at, log_at, signal_at, function_at = map(
+    record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL, FUNCTION)
+)
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
 MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT = (

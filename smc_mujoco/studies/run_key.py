@@ -92,8 +92,9 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
 
 def _codes(s: Scenario) -> list[str]:
     """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's plant and parts."""
-    functions = [part.function for part in (s.law, s.velocity, s.surface) if part is not None]
-    signals = [type(signal) for signal in (s.reference, s.feedforward, *s.disturbance) if signal is not None]
+    functions = [part.function for part in (*s.law.parts, s.velocity, s.surface) if part is not None]
+    known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
+    signals = [type(signal) for signal in known if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
     own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
     if not s.plant.build.__module__.startswith(PACKAGE):

@@ -124,7 +124,7 @@ class Objective:
             return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
         tracking = min(metrics.itae(trace) / start, FAILED)
-        bound = trace.scenario.resolved.u_max if self.u_max is None else self.u_max
+        bound = float(np.max(trace.scenario.resolved.u_max)) if self.u_max is None else self.u_max
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
     def excess(self, case: Scenario) -> float:

@@ -9,6 +9,7 @@ channel's actuator drives, if it is not the channel's joint itself.
 """
 
 import dataclasses
+import functools
 from collections.abc import Hashable, Iterator
 from typing import Any, ClassVar, NamedTuple
 
@@ -16,7 +17,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import number
-from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 PASSIVE, ROTOR = "passive:", "rotor:"
 PLAY = "play:"  # a tendon of length rotor - joint
@@ -138,6 +140,13 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     found = driven_ids(model)
     measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return np.array([*found, *(joint for joint in measured if joint not in found)], int)
+
+
+@functools.lru_cache(maxsize=32)
+def joint_names(plant: Plant) -> tuple[str, ...]:
+    """Return the name of each channel's joint, (n,)."""
+    model = compiled(plant.spec())
+    return tuple(model.joint(int(joint)).name for joint in joint_ids(model))
 
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:

@@ -1,0 +1,138 @@
+"""A law, gains, bound and reference of its own for each channel: both loops, files, keys, and bad input."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from helpers import arms
+from helpers.runs import ARRAYS, assert_same
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.signals import PerChannel
+from smc_mujoco.studies import run_key
+
+SINE, MOVE = smc.Sine(0.3, 4.0), smc.MinimumJerk(0.4, 0.01, 0.03)
+COMMON = {"duration": 0.05, "noise": smc.Noise(1e-3, 1e-2)}
+BOTH = {"plant": "double_pendulum"} | COMMON
+
+
+@smc.law_function(gains={"k": 2.0}, memory=5)
+def remembers(y, gains, memory):
+    memory[4] += y.dt * y.e
+    return -gains.k * y.e - memory[4] + 0.01 * y.limit, y.e
+
+
+def cases():
+    """Scenarios in which channels differ in one respect or in all."""
+    mixed = {"shoulder": smc.law("super_twisting", k1=5.0), "elbow": remembers(k=3.0)}
+    yield smc.Scenario(law=mixed, u_max={"elbow": 2.0, "shoulder": 5.0}, reference=[SINE, MOVE], **BOTH)
+    yield smc.Scenario(law=["twisting", "super_twisting"], model="nominal", **BOTH)
+    yield smc.Scenario(law=smc.law("classical", k=[1.0, 5.0]), surface="pid", **BOTH)
+    yield smc.Scenario(law=remembers, reference={"shoulder": MOVE, "elbow": SINE}, feedforward=SINE, **BOTH)
+    yield smc.Scenario(
+        plant=arms.arm(), law="passivity_based", reference=[SINE, MOVE, SINE], u_max=[5.0, 50.0, 20.0], **COMMON
+    )
+    cart = {"plant": smc.plant("pendulum_network", n=3), "law": ["classical", remembers, "twisting"]}
+    yield smc.Scenario(reference=[SINE, SINE, MOVE], input_delay=3e-3, **cart, **COMMON)
+
+
+@pytest.fixture(scope="module")
+def traces():
+    scenarios = list(cases())
+    return smc.run(scenarios)
+
+
+def test_callback_equals_plain_loop_where_channels_differ(traces):
+    for trace in traces:
+        assert trace.failure is None
+        assert_same(trace, reference.run(trace.scenario))
+
+
+def test_files_and_keys_hold_what_each_channel_has(traces, tmp_path):
+    keys = set()
+    for i, trace in enumerate(traces):
+        if any(law.function is remembers.function for law in trace.scenario.law.parts):
+            continue  # a test's law is not found again
+        loaded = smc.load(trace.save(tmp_path / f"{i}.npz")).scenario
+        assert loaded == trace.scenario
+        assert run_key.key(loaded) == run_key.key(trace.scenario)
+        keys.add(run_key.key(trace.scenario))
+    assert len(keys) == 3
+
+
+def test_each_channel_runs_as_it_would_under_its_law_alone():
+    """On uncoupled pendulums a channel's run is that of a scenario in which all have its law, gains and reference."""
+    plant = smc.plant("pendulum_network", n=3, kc=0.0)
+    laws = [smc.law("classical", k=2.0), smc.law("twisting"), smc.law("super_twisting", k2=3.0)]
+    signals, bounds = [SINE, MOVE, smc.Constant(0.1)], [1.0, 2.0, 5.0]
+    together = smc.run(smc.Scenario(plant=plant, law=laws, reference=signals, u_max=bounds, duration=0.2))
+    for i, (law, signal, bound) in enumerate(zip(laws, signals, bounds, strict=True)):
+        alone = smc.run(smc.Scenario(plant=plant, law=law, reference=signal, u_max=bound, duration=0.2))
+        for name in set(ARRAYS) - {"t"}:
+            one, other = getattr(together, name)[:, i], getattr(alone, name)[:, i]
+            np.testing.assert_allclose(
+                one, other, rtol=1e-12, atol=1e-13, err_msg=name
+            )  # MuJoCo solves for all at once
+    assert np.abs(together.u).max(axis=0).tolist() == bounds
+
+
+def test_what_is_the_same_for_all_channels_is_one():
+    one = smc.Scenario(law=smc.law("classical"), reference=SINE, u_max=3.0, **BOTH)
+    same = smc.Scenario(law=["classical", "classical"], reference=[SINE, SINE], u_max=[3, 3.0], **BOTH)
+    assert one == same
+    assert same.law.uniform
+    gains = smc.Scenario(law=[smc.law("classical", k=1.0), smc.law("classical", k=2.0)], **BOTH).law
+    assert gains == smc.law("classical", k=[1.0, 2.0])
+    other = dataclasses.replace(one, reference=[SINE, MOVE])
+    assert isinstance(other.reference, PerChannel)
+    assert other.references == (SINE, MOVE)
+    assert dataclasses.replace(other, duration=0.02).reference == other.reference
+
+
+REFUSED = {
+    "unknown joint": (
+        lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
+        "unknown driven joint of double_pendulum in law 'elbo': did you mean 'elbow'?",
+    ),
+    "missing joint": (
+        lambda: smc.Scenario(law="classical", reference={"shoulder": SINE}, **BOTH),
+        "reference has nothing for joint 'elbow' of double_pendulum",
+    ),
+    "too many": (
+        lambda: smc.Scenario(law=["classical"] * 3, **BOTH),
+        "law has 3 values for the 2 driven channels of double_pendulum",
+    ),
+    "bad bound": (lambda: smc.Scenario(law="classical", u_max=[1.0, -2.0], **BOTH), "u_max[1] is -2"),
+    "joint law in one channel": (
+        lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
+        "the law of channel 1 is 'unit_vector', of many joints",
+    ),
+    "gains by channel in one channel": (
+        lambda: smc.Scenario(law=["classical", smc.law("twisting", r1=[1, 2])], **BOTH),
+        "with gains by channel",
+    ),
+    "noise as reference": (
+        lambda: smc.Scenario(law="classical", reference=[SINE, smc.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH),
+        "reference is OrnsteinUhlenbeck, which is noise",
+    ),
+    "gain of a surface": (lambda: smc.surface("linear", c=[1, 2]), "linear's c is (1, 2): give one number"),
+    "wrong degree": (
+        lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
+        "law 'twisting' acts on the error",
+    ),
+    "tuning": (
+        lambda: smc.tune("double_pendulum", smc.law("classical", k=[1, 2]), budget=1),
+        "one number for each gain",
+    ),
+    "in C": (lambda: smc.law_to_c(smc.law("classical", k=[1, 2])), "has gains by channel"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input_is_one_sentence(case):
+    make, said = REFUSED[case]
+    with pytest.raises(smc.ScenarioError, match=re.escape(said)) as caught:
+        make()
+    assert "\n" not in str(caught.value)
