@@ -122,6 +122,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     """
     body, values = jit(kind.value), loader(named(names))
     random, series, memory, behind = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
+    rows = kind.rows
 
     def native(y, p, m, out):
         i = carray(pointer(y), (4,))
@@ -129,7 +130,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2], i[3]))
         elif series:
             data = carray(pointer(p + behind), (2,))
-            ok, result = attempt(body, (i[0], values(p), carray(pointer(int(data[0])), (2, int(data[1])))))
+            ok, result = attempt(body, (i[0], values(p), carray(pointer(int(data[0])), (rows, int(data[1])))))
         else:
             ok, result = attempt(body, (i[0], values(p)))
         if ok:
@@ -138,7 +139,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    made = Function(native, _cached(kind.value, names, random, series, memory))
+    made = Function(native, _cached(kind.value, names, random, series, memory, rows))
     fingerprint.hold(kind)
     return made
 
@@ -203,15 +204,16 @@ def values_of(s: Signal) -> tuple[float, ...]:
     """Return the numbers that a compiled signal reads as its parameters. They are valid as long as the signal exists.
 
     Raises:
-      ScenarioError: the data of a series are not (2, N) float64, C-contiguous.
+      ScenarioError: the data of a series are not (rows, N) float64, C-contiguous.
     """
     values = tuple(s.parameters().values())
     if not s.series:
         return values
     data = s.data
-    if data.shape[:1] != (2,) or data.ndim != 2 or data.dtype != float or not data.flags.c_contiguous:
+    if data.shape[:1] != (s.rows,) or data.ndim != 2 or data.dtype != float or not data.flags.c_contiguous:
         raise ScenarioError(
-            f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, (2, N), C-contiguous"
+            f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, ({s.rows}, N), "
+            "C-contiguous"
         )
     return (*values, float(data.ctypes.data), float(data.shape[1]))
 

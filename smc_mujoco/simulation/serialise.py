@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.hardware import backlash, drives, friction  # noqa: F
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation import time_series  # noqa: F401  # whose signals a file may name
+from smc_mujoco.simulation import time_series, waypoints  # noqa: F401  # whose signals a file may name
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal

@@ -36,8 +36,9 @@ class Signal:
       positive, natural: names of parameters that must be > 0, and >= 0.
       random: whether `value` takes memory, seed, channel and stream.
       series: whether `value` takes data.
+      rows: of the data of a series.
       cartesian: whether it is a horizontal force on the body, N, instead of a force on the joint.
-      data: the array of a series, (2, N) float64, C-contiguous.
+      data: the array of a series, (rows, N) float64, C-contiguous.
       value: static method that returns the value and its first and second derivative.
     """
 
@@ -46,6 +47,7 @@ class Signal:
     natural: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
     series: ClassVar[bool] = False
+    rows: ClassVar[int] = 2
     cartesian: ClassVar[bool] = False
     data: ClassVar[np.ndarray]
     value: ClassVar[Callable[..., tuple[float, float, float]]]

@@ -37,18 +37,23 @@ class TimeSeries(Signal):
     series = True
 
     def __post_init__(self):
+        kind = type(self).__name__
         for name in ("times", "values"):
-            object.__setattr__(self, name, _floats(f"TimeSeries's {name}", getattr(self, name)))
+            object.__setattr__(self, name, _floats(f"{kind}'s {name}", getattr(self, name)))
         if len(self.times) != len(self.values):
             raise ScenarioError(
-                f"TimeSeries has {len(self.times)} times and {len(self.values)} values: give as many of each"
+                f"{kind} has {len(self.times)} times and {len(self.values)} values: give as many of each"
             )
-        _check("TimeSeries", self.times, self.values, "item {}".format)
-        object.__setattr__(self, "data", np.array([self.times, self.values]))
+        _check(kind, self.times, self.values, "item {}".format)
+        object.__setattr__(self, "data", self._data())
         self.data.flags.writeable = False
 
+    def _data(self) -> np.ndarray:
+        """Return the array that `value` reads, (rows, N)."""
+        return np.array([self.times, self.values])
+
     def __repr__(self) -> str:
-        return f"TimeSeries({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
+        return f"{type(self).__name__}({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
 
     def __reduce__(self):  # so that a copy has its own data, also read-only
         return type(self), (self.times, self.values)

@@ -17,6 +17,7 @@ ARM = """
         <body pos="0.4 0 0">
           <joint name="reach" type="slide" axis="1 0 0" damping="0.3"/>
           <geom fromto="0 0 0 0.2 0 0" mass="0.5"/>
+          <site name="tip" pos="0.2 0 0.05"/>
         </body>
       </body>
     </body>

@@ -22,6 +22,7 @@ from smc_mujoco.simulation.signals import (
     Impulse,
     MinimumJerk,
     OrnsteinUhlenbeck,
+    PerChannel,
     Pulse,
     Ramp,
     Recorded,
@@ -30,6 +31,7 @@ from smc_mujoco.simulation.signals import (
     Step,
 )
 from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.simulation.waypoints import Waypoints
 
 FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
 NOISE = BandLimited(0.3, 5.0, 15.0)
@@ -46,6 +48,7 @@ EVERY = [
     UNEVEN,
     Ramp(2.0, 0.3),
     MinimumJerk(1.0, 0.2, 0.5),
+    Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
 ]
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian)]  # what a reference may be
 
@@ -92,7 +95,7 @@ def refused(make, *parts):
 
 def test_every_kind_of_the_library_is_tested_here():
     kinds = {kind for kind in serialise._kinds(Signal).values() if kind.__module__.startswith("smc_mujoco.")}
-    assert kinds - {Recorded} == {type(signal) for signal in EVERY}
+    assert kinds - {Recorded, PerChannel} == {type(signal) for signal in EVERY}
 
 
 @pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
