@@ -87,7 +87,9 @@ def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], 
         ok, _ = attempt(law, (measurement_at(y), values(g, n), memories, output))
         return not ok
 
-    return Function(native, _cached(function, gains, shared, memory))
+    made = Function(native, _cached(function, gains, shared, memory))
+    fingerprint.hold(function)
+    return made
 
 
 @functools.cache
