@@ -234,7 +234,7 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
             plant=plant,
             condition=condition,
             unit=first.plant.unit,
-            u_max=first.resolved.u_max,
+            u_max=float(np.max(first.resolved.u_max)),
             curves=tuple(films.curve(trace) for trace in traces),
             film=film,
             poster=poster,
