@@ -17,7 +17,7 @@ PACKAGE = Path(smc.__file__).parent
 ROOT = PACKAGE.parent
 CATALOGUES = {
     "laws": "control/laws", "surfaces": "control/surfaces", "estimators": "control/estimators",
-    "plants": "mechanisms/plants",
+    "plants": "mechanisms/plants", "joint_laws": "control/joint_laws",
 }  # fmt: skip
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
@@ -164,6 +164,12 @@ from smc_mujoco.control.law import law_function
 def brand_new(y, gains, memory):
     return -gains.k * y.e, y.e
 """,
+    "joint_laws": """
+from smc_mujoco.control.law import law_function
+@law_function(joint=True, gains={"k": 2.0})
+def brand_new(y, gains, memory):
+    return -gains.k * y.e, y.e
+""",
     "estimators": """
 from smc_mujoco.control.estimator import estimator_function
 @estimator_function(gains={"k": 2.0})
@@ -185,6 +191,7 @@ BRAND_NEW = dataclasses.replace(DUFFING, name="brand_new")
 RUN = {
     "surfaces": "smc.Scenario(plant='duffing', law='classical', surface='brand_new', duration=0.01)",
     "laws": "smc.Scenario(plant='duffing', law='brand_new', duration=0.01)",
+    "joint_laws": "smc.Scenario(plant='double_pendulum', law='brand_new', duration=0.01)",
     "estimators": "smc.Scenario(plant='duffing', law='classical', velocity='brand_new', duration=0.01)",
     "plants": "smc.Scenario(plant='brand_new', law='classical', duration=0.01)",
 }
