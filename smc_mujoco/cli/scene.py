@@ -105,6 +105,11 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
         path = out / "signals"
         signals([t for _, t in flat], path, labels=[c for c, _ in flat], title=scene.title)
         return files(path)
+    if scene.figure == "chattering":
+        from smc_mujoco.draw.amplitudes import amplitudes
+
+        amplitudes(traces, out / "chattering", title=scene.title)
+        return files(out / "chattering")
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"

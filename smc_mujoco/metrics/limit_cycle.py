@@ -7,7 +7,8 @@ samples, refined by its phase in the two halves. A drift and slow waves, such as
 the amplitude is the median, over all windows of one period, of half the range of s less its mean over a period.
 
 There is no limit cycle where s does not oscillate (rounding only), where the peak has less than a tenth of the
-spectrum (noise) or no more than leaks from slow waves, or where the oscillation grows or dies, so that its amplitude
+spectrum (noise) or no more than leaks from slow waves, where it may be the third harmonic of a larger cycle with fewer
+than five periods, or where the oscillation grows or dies, so that its amplitude
 differs by more than half from the first to the second half of the samples.
 """
 
@@ -47,8 +48,11 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     first, leaked = PERIODS, LEAK * float(spectrum.max())
     while first < len(spectrum) - 1 and spectrum[first - 1] > spectrum[first]:
         first += 1  # on the slope of slower waves
+    slow = float(spectrum[:first].max())
     spectrum[:first] = 0.0
     total, peak = float(spectrum.sum()), int(spectrum.argmax())
+    if peak < 3 * PERIODS and spectrum[peak] < slow:
+        return NONE  # it may be the third harmonic of a cycle with fewer periods
     if spectrum[peak] <= leaked or spectrum[peak - 3 : peak + 4].sum() < SHARE * total:
         return NONE
     periods = _refined(rates, peak)

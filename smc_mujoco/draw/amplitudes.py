@@ -1,0 +1,105 @@
+"""Amplitude of chattering over the actuator's lag: predicted as lines, run as dots, one colour for each label.
+
+amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}}, "chattering.svg")
+"""
+
+import itertools
+import math
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
+from smc_mujoco.metrics.catalogue import chattering_amplitude
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+HEIGHT = 5.6  # inches on a full page
+
+
+def lag(scenario: Scenario) -> float:
+    """Return the sum of all delays and time constants between command and force, s."""
+    return scenario.resolved.input_delay + sum(part.delay for part in scenario.actuator if part.drives)
+
+
+def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float]) -> float:
+    """Return the lag, s, at which two amplitudes are equal, interpolated by powers; NaN where they do not cross.
+
+    Args:
+      lags: (K,) ascending, s.
+      one, other: (K,) amplitudes, NaN where there is no limit cycle.
+    """
+    known = [i for i, pair in enumerate(zip(one, other, strict=True)) if all(value > 0.0 for value in pair)]
+    ratios = [math.log(one[i] / other[i]) for i in known]
+    for k, (low, high) in enumerate(itertools.pairwise(ratios)):
+        if low * high <= 0.0 and low != high:
+            start, end = (math.log(lags[known[i]]) for i in (k, k + 1))
+            return math.exp(start + (end - start) * low / (low - high))
+    return math.nan
+
+
+def amplitudes(
+    traces: Mapping[str, Mapping[str, Trace]],
+    path: str | os.PathLike | None = None,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw the amplitude of s over the actuator's lag, predicted and run.
+
+    Args:
+      traces: condition -> label -> Trace, each condition with another lag.
+      path, size, format, fig: as in `figure`.
+      title: default: "Chattering".
+
+    Returns:
+      The figure.
+
+    Raises:
+      ScenarioError: no traces, or as `chattering` and `figure`.
+    """
+    runs: dict[str, list[Trace]] = {}
+    for labelled in traces.values():
+        for label, trace in labelled.items():
+            runs.setdefault(label, []).append(trace)
+    if not runs:
+        raise ScenarioError("no trace to draw: give at least one")
+    paths = [] if path is None else pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    with style.page(width):
+        page = pages.blank(width, height or style.points(HEIGHT), fig)
+        ax = page.subplots()
+        colours = style.law_colours([of[0].scenario.law for of in runs.values()])
+        handles, predicted = [], {}
+        for (label, of), colour in zip(runs.items(), colours, strict=True):
+            of.sort(key=lambda trace: lag(trace.scenario))
+            lags = [1e3 * lag(trace.scenario) for trace in of]
+            predicted[label] = lags, [chattering(trace.scenario).amplitude for trace in of]
+            ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
+            measured = [chattering_amplitude(trace) for trace in of]
+            ax.plot(lags, measured, "o", color=colour, ms=style.points(7.0), mec=style.PAPER)
+            handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=style.label(label)))
+        if len(predicted) == 2:
+            (lags, one), (_, other) = predicted.values()
+            if not math.isnan(equal := crossover(lags, one, other)):
+                ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
+                text = f"equal at {style.short(equal)} ms"
+                place = {"xytext": (-4, 4), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+                ax.annotate(text, (equal, 0.0), xycoords=("data", "axes fraction"), **place)
+        handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
+        handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
+        unit = np.unique([trace.scenario.plant.unit for of in runs.values() for trace in of])
+        ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit[0]}/s)")
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.margins(0.04, 0.06)
+        pages.set_head(page, width, title or "Chattering", handles)
+        pages.write(page, paths)
+    return page

@@ -1,0 +1,45 @@
+"""Amplitude of chattering over the actuator's lag."""
+
+import math
+
+import matplotlib.pyplot as plt
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.draw.amplitudes import amplitudes, crossover, lag
+from smc_mujoco.metrics.catalogue import chattering_amplitude
+
+
+def test_the_lag_is_what_all_drives_and_the_delay_add_up_to():
+    drives = (smc.Lag(0.01), smc.Lag(0.02), smc.Backlash(0.01))
+    assert lag(smc.Scenario(plant="duffing", law="none", actuator=drives, input_delay=0.005)) == pytest.approx(0.035)
+
+
+def test_amplitudes_that_grow_with_the_lag_and_with_its_square_cross_where_they_are_equal():
+    lags = [1.0, 10.0, 100.0]
+    assert crossover(lags, [2.0 * x for x in lags], [0.1 * x * x for x in lags]) == pytest.approx(20.0)
+    assert math.isnan(crossover(lags, [1.0, 2.0, 3.0], [2.0, 3.0, 4.0]))
+    assert crossover(lags, [20.0, math.nan, 2000.0], [1.0, 1.0, 1e5]) == pytest.approx(20.0, rel=2.0)
+    assert math.isnan(crossover(lags, [math.nan] * 3, lags))
+
+
+def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
+    def trace(law, tau):
+        return smc.run(smc.Scenario(plant="duffing", law=law, actuator=smc.Lag(tau), x0=0.02, duration=6.0))
+
+    laws = {"one": "super_twisting", "two": "twisting"}
+    runs = {f"{tau:g} s": {label: trace(law, tau) for label, law in laws.items()} for tau in (0.01, 0.005)}
+    figure = amplitudes(runs)
+    lines = figure.axes[0].lines[:4]
+    for label, line, dots in zip(laws, lines[::2], lines[1::2], strict=True):
+        measured = [chattering_amplitude(runs[name][label]) for name in ("0.005 s", "0.01 s")]
+        assert list(dots.get_ydata()) == measured
+        assert list(line.get_ydata()) == pytest.approx(measured, rel=0.1)
+        assert list(line.get_xdata()) == list(dots.get_xdata()) == pytest.approx([5.0, 10.0])
+        assert line.get_color() == dots.get_color()
+    plt.close("all")
+
+
+def test_nothing_to_draw_is_one_sentence():
+    with pytest.raises(smc.ScenarioError, match="no trace to draw"):
+        amplitudes({})
