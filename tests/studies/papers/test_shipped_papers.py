@@ -1,6 +1,8 @@
 """The papers that ship beside Gaber's: what each says of itself, and that a broken law loses each of its claims."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from smc_mujoco.studies.papers.measures import LATE, exponent, late, late_step, 
 from smc_mujoco.studies.papers.perez_ventura_2017.claims import predicted
 from smc_mujoco.testing.mutants import survivors
 
+ROOT = Path(__file__).parents[3]
 PAPERS = [name for name in shipped() if name != "gaber"]
 
 
@@ -22,6 +25,12 @@ def test_at_least_five_papers_ship_with_4_to_12_claims_each():
         assert 4 <= len(found.claims) <= 12, name
         assert "abstract" in found.read or "title" in found.read, name
         assert all(claim.where and claim.thresholds for claim in found.claims.values()), name
+
+
+def test_the_page_of_verdicts_has_every_paper_with_as_many_verdicts_as_claims():
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|", (ROOT / "docs" / "papers.md").read_text(), re.M)
+    counted = {name: sum(int(count) for count in counts if count.strip()) for name, *counts in rows}
+    assert counted == {name: len(paper(name).claims) for name in PAPERS}
 
 
 @pytest.mark.parametrize("name", PAPERS)
