@@ -17,6 +17,7 @@ from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
+from smc_mujoco.control.joint_law import catalogue as joint_laws
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
@@ -27,7 +28,7 @@ SOURCE = re.compile(r"(?<![\w.])Sources?: ")
 SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
 DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled)", re.I)
 INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
-CATALOGUES = {"Laws": laws, "Surfaces": surfaces, "Velocity estimators": estimators}
+CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
 ARRIVES = {"s": "s", "e": "e", "": "–"}
 CALLS = {

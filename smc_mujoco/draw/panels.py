@@ -21,6 +21,7 @@ from smc_mujoco.draw.decimate import columns, end, line, stretches, window
 from smc_mujoco.draw.states import HOLD, at_rest, has_dry_friction
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
+from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 COLUMNS = 360  # of a panel
@@ -263,8 +264,9 @@ def target(ax: Axes, panel: Panel) -> None:
     """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
     several = sorted(panel.traces, key=lambda trace: len(trace.t))
     for trace in {trace.scenario.reference: trace for trace in several}.values():
-        known = np.isfinite(trace.r[:, 0])
-        r = trace.r[known, 0] if panel.quantity == "x" else np.zeros(known.sum())
+        r = reference(trace)
+        known = np.isfinite(r)
+        r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
         if known.any():
             (t, r), half = line(trace.t[known], r, 2), BAND * scale(trace)
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
@@ -319,9 +321,15 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
     ax.set_ylim(low, high)
 
 
+def reference(trace: Trace) -> np.ndarray:
+    """Return the reference of a trace's channels, (K + 1,), or the mean of their references if these differ."""
+    return trace.r.mean(axis=1) if isinstance(trace.scenario.reference, PerChannel) else trace.r[:, 0]
+
+
 def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """Return the reference r and its rate r' by differences, where it does not jump."""
-    r = trace.r[np.isfinite(trace.r[:, 0]), 0]
+    r = reference(trace)
+    r = r[np.isfinite(r)]
     dr = np.gradient(r, trace.scenario.control_period) if len(r) > 1 else np.zeros(len(r))
     smooth = np.abs(dr) <= JUMP * np.quantile(np.abs(dr), 0.99) if len(r) else []
     return r[smooth], dr[smooth]

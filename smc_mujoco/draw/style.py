@@ -19,7 +19,7 @@ from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation.perturbations import Jump
@@ -177,13 +177,13 @@ def distance(one: str, other: str) -> float:
 def law_name(law: Component | str) -> str:
     """Return a law's label: its own, or its name in words. A user's law keeps the user's name."""
     template, name = _template(law)
-    return (template and template.label) or (in_words(name) if name in catalogue() else name)
+    return (template and template.label) or (in_words(name) if name in known_laws() else name)
 
 
 def label(name: str) -> str:
     """Return the label of the library's law, surface or estimator of this name; other words unchanged."""
     known = {**surfaces.catalogue(), **estimators.catalogue()}
-    return law_name(name) if name in catalogue() else in_words(name) if name in known else name
+    return law_name(name) if name in known_laws() else in_words(name) if name in known else name
 
 
 def law_initials(law: str) -> str:
@@ -195,8 +195,8 @@ def law_initials(law: str) -> str:
 def _template(law: Component | str) -> tuple[Template | None, str]:
     """Return the template of a law, if there is one, and the law's name."""
     if isinstance(law, str):
-        return catalogue().get(law), law
-    return law.template or catalogue().get(law.name), law.name
+        return known_laws().get(law), law
+    return law.template or known_laws().get(law.name), law.name
 
 
 def in_words(name: str) -> str:

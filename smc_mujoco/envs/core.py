@@ -24,6 +24,7 @@ from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.reference import Failure, evaluate
 from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.signals import PerChannel
 
 FIELDS = (  # of a Scenario, that an environment accepts
     "duration", "control_period", "physics_step", "integrator", "u_max", "x0", "v0", "reference", "mismatch",
@@ -233,6 +234,8 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
     """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
     times = np.arange(samples) * scenario.control_period
+    if isinstance(scenario.reference, PerChannel):
+        raise ScenarioError("the channels have different references, and an environment has one: give one for all")
     try:
         references = np.array([evaluate(scenario.reference, float(t)) for t in times])
     except Failure as failure:
