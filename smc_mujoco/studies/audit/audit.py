@@ -197,7 +197,7 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
     """
     try:
         found = entry.evidence(runs)
-    except Exception as error:  # whatever a user's function raises
+    except (Exception, SystemExit) as error:  # whatever a user's function raises
         raise failed(runs.paper, entry, error) from error
     try:
         return list(_evidence(entry, found))

@@ -242,24 +242,24 @@ def _modules(folder: Path, package: str) -> list[ModuleType]:
         raise ScenarioError(f"{folder / CODE}: {error}") from None
     except SyntaxError as error:
         raise ScenarioError(f"{error.filename}, line {error.lineno}: {error.msg}") from None
-    except Exception as error:  # whatever the user's module raises
+    except (Exception, SystemExit) as error:  # whatever the user's module raises
         raise ScenarioError(f"{_place(error, folder)}: {_said(error)}") from None
     finally:
         sys.dont_write_bytecode = before
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     """Return the class and the message of an exception, on one line."""
     return ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
 
 
-def _place(error: Exception, folder: Path) -> str:
+def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder.resolve())]
     return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else str(folder / CODE)
 
 
-def failed(paper: Paper, entry: Entry, error: Exception) -> ScenarioError:
+def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
     """Return the error for a claim whose function raised an exception."""
     called = f"function {inspect.unwrap(entry.evidence).__name__} of claim {entry.id}"
     if isinstance(error, ScenarioError):
@@ -280,7 +280,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) 
         "fields": _fields("runs", texts.pop("runs")),
         "plants": {key: _plant(key, one, folder) for key, one in _table(data, "plants")},
         "conditions": {key: _condition(key, one) for key, one in _table(data, "conditions")},
-        "laws": {law.name: law for module in code for law in vars(module).values() if _is_law(law)},
+        "laws": dict(_laws(code)),
     }
     sets = _sets(data)
     quick = _names("quick_sets", data.get("quick_sets", list(sets)[:1]))
@@ -427,8 +427,14 @@ def _fields(what: str, text: str) -> dict[str, Any]:
     return fields
 
 
-def _is_law(value: object) -> bool:
-    return isinstance(value, Template | Component) and value.kind == "law"
+def _laws(code: Sequence[ModuleType]) -> Iterator[tuple[str, Template | Component]]:
+    """Yield name, law of every law in a paper's modules; refuse one with the name of another law of the library."""
+    for value in [value for module in code for value in vars(module).values()]:
+        if isinstance(value, Template | Component) and value.kind == "law":
+            known = laws_known().get(value.name)
+            if known and known.function is not value.function:
+                raise ScenarioError(f"law {value.name!r} of {CODE} has the name of a law of the library: rename it")
+            yield value.name, value
 
 
 def _table(data: Mapping[str, Any], field: str) -> Iterator[tuple[str, Any]]:

@@ -91,6 +91,26 @@ def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
         new(tmp_path / "levant")
 
 
+# laws of a paper's own
+
+OWN = """
+from smc_mujoco import law_function
+@law_function(gains={{"k": 4.0}})
+def {}(y, gains, memory):
+    return -gains.k * y.e, y.e
+"""
+
+
+def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
+    data = MINIMAL + 'plants = ["duffing"]\nlaws = ["soft"]\n[gains.hard.duffing]\nsoft = { k = 7.0 }\n[gains.own]'
+    code = OWN.format("soft") + "def small(runs):\n    return {'size': runs.law('duffing', 'soft').gains['k'] / 4.0}\n"
+    (one,) = claims(paper=folder(data, code))
+    assert one.numbers["hard"]["size"]["value"] == 7.0 / 4.0
+    assert one.numbers["own"]["size"]["value"] == 1.0
+    (other,) = claims(paper=folder(data, code), substitute={"soft": lambda law: law.template(k=12.0)})
+    assert other.numbers["own"]["size"]["value"] == 3.0
+
+
 # broken folders
 
 BROKEN = [
@@ -125,6 +145,8 @@ BROKEN = [
         "claim 1: unknown gain of pid 'kq'",
     ),
     (MINIMAL, "def small(runs)\n    pass", "claims.py, line 1: expected ':'"),
+    (MINIMAL, "import sys\nsys.exit(3)", "claims.py, line 2: SystemExit, 3"),
+    (MINIMAL, OWN.format("pid") + SMALL, "law 'pid' of claims.py has the name of a law of the library"),
     (MINIMAL, "import numppy\n" + SMALL, "claims.py, line 1: ModuleNotFoundError, No module named 'numppy'"),
 ]
 
