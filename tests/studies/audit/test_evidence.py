@@ -1,5 +1,6 @@
 """The evidence of an audit: written twice it is the same, it leads from claims to runs, and its seal shows changes."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -10,12 +11,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import smc_mujoco as smc
 from smc_mujoco.cli.commands import studies
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
+from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.audit import badge, evidence
 from smc_mujoco.studies.audit.audit import audit
 from smc_mujoco.studies.audit.verdict import PARTLY, REFUTED, SUPPORTED
+from smc_mujoco.studies.run_key import portable_key
 
 DATA = """
 title = "Small"
@@ -79,8 +83,8 @@ def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tm
     here = done.save(tmp_path / "here.json")
     copy = tmp_path / "elsewhere" / "small"
     copy.mkdir(parents=True)
-    for file in folder.iterdir():
-        (copy / file.name).write_bytes(file.read_bytes())
+    for file in folder.glob("*.*"):
+        (copy / file.name).write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
     code = "import sys, smc_mujoco as smc; smc.audit(sys.argv[1], threads=1).save(sys.argv[2])"
     there = tmp_path / "there.json"
     subprocess.run([sys.executable, "-c", code, str(copy), str(there)], check=True, cwd=Path(__file__).parents[3])
@@ -109,6 +113,22 @@ def test_nothing_of_the_machine_is_in_it(told, folder):
     assert str(folder.parent) not in text
     assert "arithmetic" not in text
     assert "/" not in "".join(told["paper"]["files"])
+
+
+def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_condition(monkeypatch):
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.1)
+    name = portable_key(scenario)
+    monkeypatch.setattr(serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"})
+    assert portable_key(scenario) == portable_key(scenario.named("calm")) == name
+    assert portable_key(dataclasses.replace(scenario, seed=1)) != name
+
+
+def test_a_claim_has_its_own_runs_alone(done):
+    assert [len(done.used[id]["slow"]) for id in ("1", "2")] == [2, 0]
+
+
+def test_a_quick_audit_has_the_quick_sets(folder):
+    assert list(audit(folder, only=["2"], quick=True).claims[0].verdicts) == ["slow"]
 
 
 def test_other_gains_are_other_runs(told):

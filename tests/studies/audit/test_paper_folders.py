@@ -11,6 +11,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.studies.audit import template
 from smc_mujoco.studies.audit.audit import claims
 from smc_mujoco.studies.audit.paper import CODE, FILE, new, paper
+from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.threshold import Threshold
 from smc_mujoco.studies.audit.verdict import REFUTED, SUPPORTED, Beside, Check
 
@@ -109,6 +110,13 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
     assert one.numbers["own"]["size"]["value"] == 1.0
     (other,) = claims(paper=folder(data, code), substitute={"soft": lambda law: law.template(k=12.0)})
     assert other.numbers["own"]["size"]["value"] == 3.0
+
+
+def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes(folder):
+    data = 'runs = "duration=1.0, seed=1, x0=0.1, u_max=1.0"\n' + MINIMAL + 'runs = "seed=3, u_max=3.0"\n'
+    found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
+    one = Runs(found, "default").of(found.claims["1"]).scenario("duffing", "pid", "far", u_max=4.0)
+    assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (1.0, (0.2,), 3, 4.0, "far")
 
 
 # broken folders
