@@ -24,7 +24,7 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.papers.gaber import scenarios
-from smc_mujoco.studies.report import answer, charts, maps, rigs, words
+from smc_mujoco.studies.report import answer, charts, maps, oscillation, rigs, words
 from smc_mujoco.studies.report.plan import GAINS
 from smc_mujoco.studies.report.stages import Findings
 
@@ -37,6 +37,7 @@ SECTIONS = {
     "claims": "The paper’s claims",
     "tradeoffs": "Error against effort",
     "margins": "Margins",
+    "chattering": "How much will it chatter",
     "regions": "Regions of attraction",
     "rigs": "On the rig",
     "films": "Films and traces",
@@ -80,6 +81,7 @@ def page(findings: Findings) -> str:
         "charts": charts,
         "maps": maps,
         "rigs": rigs,
+        "oscillation": oscillation,
         "link": link,
         "uri": uri,
         "plants": plants(),

@@ -1,4 +1,4 @@
-"""The stages of a report: records, grid, claims, margins, maps, rigs, scenes, statistics.
+"""The stages of a report: records, grid, claims, margins, maps, rigs, chattering, scenes, statistics.
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
@@ -29,7 +29,7 @@ from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.studies.papers.gaber.claims import lyapunov
-from smc_mujoco.studies.report import about, films, rigs, scores, words
+from smc_mujoco.studies.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.studies.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.studies.report.scores import Place, Score
 from smc_mujoco.studies.study import study
@@ -82,6 +82,7 @@ class Findings:
     fronts: tuple[Front, ...]
     margins: tuple[Margin, ...]
     by_set: Mapping[str, tuple[Margin, ...]]
+    oscillations: tuple[oscillation.Oscillation, ...]
     basins: tuple[Basin, ...]
     machines: tuple[rigs.Machine, ...]
     repeated: tuple[rigs.Repeated, ...]
@@ -113,6 +114,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     margins = all_margins(work)
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     machines = rigs.machines(work)
+    oscillations = oscillation.oscillations(work)
     no_film = films.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
@@ -123,6 +125,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             fronts=fronts(plan),
             margins=margins,
             by_set=by_set,
+            oscillations=oscillations,
             basins=basins,
             machines=machines,
             repeated=repeated,
