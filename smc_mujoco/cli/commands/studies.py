@@ -296,6 +296,8 @@ def claims(
     known = None if table is None else Table.read(table)
     if evidence and known:
         raise ScenarioError("--evidence is of runs that the audit makes itself: leave out --table")
+    if mutants and json:
+        raise ScenarioError("--mutants prints sentences: leave out --json")
     for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
         if file:
             writable(ended(file, ending) if ending else file)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.studies.audit import template
+from smc_mujoco.studies.audit import evidence, template
 from smc_mujoco.studies.audit.audit import claims
 from smc_mujoco.studies.audit.paper import CODE, FILE, new, paper
 from smc_mujoco.studies.audit.runs import Runs
@@ -117,6 +117,18 @@ def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes
     found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
     one = Runs(found, "default").of(found.claims["1"]).scenario("duffing", "pid", "far", u_max=4.0)
     assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (1.0, (0.2,), 3, 4.0, "far")
+
+
+def test_functions_may_be_in_several_files(folder):
+    home = folder(MINIMAL.replace('"small"', '"second.small"'), None)
+    (home / "claims").mkdir()
+    for name, value in (("first", 3.0), ("second", 1.5)):
+        code = f"from .shared import VALUE\ndef small(runs):\n    return {{'size': VALUE * {value}}}\n"
+        (home / "claims" / f"{name}.py").write_text(code)
+    (home / "claims" / "shared.py").write_text("VALUE = 1.0\n")
+    (one,) = claims(paper=home)
+    assert one.numbers["default"]["size"]["value"] == 1.5
+    assert set(evidence.files(paper(home))) == {"paper.toml", "claims/first.py", "claims/second.py", "claims/shared.py"}
 
 
 # broken folders
