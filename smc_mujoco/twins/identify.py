@@ -37,6 +37,7 @@ STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry fr
 SPREAD = 0.2  # standard deviation of the logarithm of other starts of the search; chosen
 MAX_CORRELATION = 0.98  # correlation from which records cannot tell two quantities apart; chosen
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
+POOR = 80.0  # percent, of a fit below which the search may have ended in the wrong place; chosen
 BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
 SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
 WORST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
@@ -80,7 +81,29 @@ class Identified:
                 found.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
             elif self.errors[name] > abs(value):
                 found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
+        if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
+            found.append(
+                f"the worst fit is {worst:.0f} %: the model lacks something, or the search ended in a valley of its "
+                "cost; start from other values, with more starts or another seed"
+            )
         return found
+
+    def drawn(self, count: int = 8, seed: int = 0) -> Rig:
+        """Return the rig with an ensemble of other sets that the records allow, for rankings over them.
+
+        Args:
+          count: number of sets, drawn from the normal distribution of the errors and kept within the ranges.
+          seed: of the draws.
+        """
+        whole("count", count, 1, 1000)
+        names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
+        spread, middle = (np.array([each[name] for name in names]) for each in (self.errors, self.values))
+        draws = rng.multivariate_normal(middle, self.correlations * np.outer(spread, spread), count, method="eigh")
+        known = [self.rig.quantities[name] for name in names]
+        kept = np.clip(draws, [each.least for each in known], [each.most for each in known])
+        return dataclasses.replace(
+            self.rig, ensemble=tuple(dict(zip(names, row, strict=True)) for row in kept.tolist())
+        )
 
     def __repr__(self) -> str:
         found = ", ".join(f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items())

@@ -1,13 +1,17 @@
 """Identification returns what made the records, and says what records cannot tell."""
 
 import csv
+import dataclasses
 import json
 import math
+import re
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import app
 from smc_mujoco.twins import records
 
 AXIS = smc.rig("emps")
@@ -28,10 +32,10 @@ def found(moved):
 
 @pytest.fixture(scope="module")
 def swung():
-    """4 s of the pendulum under a torque, with noise."""
+    """2.5 s of the pendulum under a torque, with noise."""
     return smc.run(
         PENDULUM.scenario(
-            "none", feedforward=smc.Sine(2.0, 4.5), duration=4.0, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
+            "none", feedforward=smc.Sine(2.0, 4.5), duration=2.5, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
         )
     )
 
@@ -115,6 +119,32 @@ def test_bad_questions_get_one_sentence(make, sentence, moved):
     with pytest.raises(smc.ScenarioError) as error:
         make(moved)
     assert sentence in str(error.value)
+
+
+def test_a_poor_fit_is_said(found):
+    assert found.notes == []
+    poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
+    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, or the search ended in a valley")
+
+
+def test_sets_that_the_records_allow_have_the_errors_and_the_correlations_found(found):
+    rig = found.drawn(1000, seed=1)
+    names = list(found.values)
+    sets = np.array([[each[name] for name in names] for each in rig.ensemble])
+    np.testing.assert_allclose(sets.std(axis=0), [found.errors[name] for name in names], rtol=0.1)
+    np.testing.assert_allclose(np.corrcoef(sets.T), found.correlations, atol=0.1)
+    assert rig.values == found.rig.values
+    assert found.drawn(3, seed=1).ensemble == rig.ensemble[:3]
+
+
+def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path):
+    run = smc.run(smc.Scenario(plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
+    run.export(tmp_path / "run.csv")
+    words = ["identify", "duffing", str(tmp_path / "run.csv"), "--quantities", "delta", "--starts", "1"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert re.search(r"delta +0\.[0-9]+ ", done.output)
+    assert re.search(r" (99|100)\.\d \(", done.output)
 
 
 def test_results_are_saved_and_drawn(found, tmp_path):

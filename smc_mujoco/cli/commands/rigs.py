@@ -12,7 +12,9 @@ from smc_mujoco.common.interrupts import held_back
 
 @errors_as_sentences()
 def identify(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo or emps.")],
+    rig: Annotated[
+        str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, or a plant, which `list` shows.")
+    ],
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns, or saved traces.")
     ],
@@ -39,16 +41,18 @@ def identify(
     with held_back():
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.mechanisms.plant import as_plant
+        from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.twins.identify import identify as find
         from smc_mujoco.twins.records import load
-        from smc_mujoco.twins.rig import rig as find_rig
+        from smc_mujoco.twins.rig import rigs
 
     for file in (figure, json):
         if file:
             writable(file)
-    terminal, twin, named = Terminal(), find_rig(rig), options.columns(columns)
+    terminal, named = Terminal(), options.columns(columns)
     found = find(
-        twin,
+        as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml:" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
         starts=starts,
