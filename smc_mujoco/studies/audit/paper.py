@@ -29,7 +29,9 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.mechanisms.custom.plant_from import plant_from
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
 from smc_mujoco.simulation.conditions import Condition, condition, find_condition, read_fields
 from smc_mujoco.simulation.grid import DURATION
 from smc_mujoco.simulation.scenario import Scenario
@@ -126,11 +128,16 @@ class Paper:
 
     def plant(self, plant: str) -> Plant:
         """Return a plant by the paper's name or the suite's."""
-        return self.plants[plant] if plant in self.plants else find_plant(plant)
+        if plant in self.plants:
+            return self.plants[plant]
+        find("plant", plant, {**plants_known(), **self.plants})
+        return find_plant(plant)
 
     def condition(self, text: str | Condition) -> Condition:
         """Return a condition by the paper's name, the suite's, or from its text."""
-        return self.conditions[text] if isinstance(text, str) and text in self.conditions else find_condition(text)
+        if isinstance(text, str) and not set(":+") & set(text):
+            return find("condition", text, {**CONDITIONS, **self.conditions})
+        return find_condition(text)
 
     def law(self, plant: str, law: str, gains: str) -> Component:
         """Return a law with the gains that a set has for a plant, or else with its own.

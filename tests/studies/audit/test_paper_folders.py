@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.variants import with_gains
 from smc_mujoco.studies.audit import evidence, template
 from smc_mujoco.studies.audit.audit import claims
 from smc_mujoco.studies.audit.paper import CODE, FILE, new, paper
@@ -108,7 +109,7 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
     (one,) = claims(paper=folder(data, code))
     assert one.numbers["hard"]["size"]["value"] == 7.0 / 4.0
     assert one.numbers["own"]["size"]["value"] == 1.0
-    (other,) = claims(paper=folder(data, code), substitute={"soft": lambda law: law.template(k=12.0)})
+    (other,) = claims(paper=folder(data, code), substitute={"soft": lambda law: with_gains(law, k=12.0)})
     assert other.numbers["own"]["size"]["value"] == 3.0
 
 
@@ -148,6 +149,8 @@ BROKEN = [
     (MINIMAL + 'plants = ["dufing"]', SMALL, "claim 1: unknown plant 'dufing': did you mean 'duffing'"),
     (MINIMAL + 'laws = ["clasical"]', SMALL, "claim 1: unknown law 'clasical'"),
     (MINIMAL + 'conditions = ["noisy"]', SMALL, "claim 1: unknown condition 'noisy'"),
+    (MINIMAL + 'plants = ["hevy"]\n[plants]\nheavy = { plant = "duffing" }', SMALL, "'hevy': did you mean 'heavy'"),
+    (MINIMAL + 'conditions = ["farr"]\n[conditions]\nfar = "x0=2.0"', SMALL, "'farr': did you mean 'far'"),
     (MINIMAL + 'plants = "duffing"', SMALL, "claim 1: plants is 'duffing': write a list of names"),
     (MINIMAL + 'quantifier = "every"', SMALL, "claim 1: unknown quantifier 'every'"),
     (MINIMAL + 'runs = "durations=1"', SMALL, "unknown field of a scenario in runs 'durations'"),
