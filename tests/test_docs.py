@@ -175,6 +175,10 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     built = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
     pages = {f"{folder}/{name}" for folder, names in (("laws", smc.laws()), ("plants", smc.plants())) for name in names}
     pages |= {name.removesuffix(".md") for name in NAV} | {"404", "surfaces", "estimators"}
+    notebooks = {f"notebooks/{path.stem}" for path in (DOCS / "notebooks").glob("*.ipynb")}
+    pages |= notebooks
+    for name in notebooks:
+        assert "import smc_mujoco as smc" in re.sub("<[^>]+>", "", built[f"{name}.html"])
     assert set(built) == {f"{name}.html" for name in pages}
     assert {name for name in pages if "/" in name and "<svg" not in built[f"{name}.html"]} == set()
     assert {name for name, text in built.items() if "arithmatex" in text} == set()  # an equation that is not typeset

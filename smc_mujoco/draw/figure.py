@@ -364,6 +364,7 @@ def _key(
 def _meaning(shown: Sequence[Panel]) -> list[Handle]:
     """Return the entries of a legend that explain bands and lines."""
     looks = {
+        "play": Patch(color=style.REACTION, alpha=drawing.PLAY),
         "band": Patch(color=style.MUTED, alpha=0.3),
         "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),
         "light": Line2D([], [], color=style.MUTED, alpha=0.5, lw=style.points(drawing.LIGHT_LINE)),

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, stretches, window
-from smc_mujoco.draw.states import HOLD, at_rest, has_dry_friction
+from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
 from smc_mujoco.simulation.signals import PerChannel
@@ -41,7 +41,8 @@ JUMP = 2.0  # a reference jumps where its rate is more than this many times the 
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
 UNBANDED = ("x", "e", "spread")  # drawn sample by sample, without a mean over time
 
-REFERENCE = "reference"  # id of its lines
+REFERENCE, BACKLASH = "reference", "backlash"  # ids of a reference's lines, and of a gear's play
+PLAY = 0.16  # opacity of a gear's play around the reference
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
@@ -128,11 +129,15 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
-    """Return the meaning of bands and lines that need an explanation: "band", "line", "light" -> words."""
+    """Return the meaning of bands and lines that need an explanation: "play", "band", "line", "light" -> words."""
     n = max(len(panel.group.channels) for panel in panels)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
     over, single, words = max(filter(None, windows), default=None), len(light(n)), {}
+    for panel in panels:
+        gap = max(backlash_gap(trace.scenario) for trace in panel.traces)
+        if gap and panel.quantity in ("x", "e"):
+            words["play"] = f"the gear leaves ± {style.short(gap / 2)} {style.units(panel.group)['x']} free"
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
@@ -261,15 +266,17 @@ def rests(trace: Trace) -> list[int]:
 
 
 def target(ax: Axes, panel: Panel) -> None:
-    """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
+    """Draw each reference (zero for an error) as long as a run has it, its settling band, and the play of a gear."""
     several = sorted(panel.traces, key=lambda trace: len(trace.t))
     for trace in {trace.scenario.reference: trace for trace in several}.values():
         r = reference(trace)
         known = np.isfinite(r)
         r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
         if known.any():
-            (t, r), half = line(trace.t[known], r, 2), BAND * scale(trace)
+            (t, r), half, play = line(trace.t[known], r, 2), BAND * scale(trace), backlash_gap(trace.scenario) / 2
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
+            if play:
+                ax.fill_between(t, r - play, r + play, color=style.REACTION, alpha=PLAY, lw=0, zorder=1.1, gid=BACKLASH)
             ax.plot(t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
 
 

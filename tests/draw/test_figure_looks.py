@@ -149,6 +149,18 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
         ]
 
 
+def test_the_play_of_a_gear_is_a_band_around_the_reference_with_its_size_in_the_legend(one):
+    loose = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, actuator=smc.Backlash(0.05)))
+    page = figure([loose], panels=["x", "u", "error"])
+    bands = [[a for a in ax.collections if a.get_gid() == panels.BACKLASH] for ax in page.axes]
+    assert [len(found) for found in bands] == [1, 0, 1]
+    edges = bands[2][0].get_paths()[0].vertices[:, 1]
+    assert (edges.min(), edges.max()) == pytest.approx((-0.025, 0.025))
+    words = [text.get_text() for text in page.legends[0].get_texts()]
+    assert "play: the gear leaves ± 0.025 m free" in words
+    assert not any("play" in text.get_text() for text in figure([one], panels=["x"]).legends[0].get_texts())
+
+
 def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_column(one):
     page = figure([calm(trace) for trace in ten(one)], size=COLUMN)
     page.draw_without_rendering()
