@@ -197,21 +197,23 @@ RUN = {
 }
 
 
-@pytest.mark.parametrize("catalogue", CATALOGUES)
-def test_a_new_file_is_found_and_runs(catalogue, tmp_path):
-    (tmp_path / "brand_new.py").write_text(ENTRY[catalogue])
-    code = f"""
-import importlib
-importlib.import_module("smc_mujoco.{CATALOGUES[catalogue].replace("/", ".")}").__path__.append({str(tmp_path)!r})
-import smc_mujoco as smc
+def test_a_new_file_is_found_and_runs(tmp_path):
+    code = "import importlib\n"
+    for catalogue, room in CATALOGUES.items():
+        (tmp_path / catalogue).mkdir()
+        (tmp_path / catalogue / "brand_new.py").write_text(ENTRY[catalogue])
+        name = f"smc_mujoco.{room.replace('/', '.')}"
+        code += f"importlib.import_module({name!r}).__path__.append({str(tmp_path / catalogue)!r})\n"
+    code += "import smc_mujoco as smc\n"
+    for catalogue, run in RUN.items():
+        code += f"""
 assert "brand_new" in smc.{catalogue}()
-trace = smc.run({RUN[catalogue]})
+trace = smc.run({run})
 assert trace.diverged_at is None
-again = smc.load(trace.save({str(tmp_path / "a.npz")!r}))
+again = smc.load(trace.save("{catalogue}.npz"))
 assert again.scenario == trace.scenario
-print("done")
 """
-    assert python(code, folder=tmp_path) == "done\n"
+    assert python(code + "print('done')", folder=tmp_path) == "done\n"
 
 
 # how files look

@@ -406,7 +406,7 @@ def test_the_true_law_passes_what_its_mutants_fail(verdicts):
 
 @pytest.mark.parametrize("mutant", [reversed_gain, zero_gain])
 def test_a_broken_law_fails(mutant, verdicts):
-    broken = claims(only=["3", "5", "25"], gains="study", quick=True, substitute={OURS: mutant})
+    broken = claims(only=["5", "25"], gains="study", quick=True, substitute={OURS: mutant})
     flipped = {one.id for one in broken if one.verdict != verdicts[one.id].verdict}
     assert {"5", "25"} <= flipped
 
