@@ -6,6 +6,7 @@ Compiled code is kept in one folder, so that all workers, all child processes, a
 install elsewhere compile a function once.
 """
 
+import gc
 import importlib
 import os
 from pathlib import Path
@@ -56,6 +57,18 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
     if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin("smc_mujoco.testing.plugin"):
         pluginmanager.register(importlib.import_module("smc_mujoco.testing.plugin"), "smc_mujoco")
     parser.addoption("--quick", action="store_true", help="only the first case of each test, of files that take little")
+
+
+def pytest_collection() -> None:
+    """Collect tests without a garbage collector: what they make stays."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Leave what stays out of further collections of garbage, each of which would take half a second to look at it."""
+    gc.enable()
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
