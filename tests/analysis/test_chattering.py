@@ -49,7 +49,28 @@ def saturated(k, width, a):
     return 2 * k / (math.pi * width) * (math.asin(share) + share * math.sqrt(1 - share**2))
 
 
+@smc.law_function(gains={"k": 2.0, "d": 0.1}, memory=1)
+def relay_with_hysteresis(y, gains, memory):
+    s = y.v + C * y.x
+    if abs(s) > gains.d:
+        memory[0] = math.copysign(1.0, s)
+    return -gains.k * memory[0], s
+
+
+@smc.law_function(gains={"k": 2.0, "d": 0.1})
+def relay_with_dead_zone(y, gains, memory):
+    s = y.v + C * y.x
+    return -gains.k * math.copysign(1.0, s) if abs(s) > gains.d else 0.0, s
+
+
+REACHED = math.sqrt(1 - (0.1 / S) ** 2)  # cosine of the angle at which s is 0.1
 CLOSED = {
+    "relay with hysteresis": (relay_with_hysteresis(), -8 / (math.pi * A) * complex(REACHED, -0.1 / S) * TURN),
+    "relay with a dead zone": (relay_with_dead_zone(), -8 / (math.pi * A) * REACHED * TURN),
+    "sub-optimal": (
+        smc.law("suboptimal", r1=3.0, r2=2.0),
+        -2 / (math.pi * A) * complex(3.0 * math.sqrt(3.0), 3.0 + 2 * 2.0),
+    ),
     "relay": (smc.law("classical", k=2.0, c=C), -4 * 2.0 / (math.pi * S) * S / A * TURN),
     "saturation": (smc.law("boundary_layer", k=2.0, c=C, phi=0.1), -saturated(2.0, 0.1, S) * S / A * TURN),
     "saturation, all linear": (smc.law("boundary_layer", k=2.0, c=C, phi=0.5), -2.0 / 0.5 * S / A * TURN),
