@@ -210,8 +210,13 @@ class Search:
 
     def rig(self, z: np.ndarray) -> Rig:
         """Return the rig at a point of the search, (p,)."""
-        z = np.clip(z, self.low, self.high)
-        return self.twin.with_values({n: float(v) for n, v in zip(self.names, z * self.scales, strict=True)})
+        return self.twin.with_values(self.values(z))
+
+    def values(self, z: np.ndarray) -> dict[str, float]:
+        """Return the quantities at a point of the search, within their ranges to the last bit."""
+        known = [self.twin.quantities[name] for name in self.names]
+        found = np.clip(z * self.scales, [each.least for each in known], [each.most for each in known])
+        return dict(zip(self.names, found.tolist(), strict=True))
 
     def residuals(self, points: Sequence[np.ndarray], stage: str) -> list[np.ndarray]:
         """Return the residuals at each point, (N,)."""
@@ -324,7 +329,7 @@ class Search:
         with np.errstate(all="ignore"):
             correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
         deviation = np.maximum(deviation, self._fed_back(J, z))
-        values = dict(zip(self.names, (z * self.scales).tolist(), strict=True))
+        values = self.values(z)
         errors = dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
         return values, errors, correlations
 

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.twins import records
+from smc_mujoco.twins.identify import Search
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -119,6 +120,14 @@ def test_bad_questions_get_one_sentence(make, sentence, moved):
     with pytest.raises(smc.ScenarioError) as error:
         make(moved)
     assert sentence in str(error.value)
+
+
+def test_a_search_at_the_end_of_a_range_stays_within_it_to_the_last_bit():
+    """1e-4 / 0.042 * 0.042 is less than 1e-4."""
+    rig = smc.rig("qube_servo", back_emf=0.042)
+    search = Search(rig, ["back_emf"], [], [], lambda count: None)
+    assert (search.low * search.scales)[0] < 1e-4
+    assert search.rig(search.low).values["back_emf"] == 1e-4
 
 
 def test_a_poor_fit_is_said(found):
