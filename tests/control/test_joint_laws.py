@@ -63,6 +63,9 @@ def test_super_twisting_reaches_and_stays_at_second_order_in_the_period():
     for i in range(3):
         first = calm.t[np.argmax(np.sign(calm.s[:, i]) != np.sign(calm.s[0, i]))]
         assert 0.5 < first / (2.0 * np.sqrt(abs(calm.s[0, i])) / 4.7) <= 1.0
+        before = np.flatnonzero(calm.t < 0.9 * first)  # until then w = -k2 t sgn(s)
+        rate = -np.sign(calm.s[0, i]) * (4.7 * np.sqrt(np.abs(calm.s[before, i])) + 11.0 * calm.t[before])
+        np.testing.assert_allclose(np.diff(calm.s[:, i])[before] / 2e-4, rate, atol=0.01 * np.abs(rate).max())
     # |d_a'| stays below L, so k1 = 1.5 sqrt(L) and k2 = 1.1 L are enough
     L, d = 60.0, smc.Sine(0.5, 3.0)
     law = smc.law("super_twisting_computed_torque", k1=1.5 * np.sqrt(L), k2=1.1 * L, c=4.0)

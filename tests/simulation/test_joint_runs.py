@@ -45,7 +45,8 @@ def cases(arm):
     yield smc.Scenario(plant=arm, law=curious, model="none", **common)
     yield smc.Scenario(plant="pendulum_network", law=curious, control_period=2e-3, **common)
     yield smc.Scenario(plant="servo_axis", law=curious, **common)
-    yield smc.Scenario(plant="servo_axis", law=curious, actuator=smc.DCMotor(command="voltage", gear=50.0), **common)
+    volts = smc.DCMotor(command="voltage", gear=50.0, voltage=1e3)  # of which u takes a third
+    yield smc.Scenario(plant="servo_axis", law=curious, actuator=volts, **common)
 
 
 def test_callback_equals_plain_loop_under_laws_of_many_joints(arm):
