@@ -30,6 +30,7 @@ def cases():
     yield smc.Scenario(law=mixed, u_max={"elbow": 2.0, "shoulder": 5.0}, reference=[SINE, MOVE], **BOTH)
     yield smc.Scenario(law=["twisting", "super_twisting"], model="nominal", **BOTH)
     yield smc.Scenario(law=smc.law("classical", k=[1.0, 5.0]), surface="pid", **BOTH)
+    yield smc.Scenario(law=remembers(k=[1.0, 5.0]), **BOTH)  # each channel its own memory
     yield smc.Scenario(law=remembers, reference={"shoulder": MOVE, "elbow": SINE}, feedforward=SINE, **BOTH)
     yield smc.Scenario(
         plant=arms.arm(), law="passivity_based", reference=[SINE, MOVE, SINE], u_max=[5.0, 50.0, 20.0], **COMMON
