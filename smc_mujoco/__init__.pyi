@@ -1,6 +1,7 @@
 import smc_mujoco.studies.boards
 from smc_mujoco.analysis.chattering import Chattering as Chattering
 from smc_mujoco.analysis.chattering import chattering as chattering
+from smc_mujoco.analysis.gains_for import Design as Design
 from smc_mujoco.analysis.gains_for import gains_for as gains_for
 from smc_mujoco.analysis.harmonics import describing_function as describing_function
 from smc_mujoco.analysis.margins import margins as margins
