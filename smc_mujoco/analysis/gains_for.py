@@ -128,7 +128,13 @@ def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, freque
     The frequency is taken for size 1. It does not depend on the size on a linear mechanism, and is not monotone in the
     speed.
     """
-    cycles = {speed: cycle(speed) for speed in SPEEDS if speed**2 <= strength * (1.0 + CLOSE)}
+    speeds = [speed for speed in SPEEDS if speed**2 <= strength * (1.0 + CLOSE)]
+    if not speeds:
+        raise ScenarioError(
+            f"forces among the gains are {1.0 / strength:.3g} times what u_max allows, and the search makes them "
+            f"at most {SPEEDS[0] ** -2:g} times smaller: give smaller gains, or a larger u_max"
+        )
+    cycles = {speed: cycle(speed) for speed in speeds}
     slow = {speed: one for speed, one in cycles.items() if not one.frequency > frequency}
     if not slow:
         least = min(one.frequency for one in cycles.values())

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import statistics
 
 from smc_mujoco.analysis.chattering import chattering
 from smc_mujoco.common.errors import ScenarioError
@@ -90,5 +91,5 @@ def sentence(found: tuple[Oscillation, ...]) -> str:
     text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate, and do; {calm} neither"
     if not both:
         return f"{text}."
-    errors = sorted(abs(one.error) for one in both)
-    return f"{text}. The median error of the predicted amplitude is {errors[len(errors) // 2]:.2g} %."
+    error = statistics.median(abs(one.error) for one in both)
+    return f"{text}. The median error of the predicted amplitude is {error:.2g} %."
