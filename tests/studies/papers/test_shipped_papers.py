@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.audit.audit import audit
 from smc_mujoco.studies.audit.paper import paper, shipped
-from smc_mujoco.studies.papers.aldana_lopez_2019.claims import classical_bound, least_bound
+from smc_mujoco.studies.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
 from smc_mujoco.studies.papers.measures import LATE, exponent, late, late_step, settled
 from smc_mujoco.studies.papers.perez_ventura_2017.claims import predicted
 from smc_mujoco.testing.mutants import survivors
@@ -93,6 +94,11 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         )
         assert least_bound(made) == pytest.approx(integral, rel=1e-6)
         assert classical_bound(made) > integral
+
+
+def test_fixed_time_is_sampled_finely_enough_for_the_band_that_was_fixed_before_the_first_run():
+    (claim,) = audit("aldana_lopez_2019", ["3"], gains=["skew"], quick=True).claims
+    assert (BAND, claim.verdict) == (1e-6, "supported")
 
 
 def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():

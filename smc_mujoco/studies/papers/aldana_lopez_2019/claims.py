@@ -4,7 +4,7 @@ import math
 
 from smc_mujoco.studies.papers.measures import settled
 
-BAND = 1e-5  # m/s, of |s|: it counts as reached
+BAND = 1e-6  # m/s, of |s|: it counts as reached
 SWITCHING = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
 LONGER = 1.5  # least bounds that a run lasts
 
@@ -33,7 +33,7 @@ def times(runs, laws, starts, band=BAND):
 
 
 def from_far(runs):
-    """Time from which |s| stays within 1e-5 m/s, from 5000 m/s, over the least bound and over the classical one."""
+    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the least bound and over the classical one."""
     (plant,), (name,) = runs.plants, runs.laws
     law = runs.law(plant, name)
     (time,) = times(runs, [(plant, law)], [runs.values["start"]])
@@ -43,7 +43,7 @@ def from_far(runs):
 
 
 def from_anywhere(runs):
-    """Time from which |s| stays within 1e-5 m/s, from 0.1 to 100 m/s on three plants, over the least bound."""
+    """Time from which |s| stays within 1e-6 m/s, from 0.1 to 100 m/s on three plants, over the least bound."""
     (name,), starts = runs.laws, runs.values["starts"]
     laws = [(plant, runs.law(plant, name)) for plant in runs.plants[: 1 if runs.quick else None]]
     names = [f"{plant}, from {start:g} m/s" for plant, _ in laws for start in starts]
@@ -52,7 +52,7 @@ def from_anywhere(runs):
 
 
 def predefined(runs):
-    """Time from which |s| stays within 1e-5 m/s, from 5000 m/s, over the time Tc that the gains were scaled for."""
+    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the time Tc that the gains were scaled for."""
     (plant,), (name,), wanted = runs.plants, runs.laws, runs.values["times"][: 1 if runs.quick else None]
     law = runs.law(plant, name)
     scaled = []
