@@ -10,6 +10,7 @@ second of simulations that step side by side.
 import dataclasses
 import os
 import statistics
+import time
 
 import mujoco
 from rich.console import Console
@@ -62,7 +63,7 @@ def measure(scenario: smc.Scenario) -> tuple[float, float]:
     steps = STEPS // 4
     together = stepping(chunk(scenario, RUNS, THREADS), steps, bare=False)
     together()
-    rate = RUNS * steps / statistics.median(seconds(together) for _ in range(ROUNDS))
+    rate = RUNS * steps / statistics.median(seconds(together, time.perf_counter) for _ in range(ROUNDS))
     alone = chunk(scenario, 4)
     return rate, ratio(stepping(alone, steps, bare=False), stepping(alone, steps, bare=True))[2]
 

@@ -101,7 +101,7 @@ def test_a_diverged_run_is_named_and_does_not_squash_the_others(pair, tmp_path):
     (svg,) = figure(traces, tmp_path / "a")
     assert "Classical (diverged at 0.4 s)" in words(svg)
     page = draw_figure.figure(traces)
-    ends = [line.get_xdata()[0] for ax in page.axes for line in ax.lines if line.get_marker() == "X"]
+    ends = [np.asarray(line.get_xdata())[0] for ax in page.axes for line in ax.lines if line.get_marker() == "X"]
     assert ends[:3] == [pytest.approx(0.399)] * 3  # in the panels of x, v and u over time
     assert panels.limits(traces, "x") == panels.limits(pair[:1], "x")
     figure([broken(pair[1], 1)], tmp_path / "b")  # one finite sample

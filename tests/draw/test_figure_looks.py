@@ -154,7 +154,7 @@ def test_the_play_of_a_gear_is_a_band_around_the_reference_with_its_size_in_the_
     page = figure([loose], panels=["x", "u", "error"])
     bands = [[a for a in ax.collections if a.get_gid() == panels.BACKLASH] for ax in page.axes]
     assert [len(found) for found in bands] == [1, 0, 1]
-    edges = bands[2][0].get_paths()[0].vertices[:, 1]
+    edges = np.asarray(bands[2][0].get_paths()[0].vertices)[:, 1]
     assert (edges.min(), edges.max()) == pytest.approx((-0.025, 0.025))
     words = [text.get_text() for text in page.legends[0].get_texts()]
     assert "play: the gear leaves ± 0.025 m free" in words

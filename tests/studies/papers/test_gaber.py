@@ -73,7 +73,7 @@ def judged(runs: Runs, id: str) -> str:
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
     """Claims 11, 48 and 49 are of min(lambda, u_max)."""
-    runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.resolved.u_max, "max_step": 0.021 * s.resolved.u_max})
+    runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.limits[0], "max_step": 0.021 * s.limits[0]})
     runs.mutated = lambda law: with_gains(law, lam=60.0)
     assert [judged(runs, id) for id in ("11", "49")] == [REFUTED, REFUTED]
 
