@@ -126,7 +126,7 @@ def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, freque
     """Return the speed that allows the largest forces, of SPEEDS whose predicted frequency is at most the wanted one.
 
     The frequency is taken for size 1. It does not depend on the size on a linear mechanism, and is not monotone in the
-    speed.
+    speed. If a limit cycle is lost on the way up, the law has become too fast for the actuator: such speeds are out.
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= strength * (1.0 + CLOSE)]
     if not speeds:
@@ -135,9 +135,10 @@ def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, freque
             f"at most {SPEEDS[0] ** -2:g} times smaller: give smaller gains, or a larger u_max"
         )
     cycles = {speed: cycle(speed) for speed in speeds}
-    slow = {speed: one for speed, one in cycles.items() if not one.frequency > frequency}
+    first = min((speed for speed, one in cycles.items() if one), default=math.inf)
+    slow = {speed: one for speed, one in cycles.items() if one.frequency <= frequency or (not one and speed < first)}
     if not slow:
-        least = min(one.frequency for one in cycles.values())
+        least = min(one.frequency for one in cycles.values() if one)
         raise ScenarioError(
             f"frequency is {frequency:g}, and the law oscillates at {least:.3g} Hz at least, at whatever speed: "
             "give a larger one"

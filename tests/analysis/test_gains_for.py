@@ -61,6 +61,7 @@ def without_units(y, gains, memory):
         ("classical", {}, "needs a wanted amplitude, a frequency or both"),
         ("classical", {"amplitude": -1.0}, "amplitude is -1"),
         ("classical", {"frequency": 5.0}, "oscillates at 8.* Hz at least"),
+        ("super_twisting", {"frequency": 10.0}, "oscillates at 14.* Hz at least"),  # ten times as fast it has no cycle
         ("classical", {"frequency": 100.0, "u_max": 0.005}, "are 800 times what u_max allows, .* at most 100 times"),
         (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
     ],
