@@ -46,7 +46,7 @@ class Chattering:
     Attributes:
       amplitude: of the sliding variable s, half its range, in its unit.
       amplitude_x: of the position, rad or m.
-      amplitude_u: of the command, half its range, N m or N.
+      amplitude_u: of the command, half its range, in its unit: N m, N or V.
       frequency: Hz.
       power: mean square of s', (amplitude_s omega)^2 / 2 of its first harmonic: for s' = u + d that of the delivered
         force, per unit of mass.

@@ -13,7 +13,7 @@ import numpy as np
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-MAX_LISTED = 850  # characters of the names to choose from; chosen: the sentence stays below 1000
+MAX_LISTED = 950  # characters of the names to choose from; chosen: all laws, and the sentence stays below 1100
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path
 
 

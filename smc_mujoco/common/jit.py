@@ -9,6 +9,7 @@ import io
 import os
 import re
 import sys
+import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -146,6 +147,7 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
       cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written. A body
         whose closure holds other functions needs a name and a hash of all that it reaches.
     """
+    _warned.clear()
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
@@ -153,6 +155,18 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
     with held_back():
         made.compile()
     return made
+
+
+_warned: list[str] = []  # while a function was compiled
+
+
+def warn(message: str) -> None:
+    """Warn of an old name in the function that is being compiled, and leave its code out of the cache.
+
+    A process that loaded the code would not warn.
+    """
+    _warned.append(message)
+    warnings.warn(message, DeprecationWarning, 3)
 
 
 class Cache(FunctionCache):
@@ -169,9 +183,9 @@ class Cache(FunctionCache):
         return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write it, unless no other process could load it, the disk is full or the files belong to another user."""
+        """Write it, unless compiling warned, no other process could load it, or the files cannot be written."""
         with contextlib.suppress(OSError):
-            if not data.library.has_dynamic_globals and _complete(data.library):
+            if not _warned and not data.library.has_dynamic_globals and _complete(data.library):
                 super().save_overload(sig, data)
 
 

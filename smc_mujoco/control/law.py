@@ -15,13 +15,13 @@ law, otherwise with f = 0 and g = 1.
 
 import functools
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Unpack, overload
 
 from numba import njit, types
 from numba.extending import overload_attribute
 
+from smc_mujoco.common import jit
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.registry import discover
 from smc_mujoco.control import joint_law
@@ -69,7 +69,7 @@ def _keep_old_field(old: str, new: str) -> None:
         if old in y.fields:  # of other tuples, such as gains
             i = y.fields.index(old)
         elif y.instance_class is Measurement:
-            warnings.warn(f"y.{old} is now y.{new}: read that", DeprecationWarning, 2)
+            jit.warn(f"y.{old} is now y.{new}: read that")
             i = y.fields.index(new)
         else:
             return None

@@ -298,8 +298,9 @@ class PythonComponent:
         self.name, self.returns = f"{c.kind} {c.name!r}", RETURNS[c.kind]
         self.memory = np.zeros((n, c.memory))
         parts = self._parts(c)
-        plain = {part.function: rebuild(part.function, lambda function: function) for part in dict.fromkeys(parts)}
-        self.functions, self.sizes = [plain[part.function] for part in parts], [part.memory for part in parts]
+        plain = {id(part.function): part.function for part in parts}  # a callable object may have no hash
+        plain = {key: rebuild(function, lambda inner: inner) for key, function in plain.items()}
+        self.functions, self.sizes = [plain[id(part.function)] for part in parts], [part.memory for part in parts]
         self.bind(c)
 
     def _parts(self, c: Component) -> list[Component]:
@@ -309,8 +310,9 @@ class PythonComponent:
     def bind(self, c: Component) -> None:
         """Take the gains of a component with the same functions."""
         parts = self._parts(c)
-        made = {part: gains_of(part, len(parts)) for part in dict.fromkeys(parts)}
-        self.gains = [made[part] for part in parts]
+        made = {id(part): part for part in parts}
+        made = {key: gains_of(part, len(parts)) for key, part in made.items()}
+        self.gains = [made[id(part)] for part in parts]
 
     def __call__(self, i: int, y: tuple) -> list[float]:
         """Return its two numbers for channel i; NaN for an acceleration that is not estimated.

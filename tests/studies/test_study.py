@@ -141,7 +141,7 @@ def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
 def test_the_command_takes_no_names_for_none(tmp_path, capsys):
     with pytest.raises(SystemExit):
         bench(laws=",", out=tmp_path / "a")
-    assert "laws is []: give several" in capsys.readouterr().err
+    assert "',' holds no name: give names" in capsys.readouterr().err
 
 
 # failures
