@@ -88,7 +88,7 @@ def sentence(found: tuple[Oscillation, ...]) -> str:
     """Return in a sentence how many limit cycles were predicted, how many were found, and how large the error is."""
     both = [one for one in found if not math.isnan(one.error)]
     calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in found)
-    text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate, and do; {calm} neither"
+    text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
     if not both:
         return f"{text}."
     error = statistics.median(abs(one.error) for one in both)
