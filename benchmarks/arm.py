@@ -3,24 +3,17 @@
     python benchmarks/arm.py [--quick]
 
 Physics at 0.5 ms, control at 1 kHz. Only ratios within one run mean anything on a shared machine; each is the median
-over rounds that alternate between the two sides. A control sample's cost is that of a physics step with the callback
-over one without.
+over rounds that alternate between the two sides. A law's cost is the mean of physics steps with the callback, of which
+every second has a control sample, over that of steps without.
 """
 
-import dataclasses
-import statistics
-import sys
 import time
-from collections.abc import Callable
+
+from speed import STEPS, chunk, ratio, stepping
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.batch import Chunk
-from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import cores
 
-QUICK = "--quick" in sys.argv
-ROUNDS, STEPS = (3, 2_000) if QUICK else (9, 10_000)
 ARMS, TARGET = 64, 1.5
 LENGTHS = (0.333, 0.1, 0.316, 0.1, 0.384, 0.1, 0.107)  # m: those of a Franka Panda, roughly
 MASSES = (3.0, 2.5, 3.0, 2.7, 3.0, 1.6, 0.7)  # kg, chosen
@@ -41,46 +34,6 @@ def arm() -> smc.Plant:
     return smc.plant_from(model, channels=channels, name="seven_joints")
 
 
-def seconds(action: Callable[[], object]) -> float:
-    """How long an action takes."""
-    start = time.perf_counter()
-    action()
-    return time.perf_counter() - start
-
-
-def chunk(scenario: smc.Scenario, runs: int, threads: int) -> Chunk:
-    """A batch of runs, ready to step."""
-    with installed():
-        return Chunk([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
-
-
-def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:
-    """Steps of a batch from its first state, with the callback or bare."""
-    start, records = batch.batch.state.copy(), batch.records.copy()
-    numbers = [packed.numbers.copy() for packed in batch.packed]
-
-    def action() -> None:
-        batch.batch.state[:], batch.records[:] = start, records
-        for packed, first in zip(batch.packed, numbers, strict=True):
-            packed.numbers[:] = first
-        if bare:
-            batch.batch.step(nstep=steps)
-        else:
-            with installed():
-                batch.batch.step(nstep=steps)
-
-    return action
-
-
-def ratio(one: Callable[[], object], other: Callable[[], object]) -> tuple[float, float, float]:
-    """Seconds of each, and the median over rounds of their ratio."""
-    for action in (one, other):
-        action()
-    rounds = [(seconds(one), seconds(other)) for _ in range(ROUNDS)]
-    ones, others = zip(*rounds, strict=True)
-    return statistics.median(ones), statistics.median(others), statistics.median(a / b for a, b in rounds)
-
-
 def main() -> None:
     """Print the costs of laws, and the use of cores."""
     plant = arm()
@@ -95,7 +48,7 @@ def main() -> None:
     scenario = smc.Scenario(plant=plant, law="computed_torque_sliding", physics_step=5e-4, duration=STEPS * 5e-4)
     steps = STEPS // 20
     alone, all_cores = (stepping(chunk(scenario, ARMS, threads), steps, False) for threads in (1, cores()))
-    _, _, speed_up = ratio(alone, all_cores)
+    _, _, speed_up = ratio(alone, all_cores, time.perf_counter)
     print(f"{ARMS} arms on {cores()} cores: {speed_up:.2f} times as fast as on one")
 
 

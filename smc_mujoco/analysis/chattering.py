@@ -90,6 +90,8 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
         if fields:
             raise ScenarioError(f"a Scenario and {', '.join(fields)}: give one of them")
         scenario = law
+    elif "plant" not in fields:
+        raise ScenarioError("chattering lacks plant: give plant=...")
     else:
         scenario = Scenario(law=law, **fields)  # type: ignore[arg-type]
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:

@@ -8,7 +8,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
@@ -17,7 +16,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-from smc_mujoco.metrics.catalogue import chattering_amplitude
+from smc_mujoco.metrics.limit_cycle import of_trace
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -53,7 +52,7 @@ def amplitudes(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw the amplitude of s over the actuator's lag, predicted and run.
+    """Draw the amplitude of s of the first channel over the actuator's lag, predicted and run.
 
     Args:
       traces: condition -> label -> Trace, each condition with another lag.
@@ -84,7 +83,7 @@ def amplitudes(
             lags = [1e3 * lag(trace.scenario) for trace in of]
             predicted[label] = lags, [chattering(trace.scenario).amplitude for trace in of]
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
-            measured = [chattering_amplitude(trace) for trace in of]
+            measured = [of_trace(trace)[0] for trace in of]
             ax.plot(lags, measured, "o", color=colour, ms=style.points(7.0), mec=style.PAPER)
             handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=style.label(label)))
         if len(predicted) == 2:
@@ -96,8 +95,8 @@ def amplitudes(
                 ax.annotate(text, (equal, 0.0), xycoords=("data", "axes fraction"), **place)
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
-        unit = np.unique([trace.scenario.plant.unit for of in runs.values() for trace in of])
-        ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit[0]}/s)")
+        unit = next(iter(runs.values()))[0].scenario.plant.unit
+        ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")
         ax.xaxis.set_major_formatter("{x:g}")
         ax.margins(0.04, 0.06)
         pages.set_head(page, width, title or "Chattering", handles)

@@ -244,6 +244,7 @@ def broken(y, gain, m):
         (lambda: chattering("classical", plant="duffing", channel=3), "channel is 3: give 0 to 0"),
         (lambda: chattering(smc.Scenario(plant="duffing", law="classical"), plant="duffing"), "give one of them"),
         (lambda: chattering("clasical", plant="duffing"), "classical"),
+        (lambda: chattering("classical"), "chattering lacks plant"),
         (lambda: describing_function("classical", -1.0, 3.0), "amplitude is -1"),
         (lambda: describing_function("classical", 1.0, 3.0, 0), "samples is 0"),
         (lambda: describing_function("classical", 1.0, 3.0, True), "samples is True"),

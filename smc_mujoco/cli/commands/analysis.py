@@ -221,10 +221,12 @@ def chatter(
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
     amplitude: Annotated[
-        float | None, typer.Option(help="Take the largest gains whose predicted amplitude of s stays below this.")
+        float | None,
+        typer.Option(min=1e-12, help="Take the largest gains whose predicted amplitude of s stays below this."),
     ] = None,
     frequency: Annotated[
-        float | None, typer.Option(help="Take the largest gains whose predicted frequency, Hz, stays below this.")
+        float | None,
+        typer.Option(min=1e-3, help="Take the largest gains whose predicted frequency, Hz, stays below this."),
     ] = None,
     duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs in which it is measured, s.")] = 8.0,
     out: Annotated[

@@ -337,7 +337,8 @@ def claims(
 @errors_as_sentences()
 def papers(
     new: Annotated[
-        Path | None, typer.Option("--new", metavar="FOLDER", help="Make a folder with a paper of yours, which runs.")
+        Path | None,
+        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder."),
     ] = None,
     check: Annotated[
         Path | None,
