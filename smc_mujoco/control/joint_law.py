@@ -61,10 +61,10 @@ def numbers(n: int) -> int:
 @njit
 def measurement_at(address):
     """Return the measurement that is stored at an address: HEADER numbers, the vectors, M, h and g."""
-    head = carray(pointer(address), (5,))
-    n, at = int(head[4]), address + 40
+    head = carray(pointer(address), (HEADER,))
+    n, at = int(head[HEADER - 1]), address + 8 * HEADER
     step = 8 * n
-    end = at + 9 * step
+    end = at + VECTORS * step
     return JointMeasurement(
         head[0],
         head[1],

@@ -36,7 +36,7 @@ from smc_mujoco.common.jit import (
 )
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import measurement_at
+from smc_mujoco.control.joint_law import HEADER, measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
@@ -82,7 +82,7 @@ def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], 
         return 0
 
     def native(y, g, m, out):
-        n = int(carray(pointer(y), (5,))[4])
+        n = int(carray(pointer(y), (HEADER,))[HEADER - 1])
         memories, output = carray(pointer(m), (n, memory)), carray(pointer(out), (2 * n,))
         ok, _ = attempt(law, (measurement_at(y), values(g, n), memories, output))
         return not ok
