@@ -17,7 +17,7 @@ from smc_mujoco.draw.film.arrows import DRAWN
 
 MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 MARGIN = 3  # px around what has changed, for smoothed edges
-FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, and as each shape in it; measured
+FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, as each shape in it; fitted to two films
 SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
 GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
