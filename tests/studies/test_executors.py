@@ -219,6 +219,7 @@ from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.study import study
 
 out, address, executors.STEPS, executors.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
+executors.UNDER_WAY = 4  # few, so that most of the work is not even sent when the third part is written
 scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)
 add = Store.add
 
