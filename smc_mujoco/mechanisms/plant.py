@@ -127,6 +127,7 @@ class Plant:
       label, short: long and short name in figures; "": made from its name.
       jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
       ranges: joint, least and largest position of each channel, rad or m; empty: no joint has limits.
+      suggested: "law", "u_max" or "reference" -> what each driven channel suggests to scenarios that are given none.
     """
 
     name: str
@@ -154,6 +155,7 @@ class Plant:
     label: str = ""
     short: str = ""
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed"):

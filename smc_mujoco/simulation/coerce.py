@@ -22,13 +22,14 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
-from smc_mujoco.simulation.signals import PerChannel, Signal
+from smc_mujoco.simulation.signals import Constant, PerChannel, Signal
 
 P = TypeVar("P", bound=Part)
 T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
+REST = Constant(0.0)
 
 
 ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels
@@ -40,19 +41,20 @@ def law(value: Law | Template | str) -> Law:
     return component("law", find_law(value) if isinstance(value, str) else value)
 
 
-def laws(value: Laws, plant: Plant) -> Law:
-    """Return the law of a plant's driven channels, from one law for all or one for each."""
+def laws(value: Laws | None, plant: Plant) -> Law:
+    """Return the law of a plant's driven channels, from one law for all or one for each; from None the plant's."""
+    value = plant.suggested.get("law") if value is None else value
     if not isinstance(value, Mapping | list | tuple):
         return law(value)  # pyright: ignore[reportArgumentType]
     return by_channel([law(one) for one in each("law", value, plant)])  # pyright: ignore[reportArgumentType]
 
 
-def unchanged_law(value: Laws) -> Law:
+def unchanged_law(value: Laws | None) -> Law:
     """Return a law as given. `laws` converts it when the plant is known."""
     return value  # pyright: ignore[reportReturnType]
 
 
-def unchanged_reference(value: Signal | ByChannel[Signal]) -> Signal:
+def unchanged_reference(value: Signal | ByChannel[Signal] | None) -> Signal:
     """Return a reference as given. `reference` converts it when the plant is known."""
     return value  # pyright: ignore[reportReturnType]
 
@@ -195,13 +197,18 @@ def sensor(value: Encoder | None) -> Encoder | None:
     return instance("sensor", value, Encoder, "smc.Encoder(counts=...)")
 
 
-def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
-    """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each."""
+def reference(value: Signal | ByChannel[Signal] | None, plant: Plant) -> Signal:
+    """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each.
+
+    From None it is the plant's, or rest at 0.
+    """
+    if value is None:
+        value = [REST if one is None else one for one in plant.suggested.get("reference", (None,))]
     listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
     items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
     for item in items:
         if not isinstance(item, Signal):
-            raise ScenarioError(f"reference is {shown(value)}: give one signal, such as smc.Constant(0.0)")
+            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant(0.0)")
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 

@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Constant, Impulse, OrnsteinUhlenbeck, PerChannel, Signal
+from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Signal
 
 MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -49,7 +49,6 @@ MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here 
 MAX_CONDITION = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates as much, so it may be ms
 
-REST = Constant(0.0)
 Out = TypeVar("Out")
 T = TypeVar("T")
 
@@ -74,7 +73,8 @@ class Scenario:
     Attributes:
       plant: a Plant or the name of one.
       law: a Law (`smc.law(name, **gains)` or your own), or the name of one. Or one for each driven channel: a list in
-        their order, or a mapping from the joints' names, as also for u_max and reference.
+        their order, or a mapping from the joints' names, as also for u_max and reference. Left out, all three are what
+        the plant's channels suggest, see `smc.Channel`.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
         for a law that requires it, else "none".
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
@@ -120,7 +120,7 @@ class Scenario:
     """
 
     plant: Plant = field(converter=as_plant)
-    law: Law = field(converter=coerce.unchanged_law)
+    law: Law = field(converter=coerce.unchanged_law, default=None)
     model: str | None = None
     surface: Surface | None = field(converter=coerce.surface, default=None)
     duration: float = 10.0
@@ -129,7 +129,7 @@ class Scenario:
     u_max: float | tuple[float, ...] | None = field(converter=coerce.unchanged_bound, default=None)
     x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
     v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
-    reference: Signal = field(converter=coerce.unchanged_reference, default=REST)
+    reference: Signal = field(converter=coerce.unchanged_reference, default=None)
     feedforward: Signal | None = field(converter=coerce.feedforward, default=None)
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
@@ -345,13 +345,22 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
         "physics_step": s.control_period / math.ceil(s.control_period / largest - 1e-9),
-        "u_max": default_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
+        "u_max": suggested_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": "implicitfast" if s.realistic else "RK4",
     }
     return {name: value for name, value in defaults.items() if getattr(s, name) is None}
+
+
+def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
+    """Return the bounds that the plant's channels suggest, and the default bound for those that suggest none."""
+    default = default_u_max(plant)
+    if "u_max" not in plant.suggested:
+        return default
+    bounds = tuple(default if bound is None else bound for bound in plant.suggested["u_max"])
+    return bounds if len(set(bounds)) > 1 else bounds[0]
 
 
 def default_u_max(plant: Plant) -> float:

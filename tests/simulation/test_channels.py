@@ -1,6 +1,7 @@
 """A law, gains, bound and reference of its own for each channel: both loops, files, keys, and bad input."""
 
 import dataclasses
+import pickle
 import re
 
 import numpy as np
@@ -14,6 +15,12 @@ from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.studies import run_key
 
 SINE, MOVE = smc.Sine(0.3, 4.0), smc.MinimumJerk(0.4, 0.01, 0.03)
+REST = smc.Constant(0.0)
+PENDULUM = """
+<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/>
+  <body pos="0 0 -1"><joint name="elbow" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/></body>
+</body></worldbody></mujoco>
+"""
 COMMON = {"duration": 0.05, "noise": smc.Noise(1e-3, 1e-2)}
 BOTH = {"plant": "double_pendulum"} | COMMON
 
@@ -92,7 +99,44 @@ def test_what_is_the_same_for_all_channels_is_one():
     assert dataclasses.replace(other, duration=0.02).reference == other.reference
 
 
+def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
+    channels = {
+        "shoulder": smc.Channel(motor=True, law=smc.law("classical", k=5.0), u_max=8.0, reference=SINE),
+        "elbow": {"motor": True, "law": "twisting", "reference": None},
+    }
+    plant = smc.plant_from(PENDULUM, channels=channels, name="suggesting")
+    suggested = smc.Scenario(plant=plant, **COMMON)
+    same = {"law": [smc.law("classical", k=5.0), "twisting"], "u_max": [8.0, 6.0], "reference": [SINE, REST]}
+    assert suggested == smc.Scenario(plant=plant, **same, **COMMON)
+    assert suggested.limits == (8.0, 6.0)
+    assert_same(smc.run(suggested), reference.run(suggested))
+    others = {"law": smc.law("classical", k=1.0), "u_max": 2.0, "reference": MOVE}
+    given = smc.Scenario(plant=plant, **others, **COMMON)
+    assert (given.law, given.u_max, given.reference) == tuple(others.values())
+    plain = smc.plant_from(PENDULUM, channels={j: smc.Channel(motor=True) for j in channels}, name="suggesting")
+    assert plant == plain  # the same mechanism
+    assert smc.Scenario(plant=plain, **others, **COMMON) == given
+    assert pickle.loads(pickle.dumps(suggested)) == suggested
+
+
 REFUSED = {
+    "no law": (lambda: smc.Scenario(**BOTH), "law is None: give smc.law(...), your own law, or a name"),
+    "law of one channel alone": (
+        lambda: smc.plant_from(
+            PENDULUM, channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}}
+        ),
+        "channel 'elbow' has no law and others have: give each one, or none",
+    ),
+    "channel's bound": (
+        lambda: smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, u_max=-1.0)}),
+        "u_max of channel 'elbow' is -1",
+    ),
+    "channel's reference": (
+        lambda: smc.Scenario(
+            plant=smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, reference=0.3)}), law="classical"
+        ),
+        "reference is 0.3: give one signal",
+    ),
     "unknown joint": (
         lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
         "unknown driven joint of double_pendulum in law 'elbo': did you mean 'elbow'?",

@@ -288,7 +288,7 @@ def test_a_disturbance_is_none_one_or_several():
     assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
 
 
-@pytest.mark.parametrize("value", [None, 0.0, "0", [], [smc.Constant(0.0)] * 2, ...], ids=str)
+@pytest.mark.parametrize("value", [0.0, "0", [], [smc.Constant(0.0)] * 2, ...], ids=str)
 def test_a_reference_that_is_not_one_signal_is_refused(value):
     refused(lambda: scenario(reference=value), "reference")
 

@@ -10,6 +10,7 @@ from helpers.runs import assert_same
 from numpy.polynomial import Polynomial
 
 import smc_mujoco as smc
+from smc_mujoco.mechanisms.inverse_kinematics import Tip
 from smc_mujoco.simulation import reference
 
 TIMES, VALUES = (0.2, 0.5, 1.3, 1.5, 2.0), (0.1, 0.6, -0.4, 0.0, 0.3)
@@ -120,6 +121,14 @@ def test_cartesian_path_keeps_an_orientation():
     )
     end = np.array([of(one, [1.0])[0, 0] for one in path])
     np.testing.assert_allclose(end, start + np.array([0.15, 0.0, 0.0]), atol=1e-8)
+
+
+def test_the_tips_error_is_its_jacobian_times_a_small_move():
+    """Position and orientation, in the world's axes, where the tip is turned about two axes."""
+    x, move = np.array([0.1, 0.9, 0.7]), 1e-5 * np.array([1.0, -2.0, 3.0])
+    place, turn = tip(x + move)
+    found, jacobian = Tip(arms.arm(), ["reach", "turn", "lift"], "tip", None, turn.tolist()).error(x, place)
+    np.testing.assert_allclose(found, jacobian @ move, atol=1e-9)
 
 
 def test_a_run_of_the_arm_follows_a_path_in_space():

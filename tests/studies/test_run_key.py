@@ -108,6 +108,19 @@ def test_an_edited_law_is_another_run(edit):
     assert written() != written(**edit)
 
 
+def test_every_law_of_a_mixture_decides_the_key():
+    def mixed(factors) -> str:
+        laws = []
+        for factor in factors:
+            space: dict = {"__name__": "written"}
+            exec(f"def mine(y, gains, memory): return -{factor} * y.e, y.e", space)
+            laws.append(smc.law_function(space["mine"])())
+        return key(smc.Scenario(plant="double_pendulum", law=laws, duration=0.05))
+
+    assert mixed((1.0, 2.0)) == mixed((1.0, 2.0))
+    assert len({mixed(pair) for pair in ((1.0, 2.0), (1.0, 3.0), (4.0, 2.0), (2.0, 1.0))}) == 4
+
+
 def test_a_comment_or_a_line_more_is_no_edit():
     assert written() == written() == written(before="# a comment\n\n")
 

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 
@@ -27,6 +28,8 @@ class Channel:
         y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
       x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of the keyframe, or of
         the model.
+      law, u_max, reference: what scenarios that are given none take for this channel, as in a Scenario. Give each
+        channel a law, or none. None: the default bound, and rest at 0.
     """
 
     actuator: str | None = None
@@ -34,8 +37,17 @@ class Channel:
     partner: str | None = None
     x0: float | None = None
     partner_x0: float | None = None
+    law: Any = None
+    u_max: float | None = None
+    reference: Any = None
+
+    @property
+    def mechanical(self) -> "Channel":
+        """The channel without what only scenarios read."""
+        return dataclasses.replace(self, **dict.fromkeys(SUGGESTED))
 
 
+SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
 Pairs = tuple[tuple[str, Channel], ...]  # a joint and its Channel, each
 
 
@@ -73,7 +85,22 @@ def channel(joint: object, value: object) -> Channel:
         for name in ("x0", "partner_x0")
         if getattr(made, name) is not None
     }
+    if made.u_max is not None:
+        starts["u_max"] = number(f"u_max of channel {joint!r}", made.u_max, above=0.0, infinite=True)
     return dataclasses.replace(made, **starts)
+
+
+def suggested(channels: Pairs) -> dict[str, tuple]:
+    """Return field -> what each channel suggests to scenarios, None where nothing; only fields that one suggests.
+
+    Raises:
+      ScenarioError: some channels have a law and others have none.
+    """
+    found = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
+    bare = [joint for joint, channel in channels if channel.law is None]
+    if 0 < len(bare) < len(channels):
+        raise ScenarioError(f"channel {bare[0]!r} has no law and others have: give each one, or none")
+    return {name: values for name, values in found.items() if any(value is not None for value in values)}
 
 
 def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:

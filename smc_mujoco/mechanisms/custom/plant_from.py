@@ -35,6 +35,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     joints_of,
     ranges,
     starts,
+    suggested,
 )
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.motors import MOTOR, Motor, motor_of, put
@@ -164,6 +165,8 @@ def own_plant(
         mjcf.check_model(label, model)
         check_name(name)
     pairs = coerce(channels)
+    scenarios = suggested(pairs)
+    pairs = tuple((joint, channel.mechanical) for joint, channel in pairs)
     joints = joints_of(pairs)
     check(label, model, pairs)
     if keyframe is not None:
@@ -197,6 +200,7 @@ def own_plant(
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
         ranges=ranges(model, joints),
+        suggested=scenarios,
     )
 
 
