@@ -56,6 +56,36 @@ def test_callback_equals_plain_loop_under_laws_of_many_joints(arm):
         assert_same(trace, reference.run(scenario))
 
 
+TENDON = """
+<mujoco><option gravity="0 0 -5" wind="1 0 0" density="1.2"/><worldbody>
+  <body pos="0 0 1" gravcomp="0.3"><joint name="a" axis="0 1 0" stiffness="1"/>
+    <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/>
+    <body pos="0.4 0 0"><joint name="b" axis="0 1 0" actuatorgravcomp="{own}"/>
+      <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/></body></body>
+</worldbody>{tendon}<actuator><motor name="a" joint="a"/><motor name="b" joint="b"/>{actuator}</actuator></mujoco>
+"""
+PULL = """<tendon><fixed name="t" stiffness="3" damping="1">
+  <joint joint="a" coef="1"/><joint joint="b" coef="-2"/></fixed></tendon>"""
+SERVO = '<position joint="b" kp="4" kv="0.5"/>'
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [{}, {"tendon": PULL}, {"actuator": SERVO}, {"own": "true"}],
+    ids=["bodies", "tendon", "another actuator", "gravity compensated by the actuator"],
+)
+def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
+    """Also those that MuJoCo computes elsewhere, and with data that a law of one channel has used before."""
+    text = TENDON.format(**{"tendon": "", "actuator": "", "own": "false"} | parts)
+    channels = {name: smc.Channel(actuator=name, x0=0.3) for name in "ab"}
+    plant = smc.plant_from(text, channels=channels, name="pulled")
+    common = {"plant": plant, "duration": 0.02, "model": "nominal", "v0": (1.0, -2.0), "u_max": 1e3}
+    smc.run(smc.Scenario(law="computed_torque", **common))
+    trace = smc.run(smc.Scenario(law=curious, **common))
+    assert trace.failure is None
+    assert_same(trace, reference.run(trace.scenario))
+
+
 def test_bits_do_not_depend_on_threads(arm):
     scenarios = [
         smc.Scenario(plant=arm, law="computed_torque_sliding", seed=i, noise=smc.Noise(1e-3), duration=0.05)

@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numba import carray
+from numba import carray, njit
 
 from smc_mujoco.common import libmujoco
 from smc_mujoco.common.frozen import frozen
@@ -138,12 +138,12 @@ class NominalModel(Coupled):
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
-        data.ctrl[:] = 0.0
+        data.ctrl[:] = data.qfrc_actuator[:] = 0.0
         table = np.concatenate([places.qpos, places.qvel]).astype(np.int64)
         dense, state = np.zeros(model.nv**2), np.zeros(2 * len(places.qpos))
         arrays = data.qpos, data.qvel, data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator, table, dense, state
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
-        values = (len(places.qpos), model.nv, *addresses)
+        values = (len(places.qpos), model.nv, *addresses, passive_alone(model))
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
     def native_coriolis(self) -> int:
@@ -198,27 +198,70 @@ def _called(name: str, more: int = 0) -> Callable:
     return function
 
 
+def passive_alone(model: mujoco.MjModel) -> bool:
+    """Return whether h is of inertia and passive forces alone: without tendons, and actuators that act at ctrl = 0."""
+    motors = np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE.value) and np.all(
+        model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE.value
+    )
+    return bool(motors and not model.ntendon and not np.any(model.jnt_actgravcomp))
+
+
+@functools.cache
+def _stages() -> tuple[Callable, Callable]:
+    """Return compiled functions of what MuJoCo computes from positions, and from velocities.
+
+    Both take model, data, the address of qfrc_bias, and whether h is of passive forces alone. They then leave out what
+    M and h do not need, which is half of the time: the factors of M, collisions, lights, transmissions, actuators. The
+    numbers are the same.
+    """
+    position, velocity, actuation = map(_called, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
+    kinematics, centres, inertia = map(_called, ("mj_kinematics", "mj_comPos", "mj_makeM"))
+    rates, passive, newton_euler = _called("mj_comVel"), _called("mj_passive"), _called("mj_rne", 2)
+
+    @njit
+    def positions(model, data, bias, alone):
+        if alone:
+            kinematics(model, data)
+            centres(model, data)
+            inertia(model, data)
+        else:
+            position(model, data)
+
+    @njit
+    def velocities(model, data, bias, alone):
+        if alone:
+            rates(model, data)
+            passive(model, data)
+            newton_euler(model, data, 0, bias)
+        else:
+            velocity(model, data)
+            actuation(model, data)
+
+    return positions, velocities
+
+
 @functools.cache
 def native_dynamics() -> Function:
     """Return the C function of M, h and g.
 
     Its inputs are x and v, (n,) each; its outputs M (n, n), h and g, (n,) each.
     """
-    positions, velocities, actuation = map(_called, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
+    positions, velocities = _stages()
     full = _called("mj_fullM", 1)
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (12,))
+        own = carray(pointer(p), (13,))
         n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
+        biases, alone = int(own[6]), own[12] != 0.0
         given, state = carray(pointer(y), (2 * n,)), carray(pointer(int(own[11])), (2 * n,))
         qpos, qvel = carray(pointer(int(own[4])), (1 << 40,)), carray(pointer(int(own[5])), (nv,))
-        bias, passive = carray(pointer(int(own[6])), (nv,)), carray(pointer(int(own[7])), (nv,))
+        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(own[7])), (nv,))
         actuator, table = carray(pointer(int(own[8])), (nv,)), carray(integers(int(own[9])), (2 * n,))
         dense, output = carray(pointer(int(own[10])), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
         for j in range(n):
             state[j], state[n + j] = given[j], given[n + j]
             qpos[table[j]] = given[j]
-        positions(model, data)
+        positions(model, data, biases, alone)
         full(model, data, int(own[10]))
         for i in range(n):
             for j in range(n):
@@ -226,8 +269,7 @@ def native_dynamics() -> Function:
         for part in range(2):  # g, then h, so that the velocities are those of the sample afterwards
             for j in range(n):
                 qvel[table[n + j]] = part * given[n + j]
-            velocities(model, data)
-            actuation(model, data)
+            velocities(model, data, biases, alone)
             for j in range(n):
                 k = table[n + j]
                 output[n * n + (1 - part) * n + j] = bias[k] - passive[k] - actuator[k]
@@ -239,10 +281,10 @@ def native_dynamics() -> Function:
 @functools.cache
 def native_coriolis() -> Function:
     """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its input is w, (n,)."""
-    velocities = _called("mj_fwdVelocity")
+    rates, newton_euler, velocity = _called("mj_comVel"), _called("mj_rne", 2), _called("mj_fwdVelocity")
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (12,))
+        own = carray(pointer(p), (13,))
         n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
         w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
         state, qvel = carray(pointer(int(own[11])), (2 * n,)), carray(pointer(int(own[5])), (nv,))
@@ -253,7 +295,11 @@ def native_coriolis() -> Function:
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[table[n + j]] = state[n + j] + sign * w[j]
-            velocities(model, data)
+            if own[12] != 0.0:
+                rates(model, data)
+                newton_euler(model, data, 0, int(own[6]))
+            else:
+                velocity(model, data)
             for j in range(n):
                 output[j] += sign * 0.25 * bias[table[n + j]]
         return 0
