@@ -60,7 +60,7 @@ TENDON = """
 <mujoco><option gravity="0 0 -5" wind="1 0 0" density="1.2"/><worldbody>
   <body pos="0 0 1" gravcomp="0.3"><joint name="a" axis="0 1 0" stiffness="1"/>
     <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/>
-    <body pos="0.4 0 0"><joint name="b" axis="0 1 0" actuatorgravcomp="{own}"/>
+    <body pos="0.4 0 0" gravcomp="0.5"><joint name="b" axis="0 1 0" actuatorgravcomp="{own}"/>
       <geom type="capsule" size="0.1" fromto="0 0 0 0.4 0 0" mass="1"/></body></body>
 </worldbody>{tendon}<actuator><motor name="a" joint="a"/><motor name="b" joint="b"/>{actuator}</actuator></mujoco>
 """
