@@ -200,7 +200,7 @@ def fits(law: Law | Template, plant: Plant) -> bool:
     if not law.plants or plant.name in law.plants:
         return True
     known = [plants_known()[name] for name in law.plants if name in plants_known()]
-    return plant.direct and plant.underactuated and any(each.underactuated for each in known)
+    return plant.own and plant.underactuated and any(each.underactuated for each in known)
 
 
 def laws(plant: Plant | str | None = None) -> list[str]:

@@ -270,7 +270,10 @@ def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
     found: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
         if jump := trace.scenario.jump:
-            words = ", ".join(f"{what} × {factor:.3g}" for what, factor in jump.factors.items())
+            added = trace.scenario.plant.added
+            words = ", ".join(
+                f"{what} {'+' if what in added else '×'} {factor:.3g}" for what, factor in jump.factors.items()
+            )
             found.setdefault((jump.time, words), []).append(name)
     changes: dict[float, list[str]] = {}
     for (time, words), who in sorted(found.items()):
@@ -347,7 +350,7 @@ def units(group: Group) -> dict[str, str]:
 
 def plant_name(plant: Plant) -> str:
     """Return the plant's label: its own, or its name in words. A user's model keeps the user's name."""
-    return plant.label or (plant.name if plant.direct else in_words(plant.name))
+    return plant.label or (plant.name if plant.own else in_words(plant.name))
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

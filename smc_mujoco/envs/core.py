@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.envs.tasks import TASKS, Pair, reward, starts, tasks
+from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.plant import Plant, as_plant, ready
@@ -45,8 +45,9 @@ class Setting:
       rest: qpos (nq,) and qvel (nv,) at the start of a run, before x and v of the episode are written into them.
       ctrl_limits: the largest inputs of the model's actuators, (driven,).
       selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
+      rest_x: the plant's rest, from which errors count, (n,).
       low, high: bounds of the initial positions, (n,) each.
-      references: r, r', r'' at every sample, (K + 1, 3); one row if the task has no reference.
+      references: r, r', r'' at every sample, (K + 1, 3); one row of zeros if the task has no reference.
       size: number of values in an observation: positions, velocities, and r, r', r'' if the task has a reference.
       shape: of an action.
     """
@@ -85,7 +86,7 @@ class Setting:
         self.rotors = _rotors(self.model)
         self.rest = assembly.start(self.model, self.scenario)
         self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
-        self.selected = self.task.selected(plant)
+        self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
         self.size, self.shape = 2 * plant.n + 3 * self.task.moving, (plant.driven,)
 
@@ -160,7 +161,7 @@ class Setting:
 
     def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
         """Return the reward for x, v (..., n) at sample k."""
-        return reward(*self.task.errors(x, v, self.reference(k), self.selected))
+        return reward(*self.task.errors(x - self.rest_x, v, self.reference(k), self.selected))
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
@@ -233,6 +234,8 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
     """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
+    if samples == 1:  # the task has none
+        return np.zeros((1, 3))
     times = np.arange(samples) * scenario.control_period
     if isinstance(scenario.reference, PerChannel):
         raise ScenarioError("the channels have different references, and an environment has one: give one for all")

@@ -12,7 +12,8 @@ for w, are chosen.
     swing_up      1 - cos x of toppling hinges, x of others  x'                 within 0.1 rad of hanging, others at 0
     synchronise   x - mean of the channels                   x' - its mean      the largest of the plant's x0
 
-If the joints of your own model have ranges, starts also lie within these.
+An arm such as `panda`, whose rest is a pose, has the task `regulate` alone, and x counts from this pose. If joints have
+ranges, starts also lie within these.
 """
 
 import functools
@@ -57,8 +58,8 @@ class Task:
         return np.ones(plant.n, bool)
 
     def spread(self, plant: Plant) -> Pair:
-        """Return the lowest and the highest start of the channels, (n,) each, ignoring the ranges of joints."""
-        most = np.abs(plant.x0)
+        """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring joints' ranges."""
+        most = np.abs(plant.x0 - rest(plant))
         return -most, most
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
@@ -70,6 +71,10 @@ class Track(Task):
     """Follow a reference with the driven channels."""
 
     moving = True
+
+    def fits(self, plant: Plant) -> bool:
+        """Return whether one reference can be that of all driven channels: the plant rests at 0."""
+        return not plant.rest
 
     def fields(self, plant: Plant) -> dict[str, Any]:
         """Return the reference."""
@@ -122,7 +127,7 @@ class Synchronise(Task):
 
     def fits(self, plant: Plant) -> bool:
         """Return whether the plant is a network."""
-        return plant.network
+        return plant.network and not plant.rest
 
     def spread(self, plant: Plant) -> Pair:
         """Return the same range for every channel."""
@@ -153,7 +158,12 @@ def starts(task: Task, plant: Plant) -> Pair:
     """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
     least, most = _ranges(plant)
     low, high = task.spread(plant)
-    return np.clip(low, least, most), np.clip(high, least, most)
+    return np.clip(rest(plant) + low, least, most), np.clip(rest(plant) + high, least, most)
+
+
+def rest(plant: Plant) -> np.ndarray:
+    """Return the positions from which errors and spreads count, (n,): the plant's rest, or 0."""
+    return np.array(plant.rest or (0.0,) * plant.n)
 
 
 def _ranges(plant: Plant) -> Pair:

@@ -106,9 +106,12 @@ class Plant:
       name: as in `smc.plants()`.
       parameters: name -> value, SI units; the nominal ones, which laws may know.
       mass: parameter that is meant by "mass" in a mismatch or a jump.
+      added: names of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its number to
+        such a parameter, in the parameter's unit, instead of multiplying it.
       unit: unit of x, "rad" or "m"; that of the first channel if they differ.
       mixed: units of all channels if they differ, (n,), else (); `units` has them in both cases.
       x0: default initial positions, those of the paper study, (n,).
+      rest: positions that the default reference holds, (n,); empty: 0.
       n: number of channels.
       sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
       build: n -> MjSpec of the ideal mechanism with the default parameters.
@@ -135,6 +138,7 @@ class Plant:
     mass: str
     unit: str
     x0: tuple[float, ...]
+    rest: tuple[float, ...] = ()
     n: int = 1
     sizes: tuple[int, int] = (1, 1)
     build: Callable[[int], mujoco.MjSpec]
@@ -146,6 +150,7 @@ class Plant:
     mixed: tuple[str, ...] = ()
     underactuated: bool = False
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    added: tuple[str, ...] = ()
     direct: bool = False
     smooth: bool = True
     dry: tuple[str, ...] = ()
@@ -197,6 +202,11 @@ class Plant:
         return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
     @property
+    def own(self) -> bool:
+        """Whether it is a user's model, not one of the library."""
+        return hasattr(self.build, "argument")
+
+    @property
     def argument(self) -> str:
         """Its name on the command line; for a user's model FILE.xml:joint+joint."""
         return getattr(self.build, "argument", self.name)
@@ -225,7 +235,7 @@ class Plant:
         return model
 
     def values(self, factors: Mapping[str, float]) -> Values:
-        """Return the parameters, each times its factor; `mass` stands for the plant's mass."""
+        """Return the parameters, each times its factor, or with it added; `mass` stands for the plant's mass."""
         values = dict(self.parameters)
         for key, factor in factors.items():
             name = self.mass if key == "mass" else key
@@ -233,9 +243,10 @@ class Plant:
                 raise unknown(f"parameter of {self.name}", key, [*values, "mass"])
             if factor <= 0.0 and name in self.positive:
                 raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
-            values[name] *= factor
+            values[name] = values[name] + factor if name in self.added else values[name] * factor
         for name, value in values.items():
-            if not abs(value) <= MAX_PARAMETER or (value <= 0.0 and name in self.positive):
+            low = (value <= 0.0 and name in self.positive) or (value < 0.0 and name in self.added)
+            if not abs(value) <= MAX_PARAMETER or low:
                 raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
         return Values(**values)
 
@@ -286,7 +297,7 @@ def plant(name: str, **parameters: float) -> Plant:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -MAX_PARAMETER)
         values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=MAX_PARAMETER)
-    for key in base.dry:
+    for key in (*base.dry, *base.added):
         number(f"{name}'s {key}", values[key], least=0.0)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth

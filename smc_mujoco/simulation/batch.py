@@ -99,7 +99,7 @@ class Chunk:
         """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
         size = len(self.scenarios) * self.scenarios[0].plant.n
         while steps:
-            most = USER_MODEL_STEPS if self.scenarios[0].plant.direct else SLICE_STEPS // size
+            most = USER_MODEL_STEPS if self.scenarios[0].plant.own else SLICE_STEPS // size
             count = min(steps, max(1, most))
             calls = count * self.scenarios[0].stages
             self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count), calls)
@@ -135,7 +135,7 @@ class Chunk:
         scenario = self.scenarios[i]
         failure, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
         reason = None if failure == state.FINE else self.reason(i, failure)
-        if reason is None and (self.model.npair or scenario.plant.direct) and self.overflowed(i):
+        if reason is None and (self.model.npair or scenario.plant.own) and self.overflowed(i):
             reason, step = OVERFLOWED, 0
         return from_log(self.given[i], self.logs[i], step, reason)
 

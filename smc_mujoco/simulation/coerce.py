@@ -3,6 +3,7 @@
 Each raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
 """
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -200,10 +201,13 @@ def sensor(value: Encoder | None) -> Encoder | None:
 def reference(value: Signal | ByChannel[Signal] | None, plant: Plant) -> Signal:
     """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each.
 
-    From None it is the plant's, or rest at 0.
+    From None it is what the channels suggest, or the plant's rest.
     """
     if value is None:
-        value = [REST if one is None else one for one in plant.suggested.get("reference", (None,))]
+        resting = [Constant(x) for x in plant.rest] or [REST]
+        given = plant.suggested.get("reference", (None,) * len(resting))
+        value = [still if one is None else one for still, one in zip(itertools.cycle(resting), given, strict=False)]
+    value = value.signals if isinstance(value, PerChannel) else value
     listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
     items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
     for item in items:

@@ -21,7 +21,11 @@ class Noise:
 
 @dataclasses.dataclass(frozen=True)
 class Jump:
-    """A multiplication of the plant's parameters by `factors` (parameter name -> factor) from `time`, s, on."""
+    """A change of the plant's parameters from `time`, s, on.
+
+    Each is multiplied by its factor in `factors` (parameter name -> factor); those in `plant.added`, such as a payload,
+    grow by it.
+    """
 
     time: float
     factors: Mapping[str, float]

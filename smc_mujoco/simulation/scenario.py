@@ -85,7 +85,7 @@ class Scenario:
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
-      reference: r(t), the same for every channel, or one for each driven channel.
+      reference: r(t), the same for every channel, or one for each driven channel. Default: 0, or the plant's own rest.
       feedforward: a known signal that is added to the law's u before its bound, the same for every driven channel: an
         excitation, or the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t), one signal or several to be added, or None.
@@ -93,7 +93,8 @@ class Scenario:
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
       velocity: an Estimator of the velocity that the law sees, or the name of one. Default: "measured", or
         "filtered_difference" with an encoder, which measures no velocity.
-      mismatch: parameter name -> factor on the true plant's parameter. `mass` is the plant's mass.
+      mismatch: parameter name -> factor on the true plant's parameter, or what is added to one of `plant.added`, such
+        as kg of payload. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, else implicitfast.
@@ -309,11 +310,15 @@ class Scenario:
         return Nominal() if self.amplifier is None else self.amplifier.nominal
 
     def factors(self, step: int) -> dict[str, float]:
-        """Return the true plant's parameter factors at a physics step: the mismatch, and from its time on the jump."""
+        """Return the true plant's parameter factors at a physics step: the mismatch, and from its time on the jump.
+
+        For the parameters in `plant.added` it is what is added to them.
+        """
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
-                factors[name] = factors.get(name, 1.0) * factor
+                added = name in self.plant.added
+                factors[name] = factors.get(name, 0.0) + factor if added else factors.get(name, 1.0) * factor
         return factors
 
 
@@ -419,8 +424,8 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
         raise ScenarioError(
-            f"disturbance {shown(forces[0])} is a force on a body, but {s.plant.name} is your own model, whose "
-            "disturbances act on its joints: give another signal"
+            f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
+            "joints: give another signal"
         )
     for reference in dict.fromkeys(s.references):
         if reference.cartesian:
@@ -438,7 +443,7 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if not fits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
-            hint = ": give each channel a partner" if s.plant.direct and fits(law, paired) else ""
+            hint = ": give each channel a partner" if s.plant.own and fits(law, paired) else ""
             raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}{hint}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")

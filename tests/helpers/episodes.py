@@ -32,7 +32,7 @@ def dm_control_suite() -> ModuleType:
 
 def driven_by_dm(environment, act):
     """x, v, u of every sample of an episode."""
-    limit = environment.task.setting.scenario.resolved.u_max
+    limit = np.array(environment.task.setting.scenario.limits)
     timestep, states = environment.reset(), []
     while True:
         u = act(timestep)
@@ -44,7 +44,7 @@ def driven_by_dm(environment, act):
 
 def driven_by_gym(environment, act):
     """The same of a gymnasium environment."""
-    n, limit = environment.setting.scenario.plant.n, environment.setting.scenario.resolved.u_max
+    n, limit = environment.setting.scenario.plant.n, np.array(environment.setting.scenario.limits)
     observation, _ = environment.reset(seed=0)
     states, over = [], False
     while True:

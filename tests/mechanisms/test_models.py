@@ -13,11 +13,11 @@ from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plant import Coupled, catalogue, model_path, plant, write
 
 NAMES = sorted(catalogue())
-SIZES = {1: [1], 2: [2]}  # largest n -> which are tested
+SIZES = {1: [1], 2: [2], 7: [7]}  # largest n -> which are tested
 SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 3, 5, 40, 100])]
 CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
-# one pendulum or cart a channel; the others: tests/mechanisms/test_underactuated.py and test_rig_plants.py
-DRIVEN = [(name, n) for name, n in SIZED if not catalogue()[name].free and name != "double_pendulum"]
+# one pendulum or cart a channel; the others: tests/mechanisms/test_underactuated.py, test_rig_plants.py, test_panda.py
+DRIVEN = [(name, n) for name, n in SIZED if not catalogue()[name].free and name not in ("double_pendulum", "panda")]
 EVERY_JOINT_DRIVEN = pytest.mark.parametrize(("name", "n"), DRIVEN, ids=[f"{name}-{n}" for name, n in DRIVEN])
 PLANTS = pytest.mark.parametrize("name", NAMES)
 LINKED = {  # mechanisms whose joints differ -> these, in the order of the channels
@@ -25,6 +25,7 @@ LINKED = {  # mechanisms whose joints differ -> these, in the order of the chann
     "pendubot": ["shoulder", "elbow"],
     "acrobot": ["elbow", "shoulder"],
     "double_pendulum": ["shoulder", "elbow"],
+    "panda": [f"joint{i}" for i in range(1, 8)],
 }
 
 
@@ -56,6 +57,14 @@ def expected(p, x, v, u):
     return acc, size
 
 
+def within(p, x):
+    """x from -2 .. 2, scaled to the ranges of the joints that have limits: the equation knows of none."""
+    if not p.ranges:
+        return x
+    low, high = np.array([each[1:] for each in p.ranges]).T
+    return low + (high - low) * (x + 2) / 4
+
+
 def acceleration(model, data, x, v, u):
     joints = joint_ids(model)  # one coordinate each
     data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u[: model.nu]
@@ -68,7 +77,7 @@ def worst_error(p, model, rng, trials=20):
     data = mujoco.MjData(model)
     worst = 0.0
     for _ in range(trials):
-        x, v, u = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n), rng.uniform(-6, 6, p.n)
+        x, v, u = within(p, rng.uniform(-2, 2, p.n)), rng.uniform(-3, 3, p.n), rng.uniform(-6, 6, p.n)
         acc, size = expected(p, x, v, u)
         worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
     return worst
@@ -117,7 +126,7 @@ def test_every_parameter_is_felt_by_the_model(name, n):
     size = {"n": n} if n > 1 else {}
     p = catalogue()[name]
     values = {key: value or 0.01 * min((1.0, *p.limits)) for key, value in p.parameters.items()}
-    x, v, u = rng.uniform(1.1, 2, n), rng.uniform(1, 3, n), rng.uniform(1, 6, n) * min((1.0, *p.limits))
+    x, v, u = within(p, rng.uniform(1.1, 2, n)), rng.uniform(1, 3, n), rng.uniform(1, 6, n) * min((1.0, *p.limits))
     before = plant(name, **size, **values).load()
     for key, value in values.items():
         after = plant(name, **size, **values | {key: 1.25 * value}).load()
@@ -145,7 +154,10 @@ def test_nothing_moves_but_the_equation(name, n):
     assert not model.dof_frictionloss.any()
     assert not model.tendon_frictionloss.any()
     assert not model.tendon_armature.any()
-    assert not model.jnt_limited.any()
+    assert model.jnt_limited.all() if p.ranges else not model.jnt_limited.any()
+    np.testing.assert_array_equal(
+        model.jnt_range[joint_ids(model)] if p.ranges else (), [each[1:] for each in p.ranges]
+    )
     assert not model.geom_contype.any()
     assert not model.geom_conaffinity.any()
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT

@@ -50,11 +50,11 @@ def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, 
     lit = False
     for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
         machine = assembly.spec([scenario])
-        if k == 0 and scenario.plant.direct and (lit := bool(machine.lights)):
+        if k == 0 and scenario.plant.own and (lit := bool(machine.lights)):
             take(spec.visual.headlight, machine.visual.headlight)
             for light in list(spec.lights):
                 spec.delete(light)
-        if scenario.plant.direct:
+        if scenario.plant.own:
             machine = own_machine(machine, spec, lit, first=k == 0)
             spec.attach(machine, frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
             continue
@@ -129,7 +129,7 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
         return named(scenario, chosen)
     if chosen is not None:
         return camera.turn(*chosen[:2])
-    if scenario.plant.direct:
+    if scenario.plant.own:
         right, up = np.reshape(view(assembly.model([scenario])), (2, 3))
         right, back = right / np.linalg.norm(right), np.cross(right, up) / np.linalg.norm(np.cross(right, up))
         return np.column_stack([right, np.cross(back, right), back])

@@ -45,7 +45,7 @@ class Stage:
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown, self.own = [puppet.shown for puppet in self.puppets], scenarios[0].plant.direct
+        self.shown, self.own = [puppet.shown for puppet in self.puppets], scenarios[0].plant.own
         turn = scene.turn(scenarios[0], chosen)
         self.motions = motions or [None] * len(traces)
         runs = zip(self.puppets, traces, self.motions, strict=True)

@@ -864,7 +864,7 @@ def test_what_no_channels_or_partners_can_mend_is_not_advised(partner):
 def test_a_force_on_a_body_is_refused(arm):
     with pytest.raises(
         smc.ScenarioError,
-        match=r"is a force on a body, but arm is your own model, whose disturb",
+        match=r"is a force on a body, and disturbances of arm act on its joints",
     ):
         smc.Scenario(plant=arm(), law="none", disturbance=smc.Gust(amplitude=1.0, time=0.1, width=0.1))
 

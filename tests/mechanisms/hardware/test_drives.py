@@ -215,11 +215,12 @@ def test_play_of_no_width_is_a_rigid_rotor(name):
     rigid.dof_damping[dofs] += 0.05
     mujoco.mj_setConst(rigid, mujoco.MjData(rigid))
     a, b = home(with_rotor), home(rigid)
-    deviation = np.abs(driven(with_rotor, sine, 2.0, a)[:, 1] - driven(rigid, sine, 2.0, b)[:, 1]).max()
+    seconds = 0.2 if name == "panda" else 2.0  # before it meets its stops
+    deviation = np.abs(driven(with_rotor, sine, seconds, a)[:, 1] - driven(rigid, sine, seconds, b)[:, 1]).max()
     at_twice_the_step = home(rigid)
     rigid.opt.timestep = 2 * H
-    driven(rigid, sine, 2.0, at_twice_the_step)
-    assert deviation < 0.1 * abs(at_twice_the_step.qpos[0] - b.qpos[0])  # a tenth of the step's own error
+    driven(rigid, sine, seconds, at_twice_the_step)
+    assert deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()  # a tenth of the step's own error
     assert a.qpos[: rigid.nq] == pytest.approx(b.qpos, abs=1e-4)
 
 
