@@ -179,6 +179,10 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     pages |= notebooks
     for name in notebooks:
         assert "import smc_mujoco as smc" in re.sub("<[^>]+>", "", built[f"{name}.html"])
+        pictures = re.findall(r'<img [^>]*src="([^"]+\.png)"', built[f"{name}.html"])
+        assert pictures, name
+        assert [file for file in pictures if not (tmp_path / "notebooks" / file).is_file()] == []
+        assert re.search(r'<div class="output"><table', built[f"{name}.html"]), name
     assert set(built) == {f"{name}.html" for name in pages}
     assert {name for name in pages if "/" in name and "<svg" not in built[f"{name}.html"]} == set()
     assert {name for name, text in built.items() if "arithmatex" in text} == set()  # an equation that is not typeset

@@ -133,9 +133,9 @@ def _rounded(path: re.Match[str]) -> str:
     return re.sub(r"\d+\.\d{2,}", lambda number: f"{float(number[0]):.1f}", path[0])
 
 
-def _version() -> str:
-    """Return a hash of all that figures depend on."""
-    files = [*(ROOT / "models").rglob("*.xml"), Path(__file__)]
+def _version(also: Iterable[Path]) -> str:
+    """Return a hash of all that figures depend on, and of further files."""
+    files = [*(ROOT / "models").rglob("*.xml"), Path(__file__), *also]
     for room in ROOMS:
         files += (ROOT / "smc_mujoco" / room).rglob("*.py")
     files += (ROOT / "smc_mujoco" / "control" / "tuned_gains").rglob("*.json")
@@ -151,9 +151,16 @@ def _draw(name: str, draw: Callable[..., bytes], arguments: tuple[str, ...]) -> 
         return name, draw(*arguments)
 
 
-def figures(wanted: Iterable[tuple[Callable[..., bytes], tuple[str, ...]]]) -> dict[tuple[str, ...], bytes]:
-    """Return (function's name, its arguments ...) -> the figure; what is not in the cache is drawn on all cores."""
-    version, found, jobs = _version(), {}, []
+def figures(
+    wanted: Iterable[tuple[Callable[..., bytes], tuple[str, ...]]], also: Iterable[Path] = ()
+) -> dict[tuple[str, ...], bytes]:
+    """Return (function's name, its arguments ...) -> the figure; what is not in the cache is drawn on all cores.
+
+    Args:
+      wanted: functions and their arguments.
+      also: further files that the figures depend on.
+    """
+    version, found, jobs = _version(also), {}, []
     CACHE.mkdir(parents=True, exist_ok=True)
     for draw, arguments in wanted:
         key = draw.__name__, *arguments
@@ -163,10 +170,10 @@ def figures(wanted: Iterable[tuple[Callable[..., bytes], tuple[str, ...]]]) -> d
         else:
             jobs.append((key, path, draw))
     if jobs:
-        keep = {path.name for _, path, _ in jobs}
-        for old in CACHE.iterdir():
-            if not old.name.endswith(version) and old.name not in keep:
-                old.unlink()
+        for drawn in {key[0] for key, _, _ in jobs}:
+            for old in CACHE.glob(f"{drawn}-*"):
+                if not old.name.endswith(version):
+                    old.unlink()
         with ProcessPoolExecutor(os.cpu_count()) as pool:
             futures = [(key, path, pool.submit(_draw, path.name, draw, key[1:])) for key, path, draw in jobs]
             for key, path, future in futures:

@@ -1,6 +1,5 @@
 """What the site adds to docs/: README's first screen, the gallery, notebooks, pages of laws and plants, equations."""
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -13,38 +12,21 @@ HERE = "<!-- README's first screen -->"
 CATALOGUE = "catalogue.md"  # its tables name all plants and laws
 BOOST = {"questions.md": 2.0, "mathematics.md": 2.0, "run_study.md": 1.5, "api.md": 0.3}  # in search
 GROUP = "Catalogue"  # where the contents show their pages
-NOTEBOOKS = "notebooks.md"  # the page that lists the notebooks; the contents show them below it
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import catalogue  # noqa: E402
+import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
 PAGES: list[catalogue.Page] = []  # of this build
 
 
-def notebooks():
-    """Return path -> text of a page for each notebook, in the order of the page that lists them."""
-    listed = re.findall(r"\((notebooks/\w+)\.ipynb\)", (ROOT / "docs" / NOTEBOOKS).read_text(encoding="utf-8"))
-    pages = {}
-    for path in listed:
-        cells = json.loads((ROOT / "docs" / f"{path}.ipynb").read_text(encoding="utf-8"))["cells"]
-        parts = [_part(cell) for cell in cells]
-        parts[0] += f"\n\n[The notebook]({Path(path).name}.ipynb) to run and to change; [how](../{NOTEBOOKS})."
-        pages[f"{path}.md"] = "\n\n".join(parts)
-    return pages
-
-
-def _part(cell):
-    """Return a cell of a notebook as Markdown. Links to other notebooks lead to their pages."""
-    text = "".join(cell["source"])
-    return f"```python\n{text}\n```" if cell["cell_type"] == "code" else text.replace(".ipynb)", ".md)")
-
-
 def on_config(config):
     """Put the notebooks and the pages of laws and plants into the contents."""
     overview = next(entry["Overview"] for entry in config.nav if "Overview" in entry)
-    overview[overview.index(NOTEBOOKS)] = {"Notebooks": [NOTEBOOKS, *notebooks()]}
+    below = [f"notebooks/{name}.md" for name in notebooks.names()]
+    overview[overview.index(notebooks.LISTED)] = {"Notebooks": [notebooks.LISTED, *below]}
     place = next(entry[GROUP] for entry in config.nav if GROUP in entry)
     PAGES.clear()
     for section, groups in catalogue.pages().items():
@@ -63,8 +45,8 @@ def on_files(files, config):
         files.append(File.generated(config, f"{GALLERY}/{path.name}", abs_src_path=str(path)))
     for page in PAGES:
         files.append(File.generated(config, f"{page.path}.md", content=page.text))
-    for path, text in notebooks().items():
-        files.append(File.generated(config, path, content=text))
+    for path, content in notebooks.pages().items():
+        files.append(File.generated(config, path, content=content))
     for name in ("site.css", "iframe-worker.js"):
         files.append(File.generated(config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)))
     files.append(File.generated(config, "assets/stix-two-math.ttf", content=font()))
@@ -80,7 +62,7 @@ def on_page_markdown(markdown, page, config, files):
         page.meta["search"] = {"boost": boost}
     first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n<!-- end of the first screen -->")
     markdown = markdown.replace(HERE, first.replace("](docs/", "](")).replace(f"](../{GALLERY}/", f"]({GALLERY}/")
-    if page.file.src_uri == NOTEBOOKS:
+    if page.file.src_uri == notebooks.LISTED:
         markdown = markdown.replace(".ipynb)", ".md)")
     return linked(markdown) if page.file.src_uri == CATALOGUE else markdown
 

@@ -1,0 +1,55 @@
+"""Run the cells of a notebook in IPython, as a notebook's kernel does, and write what each shows as JSON.
+
+python kernel.py NOTEBOOK FILE [BEFORE [AFTER]]    # BEFORE and AFTER are code that runs first and last
+
+FILE gets a list for each cell: its outputs, MIME type -> content, pictures in base64. What is printed is text/plain.
+"""
+
+import base64
+import json
+import sys
+from pathlib import Path
+
+from IPython.core.interactiveshell import InteractiveShell
+from IPython.utils.capture import capture_output
+from traitlets.config import Config
+
+
+class ZMQInteractiveShell(InteractiveShell):
+    """IPython's shell under the name of a notebook's, by which progress bars and smc.show know one."""
+
+
+def main() -> None:
+    """Run the notebook in the current folder; end with status 1 at the first cell that fails."""
+    notebook, file, *more = sys.argv[1:]
+    cells = json.loads(Path(notebook).read_text("utf-8"))["cells"]
+    before, after = [*more, "", ""][:2]
+    config = Config(InteractiveShell={"ipython_dir": str(Path.cwd())}, HistoryManager={"enabled": False})
+    shell = ZMQInteractiveShell.instance(config=config)
+    _shown(shell, before)
+    shown = [_shown(shell, "".join(cell["source"])) for cell in cells if cell["cell_type"] == "code"]
+    _shown(shell, after)
+    Path(file).write_text(json.dumps(shown))
+
+
+def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:
+    """Run a cell and return its outputs, without those that are updated while it runs: progress bars."""
+    with shell.display_trap, capture_output() as caught:  # run_cell would set its own hook in place of the capture
+        done = shell.run_cell(code)
+    sys.stderr.write(caught.stderr)
+    if not done.success:
+        sys.exit(caught.stdout)
+    printed = [{"text/plain": caught.stdout}] if caught.stdout else []
+    return printed + [
+        {kind: _text(content) for kind, content in output.data.items()}
+        for output in caught.outputs
+        if not output.transient
+    ]
+
+
+def _text(content: str | bytes) -> str:
+    return base64.b64encode(content).decode() if isinstance(content, bytes) else content
+
+
+if __name__ == "__main__":
+    main()
