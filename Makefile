@@ -17,7 +17,7 @@ demo: setup ## the inverted pendulum under the paper's four laws: scores, traces
 
 test: ## all tests, a file of them at a time on each core
 	@./setup.sh requirements-test.lock
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 quick: ## the first case of each test that takes little: a minute, for every change
 	@./setup.sh requirements-test.lock

@@ -51,6 +51,27 @@ QUICK = {
     "testing/test_step_responses.py",
 }
 
+# Files that take longest: more than about 20 s of processor time. They come first, so that no core is left with one.
+LONG = {
+    "analysis/test_chattering.py",
+    "analysis/test_gains_for.py",
+    "analysis/tuning/test_search.py",
+    "cli/test_main.py",
+    "control/c/test_load.py",
+    "draw/film/test_film.py",
+    "draw/test_figure.py",
+    "simulation/test_lockstep.py",
+    "simulation/test_realistic.py",
+    "studies/audit/test_claims.py",
+    "studies/papers/test_shipped_papers.py",
+    "studies/report/test_report.py",
+    "studies/test_executors.py",
+    "test_fuzz.py",
+    "test_notebooks.py",
+    "test_packaging.py",
+    "test_readme.py",
+}
+
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Load the plugin, unless its entry point has: then, with its options, before they are read."""
@@ -73,13 +94,18 @@ def pytest_collection_finish() -> None:
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave out files that are not quick, where that is asked for."""
-    path = collection_path
-    left_out = path.suffix == ".py" and path.relative_to(ROOT / "tests").as_posix() not in QUICK
+    left_out = collection_path.suffix == ".py" and _name(collection_path) not in QUICK
     return True if config.getoption("quick") and left_out else None
 
 
+def _name(path: Path) -> str:
+    """Return the name of a file of tests as in the sets above."""
+    return path.as_posix().removeprefix(f"{ROOT.as_posix()}/tests/")
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the first case of each test, where that is asked for."""
+    """Put long files first. Keep the first case of each test, where that is asked for."""
+    items.sort(key=lambda item: _name(item.path) not in LONG)
     if config.getoption("quick"):
         first = set({item.nodeid.split("[")[0]: item for item in reversed(items)}.values())
         config.hook.pytest_deselected(items=[item for item in items if item not in first])

@@ -45,6 +45,5 @@ def test_runs_are_of_the_plants_and_laws_that_the_claim_names(name):
             assert one.scenario.law.name in laws, id
 
 
-@pytest.mark.parametrize("name", shipped())
-def test_mutants_of_its_law_lose_a_claim(name):
-    assert survivors(name, CHEAP.get(name)) == {}
+def test_mutants_of_its_law_lose_each_cheap_claim_of_the_first_paper():
+    assert survivors("gaber", CHEAP["gaber"]) == {}
