@@ -8,6 +8,7 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 from __future__ import annotations
 
 import math
+import weakref
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
+_CYCLES: weakref.WeakKeyDictionary[Trace, tuple[float, float]] = weakref.WeakKeyDictionary()
 
 
 def metrics() -> tuple[Metric, ...]:
@@ -49,7 +51,8 @@ def score(trace: Trace) -> dict[str, float]:
       ScenarioError: the run diverged, failed or holds NaN.
     """
     refuse(trace)
-    return {m.name: m.of(trace) for m in metrics() if not m.refusal(trace.scenario.plant)}
+    parts = conventions.parts(trace)
+    return {m.name: m.of(parts) for m in metrics() if not m.refusal(trace.scenario.plant)}
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
@@ -243,9 +246,14 @@ def chattering_frequency(trace: Trace) -> float:
 
 
 def _cycle(trace: Trace) -> tuple[float, float]:
-    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
-    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
-    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
+    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one.
+
+    The result is kept as long as the trace is, because two metrics ask for it.
+    """
+    if trace not in _CYCLES:
+        found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
+        _CYCLES[trace] = max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
+    return _CYCLES[trace]
 
 
 @metric("s", realistic=True)

@@ -31,7 +31,7 @@ import functools
 import inspect
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,11 +94,10 @@ class Metric:
         """Whether free joints count in its single value: it is computed from the motion, and does not have x's unit."""
         return not self.command and "{" not in self.unit
 
-    def of(self, trace: Trace) -> float:
-        """Return the single value of a trace that `refuse` and `refusal` accept: that of the worst group."""
-        plant = trace.scenario.plant
-        counted = [group for group in groups(plant) if self.fits(group) and (group.driven or self.shared)]
-        return max(float(self.formula(cut(trace, group))) for group in counted)
+    def of(self, parts: Mapping[Group, Trace]) -> float:
+        """Return the single value of a trace that `refuse` and `refusal` accept, from its `parts`: the worst group's."""
+        counted = [part for group, part in parts.items() if self.fits(group) and (group.driven or self.shared)]
+        return max(float(self.formula(part)) for part in counted)
 
     def fits(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
@@ -131,7 +130,7 @@ def metric(
             refuse(trace)
             if why := entry.refusal(trace.scenario.plant):
                 raise ScenarioError(why)
-            return entry.of(trace)
+            return entry.of(parts(trace))
 
         return checked
 

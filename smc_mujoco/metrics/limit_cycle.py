@@ -2,14 +2,19 @@
 
     amplitude, frequency = limit_cycle(t, s)      # half the range within a period, Hz; NaN, NaN where there is none
 
-The frequency is that of the largest peak in the spectrum of s', among those that have at least five periods in the
-samples, refined by its phase in the two halves. A drift and slow waves, such as those of a swinging load, do not count:
-the amplitude is the median, over all windows of one period, of half the range of s less its mean over a period.
+The frequency follows from the largest peak in the spectrum of s', among those that have at least five periods in the
+samples, refined by its phase in the two halves. If s jumps, that peak may be a higher harmonic, and is divided by its
+order. A drift and slow waves, such as those of a swinging load, do not count: the amplitude is the median, over all
+windows of one period, of half the range of s less its mean over a period.
 
-There is no limit cycle where s does not oscillate (rounding only), where the peak has less than a tenth of the
-spectrum (noise) or no more than leaks from slow waves, where it may be the third harmonic of a larger cycle with fewer
-than five periods, or where the oscillation grows or dies, so that its amplitude
-differs by more than half from the first to the second half of the samples.
+There is no limit cycle where
+
+- s does not oscillate, but for rounding;
+- the harmonics of the peak have less than a tenth of the spectrum, as in noise, or in the irregular steps of a coarse
+  encoder, or no more than leaks from slow waves;
+- the peak may be a harmonic of a larger cycle with fewer than five periods;
+- the oscillation grows or dies: its amplitude differs by more than half from the first to the second half of the
+  samples.
 """
 
 from __future__ import annotations
@@ -28,7 +33,9 @@ if TYPE_CHECKING:
 PERIODS = 5  # fewest in the samples
 LEAK = 2.5e-9  # of the spectrum's largest power: what the window leaks from slow waves
 ROUNDING = 1e-10  # of the largest |s|
-SHARE = 0.1  # of the spectrum's power, which a peak has at least
+SHARE = 0.1  # of the spectrum's power, which the cycle's harmonics have at least
+SAME = 0.1  # periods: how far a line lies from a fraction of another at most, to be the first harmonic of both
+LINE = 0.01  # of the largest peak's power: what the line of the first harmonic has at least
 STEADY = 0.5  # largest relative change of the amplitude from the first to the second half
 NONE = (math.nan, math.nan)
 
@@ -45,18 +52,15 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
         return NONE
     h = float(t[-1] - t[0]) / (len(t) - 1)
     spectrum = np.abs(np.fft.rfft((rates - rates.mean()) * _window(len(rates)))) ** 2
-    first, leaked = PERIODS, LEAK * float(spectrum.max())
+    first = PERIODS
     while first < len(spectrum) - 1 and spectrum[first - 1] > spectrum[first]:
         first += 1  # on the slope of slower waves
-    slow = float(spectrum[:first].max())
-    spectrum[:first] = 0.0
-    total, peak = float(spectrum.sum()), int(spectrum.argmax())
-    if peak < 3 * PERIODS and spectrum[peak] < slow:
-        return NONE  # it may be the third harmonic of a cycle with fewer periods
-    if spectrum[peak] <= leaked or spectrum[peak - 3 : peak + 4].sum() < SHARE * total:
+    peak = first + int(spectrum[first:].argmax())
+    if spectrum[peak] <= LEAK * float(spectrum.max()):
         return NONE
     periods = _refined(rates, peak)
-    if periods < PERIODS:
+    periods /= _order(rates, spectrum, first, peak, periods)
+    if periods < PERIODS or _share(spectrum, first, periods) < SHARE:
         return NONE
     frequency = periods / (h * len(rates))
     window = max(2, min(round(1.0 / (frequency * h)), len(s) // PERIODS))
@@ -66,6 +70,32 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     if max(early, late) <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > STEADY * max(early, late):
         return NONE
     return float(np.median(ranges)) / 2.0, frequency
+
+
+def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, periods: float) -> int:
+    """Return which harmonic of the cycle the largest peak of s' is: 1, or larger for a wave with jumps or pulses.
+
+    The first harmonic is the largest in s itself, and has a line of its own. Waves with fewer than five periods have no
+    lines that can be told apart: one of them counts if the peak may be its second or third harmonic.
+    """
+    of_s = spectrum[1:] / np.sin(0.5 * math.pi * np.arange(1, len(spectrum)) / (len(spectrum) - 1)) ** 2
+    sizes = np.convolve(np.r_[0.0, of_s], np.ones(5), "same")  # of lines, which the window spreads
+    order, largest = 1, sizes[peak]
+    for k in range(2, round(periods / PERIODS) + 1 if periods >= 3 * PERIODS else 4):
+        at = round(periods / k)
+        own = at >= first and abs(_refined(rates, at) - periods / k) < SAME and spectrum[at] > LINE * spectrum[peak]
+        if sizes[at] > largest and (own or at < PERIODS):
+            order, largest = k, sizes[at]
+    return order
+
+
+def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
+    """Return the share of a cycle's harmonics in a spectrum, over what they have in one without lines: 0 to 1."""
+    width = min(3, int(periods - 2) // 2)  # bins to each side of a line
+    bins = np.arange(len(spectrum))
+    lines = np.abs(bins - periods * np.maximum(np.round(bins / periods), 1.0)) <= width + 0.5
+    covered = lines[first:].mean()
+    return float((spectrum[first:][lines[first:]].sum() / spectrum[first:].sum() - covered) / (1.0 - covered))
 
 
 def _window(count: int) -> np.ndarray:

@@ -22,7 +22,7 @@ CYCLE = {"chattering_amplitude", "chattering_frequency"}
 SYNC = {"mean_settling_time", "spread_settling_time", "spread_bound"}
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
     """A trace's fields, without a simulator."""
 
@@ -682,6 +682,16 @@ def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan()
     assert m.chattering_amplitude(both) == pytest.approx(0.1, rel=0.05)
     assert m.chattering_frequency(both) == pytest.approx(5.1, rel=1e-3)
     assert math.isnan(m.chattering_amplitude(run(t, np.cos(t))))
+
+
+def test_scoring_looks_for_the_limit_cycle_of_a_channel_once(monkeypatch):
+    t, asked = np.arange(2001) / 100, []
+    cart = run(
+        t, np.zeros((len(t), 2)), s=np.column_stack([np.sin(60 * t), np.zeros(len(t))]), units=("m", "rad"), free=True
+    )
+    monkeypatch.setattr(limit_cycle, "of_trace", lambda trace, channel: asked.append(channel) or (0.1, 10.0))
+    assert m.score(cart)["chattering_frequency"] == 10.0
+    assert asked == [0]
 
 
 # Invariances

@@ -25,6 +25,42 @@ def test_a_wave_of_two_samples_is_found():
     assert limit_cycle(T, 0.2 * (-1.0) ** np.arange(len(T))) == pytest.approx((0.2, 500.0))
 
 
+SHAPES = {
+    "square": lambda angle: np.sign(np.sin(angle)),
+    "saw": lambda angle: angle / math.pi % 2.0 - 1.0,
+    "pulses": lambda angle: 2.0 * (angle % math.tau < 0.1 * math.tau) - 1.0,
+    "half pulses": lambda angle: np.sign(np.sin(angle)) * (angle % math.pi < 0.2 * math.pi),
+    "third harmonic": lambda angle: (np.sin(angle) + 0.5 * np.sin(3.0 * angle)) / 1.08,
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("frequency", [3.1, 7.25, 7.3, 19.37, 81.4])  # 7.25: between two bins
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_first_harmonic_counts_where_a_higher_one_is_larger_in_the_rate(shape, frequency, noise):
+    wave = SHAPES[shape](math.tau * frequency * T + 0.3)
+    amplitude, found = limit_cycle(T, wave + noise * np.random.default_rng(0).normal(size=len(T)))
+    assert found == pytest.approx(frequency, rel=1e-3)
+    assert amplitude == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_cycle_of_fourteen_periods_is_no_harmonic_of_slow_waves():
+    rng = np.random.default_rng(1)
+    wander = np.cumsum(rng.normal(size=len(T))) * 1e-3
+    assert limit_cycle(T, wave(7.1) + wander)[1] == pytest.approx(7.1, rel=5e-3)
+
+
+def test_a_slow_wave_is_no_first_harmonic_of_a_cycle_that_is_much_larger_in_the_rate():
+    assert limit_cycle(T, wave(80.0) + wave(4.0, 0.5))[1] == pytest.approx(80.0, rel=1e-3)
+
+
+def test_steps_of_an_encoder_at_random_times_are_no_limit_cycle():
+    rng, s = np.random.default_rng(2), np.zeros(len(T))
+    for at in rng.choice(len(T), 40, replace=False):
+        s[at:] += rng.choice([-1.0, 1.0]) * np.exp(-(T[at:] - T[at]) / 6e-3)
+    assert math.isnan(limit_cycle(T, s)[0])
+
+
 def test_slow_waves_and_drifts_do_not_count():
     triangle = 1e-3 * (2.0 / math.pi) * np.arcsin(np.sin(math.tau * 50.0 * T))
     amplitude, frequency = limit_cycle(T, triangle + 0.5 * np.sin(6.0 * T) + 0.2 * T)
