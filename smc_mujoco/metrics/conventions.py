@@ -95,7 +95,7 @@ class Metric:
         return not self.command and "{" not in self.unit
 
     def of(self, parts: Mapping[Group, Trace]) -> float:
-        """Return the single value of a trace that `refuse` and `refusal` accept, from its `parts`: the worst group's."""
+        """Return the single value, that of the worst group, for the `parts` of a trace that `refusal` accepts."""
         counted = [part for group, part in parts.items() if self.fits(group) and (group.driven or self.shared)]
         return max(float(self.formula(part)) for part in counted)
 
