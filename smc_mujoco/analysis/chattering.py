@@ -35,7 +35,7 @@ MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
 SAME = 0.02  # relative: two cycles nearer than that are one
 WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
 NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
-FEW = 10.0  # control samples in a period: below it, cycles lock to the samples, and the prediction is rough
+NEAR, SLOWER = 1e-4, 0.93  # relative: how close the slowest and fastest cycle are found, and steps on the way there
 DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in this many steps
 
 
@@ -52,7 +52,12 @@ class Chattering:
         force, per unit of mass.
       third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
         large the law does not see a sine, and the prediction is rough.
-      samples: control samples in a period. Below ten a cycle locks to the samples, and the prediction is rough.
+      samples: control samples in a period.
+      amplitude_range, frequency_range: the least and the most that amplitude and frequency may be, if the cycle keeps
+        its place among the samples, and with the higher harmonics that the law sees: see `Loop.phases`. What one count
+        of an encoder moves s by is added to the largest amplitude.
+      coupling: largest amplitude of another driven channel under this one's command, over amplitude_x; 0 for a single
+        channel. The prediction is for one channel alone: where this is not small, they oscillate together.
       gain: N, complex; response: L, complex, at the cycle.
       assumptions: what was left out or is doubtful, in sentences.
     """
@@ -64,12 +69,21 @@ class Chattering:
     power: float = math.nan
     third_harmonic: float = math.nan
     samples: float = math.nan
+    amplitude_range: tuple[float, float] = (math.nan, math.nan)
+    frequency_range: tuple[float, float] = (math.nan, math.nan)
+    coupling: float = math.nan
     gain: complex = complex(math.nan)
     response: complex = complex(math.nan)
     assumptions: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return not math.isnan(self.frequency)
+
+    @property
+    def uncertainty(self) -> float:
+        """How far the amplitude or the frequency may be off, relative to the predicted one: the larger of the two."""
+        pairs = ((self.amplitude_range, self.amplitude), (self.frequency_range, self.frequency))
+        return max(abs(end / value - 1.0) for ends, value in pairs for end in ends)
 
 
 def chattering(law: Scenario | Component | Template | str, channel: int = 0, **fields: object) -> Chattering:
@@ -94,14 +108,19 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
         raise ScenarioError("chattering lacks plant: give plant=...")
     else:
         scenario = Scenario(law=law, **fields)  # type: ignore[arg-type]
+    return predict(scenario, channel)
+
+
+def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
+    """Return what `chattering` returns for a scenario; without `ranges` in half the time, and these are NaN."""
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
     found = _stable(loop, cycles(loop))
-    said = tuple(_assumptions(scenario))
+    said = tuple(_assumptions(loop))
     if not found:
         return Chattering(assumptions=said)
-    return _described(loop, max(found, key=lambda wave: wave.omega), said)
+    return _described(loop, max(found, key=lambda wave: wave.omega), said, ranges)
 
 
 def cycles(loop: Loop) -> list[Wave]:
@@ -152,29 +171,69 @@ def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, 
     low, high = math.log(amplitudes[0]) - WIDER, math.log(amplitudes[1]) + WIDER
     first, last = np.log(omegas)
 
-    def size(z: float, omega: float, response: complex) -> float:
-        return math.log(abs(loop.gain(math.exp(z), omega) * response) + 1e-300)
-
-    def amplitude(omega: float) -> float:
-        """Return where |N L| = 1, or the end of the range that is nearer to it."""
-        response = loop.response(omega)
-        if size(low, omega, response) <= 0.0:
-            return math.exp(low)
-        if size(high, omega, response) >= 0.0:
-            return math.exp(high)
-        return math.exp(float(brentq(size, low, high, (omega, response), xtol=1e-9)))  # type: ignore[arg-type]
-
     def phase(w: float) -> float:
-        omega = math.exp(w)
-        return float(np.angle(loop.gain(amplitude(omega), omega) * loop.response(omega)))
+        return _on_curve(loop, math.exp(w), low, high)[1]
 
     fastest = math.log(NYQUIST * math.pi / loop.scenario.control_period)
     first, last = 2 * first - last, min(2 * last - first, fastest)
     if phase(first) * phase(last) > 0.0:
         return None  # found with few samples, and not confirmed with all
     omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
-    found = amplitude(omega)
+    found, _ = _on_curve(loop, omega, low, high)
     return (found, omega) if low < math.log(found) < high else None
+
+
+def _on_curve(loop: Loop, omega: float, low: float, high: float, close: float = 1e-9) -> tuple[float, float]:
+    """Return the amplitude where |N L| = 1, or the end of a range of its log that is nearer to it, and N L's phase."""
+    from scipy.optimize import brentq
+
+    response = loop.response(omega)
+
+    def size(z: float) -> float:
+        return math.log(abs(loop.gain(math.exp(z), omega) * response) + 1e-300)
+
+    if size(low) <= 0.0:
+        z = low
+    elif size(high) >= 0.0:
+        z = high
+    else:
+        z = float(brentq(size, low, high, xtol=close))  # type: ignore[arg-type]
+    return math.exp(z), float(np.angle(loop.gain(math.exp(z), omega) * response))
+
+
+def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
+    """Return the cycle for a law that is late (shift < 0, rad at the cycle's omega) or early.
+
+    It is sought along the curve |N L| = 1, towards slower waves for a law that is late. The search ends at the slowest
+    wave that counts, and at a wave of two samples.
+    """
+    from scipy.optimize import brentq
+
+    half = math.pi / loop.scenario.control_period
+    slowest, fastest, z = math.tau * MIN_FREQUENCY, NYQUIST * half, math.log(wave.amplitude)
+
+    def excess(omega: float) -> float:
+        nonlocal z
+        amplitude, phase = _on_curve(loop, omega, z - WIDER, z + WIDER, NEAR)
+        z = math.log(amplitude)
+        return phase + shift * omega / wave.omega
+
+    omega, before, step = wave.omega, shift, SLOWER if shift < 0.0 else 1.0 / SLOWER
+    if omega > fastest:  # two samples: these cannot be early
+        omega, before = fastest, excess(fastest) if shift < 0.0 else 0.0
+    if before * shift <= 0.0:
+        return wave
+    while slowest < omega * step < fastest:
+        after = excess(omega * step)
+        if before * after <= 0.0 and abs(before - after) < math.pi:
+            omega = float(brentq(excess, omega, omega * step, rtol=NEAR))  # type: ignore[arg-type]
+            excess(omega)
+            return loop.wave(math.exp(z), omega)
+        omega, before = omega * step, after
+    if step < 1.0:
+        return loop.wave(math.exp(z), omega)
+    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, AMPLITUDES)
+    return loop.wave(*min(_of_two_samples(loop, half, amplitudes), default=(math.exp(z), half)))
 
 
 def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[tuple[float, float]]:
@@ -226,20 +285,23 @@ def _decays(loop: Loop, wave: Wave) -> bool:
     return ((up - down) / (fast - slow)).imag < 0.0
 
 
-def _described(loop: Loop, wave: Wave, said: tuple[str, ...]) -> Chattering:
+def _described(loop: Loop, wave: Wave, said: tuple[str, ...], ranges: bool) -> Chattering:
     """Return the numbers of a limit cycle."""
     response = loop.response(wave.omega)
-    samples = math.tau / wave.omega / loop.scenario.control_period
-    passed = abs(loop.response(3.0 * wave.omega) / response)
-    said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
-    if samples < FEW:
-        said += (f"a period has {samples:.1f} control samples: the cycle locks to them",)
-    sensor = loop.scenario.sensor
-    count = 0.0 if sensor is None else sensor.quantum(loop.scenario.plant.units[loop.channel] == "rad")
-    if count:
-        said += (f"the encoder rounds x by up to {50.0 * count / wave.amplitude:.2g} % of the oscillation's amplitude",)
+    if not math.isnan(wave.third):
+        passed = abs(loop.response(3.0 * wave.omega) / response)
+        said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
+    coupling = loop.coupling(wave.omega)
+    if coupling:
+        said += (
+            f"other driven channels are at rest, though this one's command moves them {coupling:.2g} times as far",
+        )
     if wave.drift > 0.05:
         said += ("gains or memories of the law drift: the prediction is a snapshot",)
+    sizes, omegas = [math.nan], [math.nan]
+    if ranges:
+        waves = [wave, *(_shifted(loop, wave, phase) for phase in loop.phases(wave.amplitude, wave.omega))]
+        sizes, omegas = [one.s for one in waves], [one.omega for one in waves]
     return Chattering(
         amplitude=wave.s,
         amplitude_x=wave.amplitude,
@@ -247,24 +309,33 @@ def _described(loop: Loop, wave: Wave, said: tuple[str, ...]) -> Chattering:
         frequency=wave.omega / math.tau,
         power=wave.rate**2 / 2.0,
         third_harmonic=wave.third,
-        samples=samples,
+        samples=math.tau / wave.omega / loop.scenario.control_period,
+        amplitude_range=(min(sizes), max(sizes) + loop.count),
+        frequency_range=(min(omegas) / math.tau, max(omegas) / math.tau),
+        coupling=coupling,
         gain=wave.gain,
         response=response,
         assumptions=said,
     )
 
 
-def _assumptions(scenario: Scenario) -> Iterator[str]:
-    """Yield what is left out of the linear part."""
+def _assumptions(loop: Loop) -> Iterator[str]:
+    """Yield what is left out of the linear part, and what a run has beside it."""
+    scenario = loop.scenario
     yield "about rest at x = 0, without reference, disturbance and noise"
-    if scenario.plant.driven > 1:
-        yield "the other driven channels are at rest"
     if any(isinstance(part, RateLimit) for part in scenario.actuator):
         yield "the actuator's rate limit is not reached"
     if any(isinstance(part, Backlash) for part in scenario.actuator):
         yield "rotor and joint are free masses while the rotor crosses its play"
     if scenario.friction:
         yield "no dry friction"
+    if loop.count:
+        unit = f"{scenario.plant.units[loop.channel]}/s"
+        yield f"no rounding by the encoder: a count moves s by {loop.count:.2g} {unit}; smaller cycles drown in that"
+    resolved = scenario.resolved
+    if resolved.integrator != "RK4":
+        step, share = 1e3 * resolved.physics_step, 100.0 * resolved.physics_step / resolved.control_period
+        yield f"MuJoCo's steps of {step:g} ms advance by half a step, which takes {share:.3g} % off the hold's delay"
 
 
 def shared(cycles: Sequence[Chattering]) -> list[str]:
@@ -287,6 +358,7 @@ def save(
     rows = [
         {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains)}
         | {name: value for name, value in vars(cycle).items() if name not in ("gain", "response")}
+        | {"uncertainty": cycle.uncertainty}
         | {"gain": [cycle.gain.real, cycle.gain.imag], "response": [cycle.response.real, cycle.response.imag]}
         | {"measured_amplitude": amplitude, "measured_frequency": frequency}
         for one, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True)

@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from smc_mujoco.analysis import margins
-from smc_mujoco.analysis.chattering import Chattering, chattering
+from smc_mujoco.analysis.chattering import Chattering, chattering, predict
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
 from smc_mujoco.common.progress import bar
@@ -96,22 +96,25 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
             number(name, value, above=0.0)
     with bar(f"gains of {base.law.name} on {base.plant.name}") as drawn:
 
+        def scaled(size: float, speed: float) -> Scenario:
+            return dataclasses.replace(base, law=_scaled(base.law, size, speed))
+
         def cycle(size: float, speed: float) -> Chattering:
             drawn.advance(1.0)
-            return chattering(dataclasses.replace(base, law=_scaled(base.law, size, speed)), channel)
+            return predict(scaled(size, speed), channel, ranges=False)
 
         strength = _strength(base)
         speed = 1.0 if frequency is None else _speed(lambda w: cycle(1.0, w), amplitude, frequency, strength)
         size = 1.0
         if amplitude is not None:
             size = _largest(lambda q: cycle(q, speed).amplitude, amplitude, strength / speed**2)
-        found = cycle(size, speed)
+        chosen = scaled(size, speed)
+        found = chattering(chosen, channel)
         if frequency is not None and found.frequency > frequency:
             raise ScenarioError(
                 f"{base.law.name} of amplitude {amplitude:g} oscillates at {found.frequency:.3g} Hz, above the wanted "
                 f"{frequency:g}: give a larger frequency, or another amplitude"
             )
-        chosen = dataclasses.replace(base, law=_scaled(base.law, size, speed))
         (borne,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(borne.value):
         warnings.warn(

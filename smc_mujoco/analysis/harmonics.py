@@ -41,7 +41,9 @@ MAX_SAMPLES = 10**9  # of a period, for a describing function
 SAMPLES = 3  # of a drive, about: so many times the finest period's
 PERIODS = (12, 600)  # fewest and most of a drive
 FINEST = 1000  # samples of a period; a law that runs more often is run that often here
+RESTING = 1000  # samples before, and after, the reading of an encoder moves by one count
 HARMONICS = 9  # of u that are followed through the mechanism
+POSITIONS = 16  # of the samples in a period that are tried
 SETTLING = 0.4  # share of a drive that is left out, while memories settle
 FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
 T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
@@ -129,6 +131,11 @@ class Loop:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
         return complex(self._answer(omega)[self.rows[self.channel]])
 
+    def coupling(self, omega: float) -> float:
+        """Return the largest amplitude of another driven channel under this one's u, over that of its own x."""
+        answer = np.abs(self._answer(omega)[self.rows[: self.scenario.plant.driven]])
+        return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
+
     def _solve(self, omega: complex) -> np.ndarray:
         """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
 
@@ -146,10 +153,46 @@ class Loop:
         late = s.sensor.delay if s.sensor else 0.0
         return passed @ answers * np.exp(-1j * omega * late)
 
+    @functools.cached_property
+    def count(self) -> float:
+        """The largest |s| after the reading of x has moved by one count of the encoder at rest; 0 without one."""
+        s = self.scenario.resolved
+        count = 0.0 if s.sensor is None else s.sensor.quantum(s.plant.units[self.channel] == "rad")
+        if not count:
+            return 0.0
+        h, f = s.control_period, self.model[self.channel]
+        x = np.where(np.arange(2 * RESTING) < RESTING, 0.0, count)
+        y = np.zeros((len(x), len(FIELDS)))
+        y[:, T], y[:, DT], y[:, LIMIT] = h * np.arange(len(x)), h, self.scenario.limits[self.channel]
+        y[:, MODEL], y[:, X], y[:, E], y[:, F], y[:, G] = s.model == "nominal", x, x, f[0] + f[2] * x, f[1]
+        out = self.controller(np.column_stack([np.full(len(x), h), x, np.zeros(len(x))]), y, self.controller.memories())
+        return float(np.abs(out[:, 1]).max())
+
     def gain(self, amplitude: float, omega: float, finest: int = FINEST) -> complex:
         """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
         angles, u, _ = self._drive([amplitude], omega, finest)
         return self._over(_harmonic(u, angles), amplitude, omega)
+
+    def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
+        """Return how far the phase of `gain` may be off at least and at most, rad: least <= 0 <= most.
+
+        The first reason is the position of the samples. `gain` is a mean over all positions; a cycle of a whole number
+        of samples keeps one. A relay then switches up to half a control period earlier or later than in the mean. The
+        second reason are the higher harmonics of e, which follow from those of u and change its first harmonic.
+        """
+        h = max(self.scenario.control_period, math.tau / omega / FINEST)
+        locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))  # of an even number of samples, four or more
+        mean = self.gain(amplitude, 1.001 * locked)
+        shifts = []
+        for position in (np.arange(POSITIONS) + 0.5) / POSITIONS:
+            angles, u, _ = self._drive([amplitude], locked, FINEST, position)
+            shifts.append(float(np.angle(self._over(_harmonic(u, angles), amplitude, locked) / mean)))
+        angles, u, _ = self._drive([amplitude], omega, FINEST)
+        first, harmonics = _harmonic(u, angles), self._followed(amplitude, omega, u, angles)
+        angles, u, _ = self._drive(harmonics, omega, FINEST)
+        shift = float(np.angle(_harmonic(u, angles) / first)) if first else 0.0
+        scale = omega / locked
+        return scale * min(*shifts, 0.0) + min(shift, 0.0), scale * max(*shifts, 0.0) + max(shift, 0.0)
 
     def _over(self, first: complex, amplitude: float, omega: float) -> complex:
         """Return the gain that belongs to a first harmonic of u."""
@@ -172,37 +215,43 @@ class Loop:
         angles, u, _ = self._drive([amplitude], omega, FINEST)
         first, half = _harmonic(u, angles), len(u) // 2
         early, late = _harmonic(u[:half], angles[:half]), _harmonic(u[half:], angles[half:])
-        most = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
-        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, most + 1)]
-        # the phase of u's first harmonic is that which the balance gives it
-        turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
-        rest = [x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2)]
-        angles, u, s = self._drive([amplitude, *rest], omega, FINEST)
+        harmonics = self._followed(amplitude, omega, u, angles)
+        angles, u, s = self._drive(harmonics, omega, FINEST)
         at = _harmonic(s, angles)
         return Wave(
             amplitude=amplitude,
             omega=omega,
             gain=self._over(first, amplitude, omega),
-            third=abs(_harmonic(s, 3.0 * angles) / at) if at and most > 1 else math.nan,
+            third=abs(_harmonic(s, 3.0 * angles) / at) if at and len(harmonics) > 1 else math.nan,
             s=float(np.ptp(s)) / 2.0,
             u=float(np.ptp(u)) / 2.0,
             rate=omega * abs(at),
             drift=abs(late - early) / (abs(first) or 1.0),
         )
 
+    def _followed(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
+        """Return the harmonics of e = amplitude sin(omega t) and of the mechanism's answer to those of u."""
+        first = _harmonic(u, angles)
+        most = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
+        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, most + 1)]
+        # the phase of u's first harmonic is that which the balance gives it
+        turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
+        return [amplitude, *(x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2))]
+
     def _drive(
-        self, amplitudes: Sequence[complex], omega: float, finest: int
+        self, amplitudes: Sequence[complex], omega: float, finest: int, position: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
 
         The error is the sum of Re(amplitude_n exp(j n omega t)): it starts at its largest, so that integrals of odd
-        functions of it have no mean. `finest` is the largest number of samples of a period.
+        functions of it have no mean. `finest` is the largest number of samples of a period, and `position` the time of
+        the first sample, in control periods.
         """
         s, turn = self.scenario.resolved, math.tau / omega
         h = max(s.control_period, turn / finest)
         periods = min(max(math.ceil(SAMPLES * finest * h / turn), PERIODS[0]), PERIODS[1])
         count = math.ceil(periods * turn / h)
-        y, turns = np.zeros((count, len(FIELDS))), np.exp(1j * omega * h * np.arange(count))
+        y, turns = np.zeros((count, len(FIELDS))), np.exp(1j * omega * h * (np.arange(count) + position))
 
         def along(i: int) -> tuple[np.ndarray, np.ndarray]:
             """Return position and velocity of a channel. MuJoCo's velocity is not exactly the rate of its position."""
@@ -226,7 +275,7 @@ class Loop:
             y[:, Q], y[:, DQ], y[:, FQ], y[:, GQ] = q, dq, f + fx * q + fv * dq, g
         out = self.controller(np.column_stack([np.full(count, h), x, v]), y, self.controller.memories())
         first, limit = int(SETTLING * count), y[0, LIMIT]
-        return omega * y[first:, T], np.clip(out[first:, 0], -limit, limit), out[first:, 1]
+        return omega * (y[first:, T] + h * position), np.clip(out[first:, 0], -limit, limit), out[first:, 1]
 
 
 class Controller:

@@ -375,17 +375,21 @@ def chattering(
 ) -> Table:
     """Return predicted and measured limit cycles, a line for each scenario."""
     plant = scenarios[0].plant
-    heads = (f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "third", "samples")
+    last = "coupling" if plant.driven > 1 else "third"
+    heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
     numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
-
     for scenario, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True):
-        third = "" if math.isnan(cycle.third_harmonic) else f"{100 * cycle.third_harmonic:.0f} %"
-        samples = "" if math.isnan(cycle.samples) else number(cycle.samples, 3)
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
         both = map(number, (cycle.amplitude, amplitude, cycle.frequency, frequency))
-        table.add_row(law, *both, third, samples)
+        share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
+        table.add_row(law, *both, _share(cycle.uncertainty), _share(share))
     return table
+
+
+def _share(share: float) -> str:
+    """Return a share in percent; "" for NaN."""
+    return "" if math.isnan(share) else f"{100 * share:.0f} %" if share <= 1.0 else "> 100 %"
 
 
 def designs(designs: Sequence[Design], unit: str) -> Table:

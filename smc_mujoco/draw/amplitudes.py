@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
@@ -81,7 +81,7 @@ def amplitudes(
         for (label, of), colour in zip(runs.items(), colours, strict=True):
             of.sort(key=lambda trace: lag(trace.scenario))
             lags = [1e3 * lag(trace.scenario) for trace in of]
-            predicted[label] = lags, [chattering(trace.scenario).amplitude for trace in of]
+            predicted[label] = lags, [predict(trace.scenario, ranges=False).amplitude for trace in of]
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
             measured = [of_trace(trace)[0] for trace in of]
             ax.plot(lags, measured, "o", color=colour, ms=style.points(7.0), mec=style.PAPER)

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from smc_mujoco.analysis.chattering import Chattering, chattering
+from smc_mujoco.analysis.chattering import Chattering, predict
 from smc_mujoco.analysis.harmonics import Loop
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
@@ -61,7 +61,7 @@ def nyquist(
         raise ScenarioError("no scenario to draw: give at least one")
     paths = [] if path is None else pages.files(path, format)
     if cycles is None:
-        cycles = [chattering(scenario, channel) for scenario in scenarios]
+        cycles = [predict(scenario, channel, ranges=False) for scenario in scenarios]
     runs = [run(scenario) for scenario in scenarios] if traces is None else traces
     width, height = pages.measure(size, fig)
     with style.page(width):

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
@@ -131,7 +131,7 @@ class Objective:
         """Return what predicted chattering above the bound costs, s^2, in proportion to it; 0 below it."""
         if self.chattering is None:
             return 0.0
-        amplitude = chattering(case).amplitude
+        amplitude = predict(case, ranges=False).amplitude
         return 2.0 * FAILED * len(self.conditions) * amplitude / self.chattering if amplitude > self.chattering else 0.0
 
 

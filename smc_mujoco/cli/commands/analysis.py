@@ -238,9 +238,11 @@ def chatter(
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
     With a law that switches and an actuator that lags, the loop oscillates without end. The frequency and the amplitude
-    follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "third" is the share
-    of the third harmonic in s, and "samples" the number of control samples in a period. Where third is above 20 %, or
-    samples below 10, the prediction is rough.
+    follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "±" is how far
+    amplitude or frequency may be off, because the cycle may keep its place among the control samples, which shifts the
+    instant at which the law switches, and because of the harmonics in s; "third" is the share of the third. If there
+    are several driven channels, "coupling" is how far another one moves under this one's command, relative to its own
+    motion: where that is not small, they oscillate together, and the prediction, for one channel alone, fails.
 
     With --amplitude or --frequency the gains of each law are made larger or smaller, in proportion, until the
     prediction is what was asked for, and the constant disturbance that they bear is measured.

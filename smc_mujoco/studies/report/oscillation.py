@@ -25,7 +25,7 @@ class Oscillation:
     Attributes:
       amplitude, frequency: predicted, in the unit of s and in Hz.
       measured_amplitude, measured_frequency: of a run.
-      third_harmonic, samples: what the prediction stands on, see `Chattering`.
+      third_harmonic, uncertainty: how good the prediction is, see `Chattering`.
     """
 
     plant: str
@@ -35,7 +35,7 @@ class Oscillation:
     measured_amplitude: float
     measured_frequency: float
     third_harmonic: float
-    samples: float
+    uncertainty: float
 
     @property
     def error(self) -> float:
@@ -78,7 +78,7 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
                 measured_amplitude=amplitude,
                 measured_frequency=frequency,
                 third_harmonic=cycle.third_harmonic,
-                samples=cycle.samples,
+                uncertainty=cycle.uncertainty,
             )
         )
     return found
