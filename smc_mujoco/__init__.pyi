@@ -9,6 +9,7 @@ from smc_mujoco.analysis.region_of_attraction import basin as basin
 from smc_mujoco.analysis.tuning.result import Tuned as Tuned
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.cli.main import play as play
+from smc_mujoco.common.catalogue import PackageWarning as PackageWarning
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.common.errors import ScenarioWarning as ScenarioWarning
 from smc_mujoco.common.gl import choose_gl as choose_gl

@@ -76,7 +76,9 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
         i.filename: i.CRC for i in zipfile.ZipFile(wheel).infolist()
     }
     held = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
-    assert shipped("smc_mujoco", "models", "scenes", "tests", "benchmarks", "docs", "videos/gallery") <= held
+    assert (
+        shipped("smc_mujoco", "models", "scenes", "tests", "benchmarks", "docs", "examples", "videos/gallery") <= held
+    )
     pages = ("tests/test_readme.py", "-k", "relative_link or targets or command_lines", "-p", "no:cacheprovider")
     done = run(sys.executable, "-m", "pytest", *pages, cwd=source, PYTHONPATH=str(source))
     assert done.returncode == 0, done.stdout

@@ -13,7 +13,7 @@ from rich.padding import Padding
 from rich.table import Column
 from rich.text import Text
 
-from smc_mujoco.cli.tables import plain, titled
+from smc_mujoco.cli.tables import plain, titled, with_package
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -48,12 +48,12 @@ class Entry(NamedTuple):
     source: str
 
 
-def catalogue() -> dict[str, list[Template]]:
-    """Return name -> the law, the surface and the velocity estimator of that name."""
-    by_name: dict[str, list[Template]] = {}
+def catalogue() -> dict[str, list[tuple[Template, str]]]:
+    """Return name -> the law, the surface and the velocity estimator of that name, each with its package."""
+    by_name: dict[str, list[tuple[Template, str]]] = {}
     for templates in CATALOGUES.values():
         for name, template in templates().items():
-            by_name.setdefault(name, []).append(template)
+            by_name.setdefault(name, []).append((template, templates().package(name)))
     return by_name
 
 
@@ -95,8 +95,8 @@ def print_pages(name: str | None, console: Console) -> None:
       ScenarioError: nothing has that name.
     """
     if name is not None:
-        for template in find("law, surface or velocity estimator", name, catalogue()):
-            print_page(template, console)
+        for template, package in find("law, surface or velocity estimator", name, catalogue()):
+            print_page(template, console, package)
         return
     for heading, templates in CATALOGUES.items():
         known, degree = templates(), [Column("deg", justify="right", style="dim")] * (heading == "Laws")
@@ -110,7 +110,8 @@ def print_pages(name: str | None, console: Console) -> None:
         for _, template in sorted(known.items()):
             parts = entry(template)
             degrees = [str(template.relative_degree)] * len(degree)
-            table.add_row(template.name, *degrees, Text(parts.formula), Text(brief(parts.source)))
+            formula = with_package(parts.formula, known.package(template.name))
+            table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
         console.print(table, "")
     filters = "[cyan]smc-mujoco laws --needs continuous,two-gains[/]"
     console.print(f"One in full: [cyan]smc-mujoco laws NAME[/]; those that suit: {filters}", highlight=False)
@@ -143,8 +144,8 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
     console.print(key, style="dim", highlight=False)
 
 
-def print_page(template: Template, console: Console) -> None:
-    """Print everything about one law, surface or estimator."""
+def print_page(template: Template, console: Console, package: str = "") -> None:
+    """Print everything about one law, surface or estimator, and the package that it is from if that is another one."""
     parts, is_law = entry(template), template.kind == "law"
     console.print(Text.assemble((template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")))
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
@@ -160,6 +161,7 @@ def print_page(template: Template, console: Console) -> None:
         "discretisation": parts.discretisation,
         "known": parts.known,
         "source": parts.source,
+        "package": package,
         "use": CALLS[template.kind].format(call),
     }
     table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))

@@ -207,6 +207,11 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
+def with_package(line: str, package: str) -> str:
+    """Return the line about an entry, with the name of the package that it is from if that is another one."""
+    return f"{line} [{package}]" if package else line
+
+
 # leaderboards
 
 

@@ -1,11 +1,12 @@
-"""Finding the modules of a catalogue, such as the laws: one file, one entry."""
+"""Finding the entries of a catalogue, such as the laws: one file of this package, one entry; and entry points."""
 
 import importlib
-import operator
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import TypeVar
+
+from smc_mujoco.common.catalogue import NAME, Catalogue, added, imported
 
 T = TypeVar("T")
 
@@ -19,8 +20,18 @@ def modules(package: str) -> Iterator[ModuleType]:
 def discover(package: str, kind: type[T]) -> dict[str, T]:
     """Return every object of a kind at the top level of a package's modules, by its name, in alphabetical order."""
     values = [value for module in modules(package) for value in vars(module).values() if isinstance(value, kind)]
-    name = operator.attrgetter("name")
-    return {name(value): value for value in sorted(values, key=name)}
+    return {NAME(value): value for value in sorted(values, key=NAME)}
+
+
+def catalogue_of(
+    package: str, kind: type[T], group: str, fits: Callable[[T], bool] = lambda value: True
+) -> Catalogue[T]:
+    """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points.
+
+    Args:
+      fits: what else must hold for an object of another package.
+    """
+    return Catalogue(discover(package, kind), added(group, imported(kind, fits)))
 
 
 def subclasses(base: type[T]) -> list[type[T]]:

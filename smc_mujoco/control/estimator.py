@@ -4,8 +4,9 @@ import functools
 from collections.abc import Callable
 from typing import NamedTuple, Unpack, overload
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import find
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.component import Component, Options, Template, decorated
 
 Estimator = Component
@@ -34,9 +35,11 @@ def estimator_function(
 
 
 @functools.cache
-def catalogue() -> dict[str, Template]:
-    """Return every estimator of smc_mujoco.control.estimators, by name."""
-    return discover("smc_mujoco.control.estimators", Template)
+def catalogue() -> Catalogue[Template]:
+    """Return every estimator of smc_mujoco.control.estimators and of other packages, by name."""
+    return catalogue_of(
+        "smc_mujoco.control.estimators", Template, "smc_mujoco.estimators", lambda one: one.kind == "estimator"
+    )
 
 
 def estimator(name: str, **gains: float) -> Estimator:

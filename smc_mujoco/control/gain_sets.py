@@ -15,7 +15,8 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
@@ -150,9 +151,22 @@ def paper_plant(plant: object) -> str:
 
 
 def file(plant: str, name: str, objective: str, seed: int = 0) -> Path:
-    """Return the file with the tuning of a law on a plant for an objective from a seed."""
+    """Return the file with the tuning of a law on a plant for an objective from a seed.
+
+    It is in the folder tuned_gains/OBJECTIVE beside this file, or beside the code of another package's law or plant.
+    """
     ending = f"-{seed}" if seed else ""
-    return Path(__file__).parent / "tuned_gains" / objective / f"{plant}-{name}{ending}.json"
+    part = Path("tuned_gains") / objective / f"{plant}-{name}{ending}.json"
+    files = [home / part for home in (Path(__file__).parent, *_homes(plant, name))]
+    return next((file for file in files if file.is_file()), files[0])
+
+
+def _homes(plant: str, name: str) -> Iterator[Path]:
+    """Yield the folders with the code of a law and of a plant that are other packages'."""
+    if catalogue().package(name) and (law := catalogue().get(name)):
+        yield Path(inspect.getfile(law.function)).parent
+    if plants_known().package(plant) and (made := plants_known().get(plant)):
+        yield Path(inspect.getfile(made.build)).parent
 
 
 def _tuned(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:

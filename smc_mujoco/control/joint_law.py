@@ -23,8 +23,9 @@ import numpy as np
 from numba import carray, njit
 from numba.extending import overload
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.jit import call, pointer
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.component import Template
 
 
@@ -162,9 +163,11 @@ def norm(a):
 
 
 @functools.cache
-def catalogue() -> dict[str, Template]:
-    """Return every law of smc_mujoco.control.joint_laws, by name."""
-    return discover("smc_mujoco.control.joint_laws", Template)
+def catalogue() -> Catalogue[Template]:
+    """Return every law of smc_mujoco.control.joint_laws and of other packages, by name."""
+    return catalogue_of(
+        "smc_mujoco.control.joint_laws", Template, "smc_mujoco.joint_laws", lambda law: law.kind == "law" and law.joint
+    )
 
 
 def joint_laws() -> list[str]:

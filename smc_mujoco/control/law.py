@@ -22,8 +22,9 @@ from numba import njit, types
 from numba.extending import overload_attribute
 
 from smc_mujoco.common import jit
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, LawOptions, Template, decorated, renamed
 from smc_mujoco.mechanisms.plant import Plant, as_plant
@@ -163,25 +164,34 @@ def law_function(
 
 
 @functools.cache
-def catalogue() -> dict[str, Template]:
-    """Return every law of smc_mujoco.control.laws, by name."""
-    return discover("smc_mujoco.control.laws", Template)
+def catalogue() -> Catalogue[Template]:
+    """Return every law of smc_mujoco.control.laws and of other packages, by name."""
+    return catalogue_of(
+        "smc_mujoco.control.laws", Template, "smc_mujoco.laws", lambda law: law.kind == "law" and not law.joint
+    )
 
 
-def known_laws() -> dict[str, Template]:
-    """Return every law of the library, of one channel and of many joints, by name."""
+@functools.cache
+def known_laws() -> Catalogue[Template]:
+    """Return every law of one channel and of many joints, by name."""
     return catalogue() | joint_law.catalogue()
 
 
 def checked_name(law: Law) -> Law:
-    """Return the law. Raise ScenarioError if it is a user's with the name of a library law."""
+    """Return the law. Raise ScenarioError if it is a user's with the name of a law of the catalogue."""
     known = known_laws().get(law.name) if law.kind == "law" else None
-    if known is None or law.function in (None, known.function):
+    if known is None or law.function in (None, known.function) or _place(law.function) == _place(known.function):
         return law
+    package = known_laws().package(law.name)
     raise ScenarioError(
-        f"your law {law.name!r} has the name of a law of the library: rename its function, or give "
-        f"law.named('my_{law.name}')"
+        f"your law {law.name!r} has the name of a law of {f'package {package!r}' if package else 'the library'}: "
+        f"rename its function, or give law.named('my_{law.name}')"
     )
+
+
+def _place(function: object) -> tuple[object, object]:
+    """Return the module and the name of a function, which stay when a module is loaded again."""
+    return getattr(function, "__module__", None), getattr(function, "__qualname__", function)
 
 
 def law(name: str, **gains: float | Sequence[float]) -> Law:

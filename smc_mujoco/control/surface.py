@@ -8,8 +8,9 @@ import functools
 from collections.abc import Callable
 from typing import Unpack, overload
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import find
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.component import Component, SurfaceOptions, Template, decorated
 
 Surface = Component
@@ -30,9 +31,11 @@ def surface_function(
 
 
 @functools.cache
-def catalogue() -> dict[str, Template]:
-    """Return every surface of smc_mujoco.control.surfaces, by name."""
-    return discover("smc_mujoco.control.surfaces", Template)
+def catalogue() -> Catalogue[Template]:
+    """Return every surface of smc_mujoco.control.surfaces and of other packages, by name."""
+    return catalogue_of(
+        "smc_mujoco.control.surfaces", Template, "smc_mujoco.surfaces", lambda one: one.kind == "surface"
+    )
 
 
 def surface(name: str, **gains: float) -> Surface:

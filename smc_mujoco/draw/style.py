@@ -125,7 +125,7 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 
 def _free(used: set[str]) -> str:
     """Return the colour farthest from all in the picture: one of the laws', or of a grid if none is far enough."""
-    stated = [template.colour for template in catalogue().values() if template.colour]
+    stated = [template.colour for template in catalogue().own.values() if template.colour]
     drawn = [*used, PAPER, DISTURBANCE, REACTION, FAILED]
     for colours in (OTHERS, stated):
         best, apart = _farthest(colours, drawn)
@@ -182,7 +182,7 @@ def law_name(law: Component | str) -> str:
 
 def label(name: str) -> str:
     """Return the label of the library's law, surface or estimator of this name; other words unchanged."""
-    known = {**surfaces.catalogue(), **estimators.catalogue()}
+    known = surfaces.catalogue() | estimators.catalogue()
     return law_name(name) if name in known_laws() else in_words(name) if name in known else name
 
 

@@ -39,8 +39,11 @@ def register() -> None:
 
 
 def plants() -> list[str]:
-    """Return the names of the plants without importing one."""
-    return [module.name for module in pkgutil.iter_modules([str(Path(__file__).parents[1] / "mechanisms" / "plants")])]
+    """Return the names of the plants, other packages' included, without importing one."""
+    from smc_mujoco.common.catalogue import points
+
+    own = [module.name for module in pkgutil.iter_modules([str(Path(__file__).parents[1] / "mechanisms" / "plants")])]
+    return list(dict.fromkeys([*own, *(point.name for point in points("smc_mujoco.plants"))]))
 
 
 def camel(name: str) -> str:

@@ -17,11 +17,12 @@ from typing import Any, NamedTuple, Protocol
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, shown, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 
 DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
@@ -207,6 +208,11 @@ class Plant:
         return hasattr(self.build, "argument")
 
     @property
+    def on_stage(self) -> bool:
+        """Whether its MJCF is built on models/common/theme.xml: films put such machines on one floor, in one light."""
+        return not self.own and _on_stage(self.build, self.n)
+
+    @property
     def argument(self) -> str:
         """Its name on the command line; for a user's model FILE.xml:joint+joint."""
         return getattr(self.build, "argument", self.name)
@@ -251,6 +257,13 @@ class Plant:
         return Values(**values)
 
 
+@functools.cache
+def _on_stage(build: Callable[[int], mujoco.MjSpec], n: int) -> bool:
+    """Return whether a mechanism has the floor and the accent of the theme, and a body `machine` with all else."""
+    spec = build(n)
+    return None not in (spec.body("machine"), spec.geom("floor"), spec.material("floor"), spec.material("accent"))
+
+
 def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
@@ -278,9 +291,9 @@ def model_path(name: str) -> Path:
 
 
 @functools.cache
-def catalogue() -> dict[str, Plant]:
-    """Return every plant found in smc_mujoco.mechanisms.plants, by name."""
-    return discover("smc_mujoco.mechanisms.plants", Plant)
+def catalogue() -> Catalogue[Plant]:
+    """Return every plant of smc_mujoco.mechanisms.plants and of other packages, by name."""
+    return catalogue_of("smc_mujoco.mechanisms.plants", Plant, "smc_mujoco.plants")
 
 
 def plant(name: str, **parameters: float) -> Plant:

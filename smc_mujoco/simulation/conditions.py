@@ -232,7 +232,7 @@ def _value(node: ast.expr) -> Any:
 def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
     name = ast.unparse(node.func).removeprefix("smc.")
-    kind = find("part, signal or estimator", name, _kinds() | estimators())
+    kind = find("part, signal or estimator", name, estimators() | _kinds())
     values, named = map(_value, node.args), _keywords(node)
     try:
         return kind(*values, **named)

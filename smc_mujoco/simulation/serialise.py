@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import present_place, subclasses
@@ -123,11 +124,9 @@ def _restore_law(data: dict) -> Component:
     return _find(data, "law", known_laws() | CONTROLLERS | _laws_elsewhere(data["module"]))
 
 
-def _find(data: dict, kind: str, known: dict[str, Template]) -> Component:
-    home = present_place(data["module"])
-    named = (
-        [known[data["name"]]] if data["name"] in known else known.values()
-    )  # one of the library may have been renamed
+def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
+    home, template = present_place(data["module"]), known.get(data["name"])
+    named = known.own.values() if template is None else [template]  # one of the library may have been renamed
     there = (one for one in named if one.function.__module__ == home and {*data["gains"]} <= {*one.gains})
     if template := next(there, None):
         bound = template.bind(data["gains"])

@@ -9,6 +9,7 @@ from typing import Any
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
+from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.conditions import NAMED
@@ -97,12 +98,14 @@ def _codes(s: Scenario) -> list[str]:
     signals = [type(signal) for signal in known if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
     own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
+    mjcf: list[str] = []
     if not s.plant.build.__module__.startswith(PACKAGE):
         builds = *s.plant.contacts.items(), *s.plant.mechanisms.items()
         own += [s.plant.build, s.plant.fields, s.plant.nominal, builds]
+        mjcf = [digest_of(s.plant.spec())]  # which its build may read from a file
     elif not s.plant.nominal.__module__.startswith(PACKAGE):
         own.append(s.plant.nominal)
-    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)]
+    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)] + mjcf
 
 
 def _compared(data: dict[str, Any]) -> str:

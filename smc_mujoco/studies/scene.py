@@ -7,15 +7,18 @@ A scene file has a docstring - the question, the figure of the paper it answers,
 
 import ast
 import dataclasses
+import functools
 import hashlib
 import re
 import runpy
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.catalogue import Catalogue, added, source
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped
@@ -125,13 +128,22 @@ class Scene:
                 yield condition, label, scenario
 
 
-def scenes() -> dict[str, Path]:
-    """Return name -> file of every scene that comes with the package."""
-    return {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
+@functools.cache
+def scenes() -> Catalogue[Path]:
+    """Return name -> file of every scene that comes with the package, or with another one."""
+    own = {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
+    return Catalogue(own, added("smc_mujoco.scenes", _of_package))
+
+
+def _of_package(point: EntryPoint) -> Path:
+    """Return the scene file that an entry point of another package names. The file is read, and not run."""
+    path = Path(str(source(point).origin))
+    ast.parse(path.read_text(encoding="utf-8"))
+    return path
 
 
 def find(name: str) -> Path:
-    """Return the scene file at a path, or the one of that name that comes with the package."""
+    """Return the scene file at a path, or the one of that name that comes with a package."""
     if Path(name).is_file():
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
@@ -157,7 +169,7 @@ def read(path: Path) -> Scene:
 
 def question(path: Path) -> str:
     """Return the first line of a scene file's docstring."""
-    return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0]
+    return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
 
 
 def _execute(path: Path) -> dict:

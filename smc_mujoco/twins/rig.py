@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import discover
+from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
@@ -398,9 +399,9 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
 
 
 @functools.cache
-def catalogue() -> dict[str, Rig]:
-    """Return every rig of smc_mujoco.twins.rigs, by name."""
-    return discover("smc_mujoco.twins.rigs", Rig)
+def catalogue() -> Catalogue[Rig]:
+    """Return every rig of smc_mujoco.twins.rigs and of other packages, by name."""
+    return catalogue_of("smc_mujoco.twins.rigs", Rig, "smc_mujoco.rigs")
 
 
 def rig(name: str, **values: float) -> Rig:

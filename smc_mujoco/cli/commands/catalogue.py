@@ -1,7 +1,8 @@
 """smc-mujoco list, laws: what there is to choose from."""
 
-import sys
-from typing import Annotated
+import inspect
+from collections.abc import Callable
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -9,12 +10,18 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
+T = TypeVar("T")
+
 
 @errors_as_sentences()
 def list_() -> None:
-    """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study."""
+    """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study.
+
+    What another installed package adds has the name of that package behind it, in brackets.
+    """
     with held_back():
         from smc_mujoco.cli import law_pages, tables
+        from smc_mujoco.common.catalogue import Catalogue
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.studies import scene
         from smc_mujoco.studies.papers.gaber import scenarios
@@ -22,10 +29,14 @@ def list_() -> None:
     def first_line(doc: str | None) -> str:
         return (doc or "").strip().partition("\n")[0].rstrip(":")  # a formula may follow
 
-    lists = {"Plants": [(name, first_line(sys.modules[p.build.__module__].__doc__)) for name, p in plants().items()]}
+    def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
+        lines = {name: first_line(doc(entry)) for name, entry in known.items()}
+        return [(name, tables.with_package(line, known.package(name))) for name, line in lines.items()]
+
+    lists = {"Plants": listed(plants(), lambda plant: getattr(inspect.getmodule(plant.build), "__doc__", ""))}
     for title, templates in law_pages.CATALOGUES.items():
-        lists[title] = [(name, first_line(template.doc)) for name, template in templates().items()]
-    lists["Scenes, for smc-mujoco run"] = [(name, scene.question(path)) for name, path in scene.scenes().items()]
+        lists[title] = listed(templates(), lambda template: template.doc)
+    lists["Scenes, for smc-mujoco run"] = listed(scene.scenes(), scene.question)
     lists["Conditions, for smc.paper.comparison(plant, condition)"] = [("", ", ".join(scenarios.CONDITIONS))]
     terminal = Terminal()
     for title, rows in lists.items():

@@ -364,7 +364,8 @@ def papers(
         terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
     if new or check:
         return
-    rows = [(name, f"{one.authors}: {one.title} ({len(one.claims)} claims)") for name, one in paper.papers().items()]
+    lines = {name: f"{one.authors}: {one.title} ({len(one.claims)} claims)" for name, one in paper.papers().items()}
+    rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
     terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
 
 
@@ -378,6 +379,10 @@ def report(
     records: Annotated[
         Path | None,
         typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
+    ] = None,
+    laws: Annotated[
+        str | None,
+        typer.Option(help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants."),
     ] = None,
     paper: Annotated[
         str | None,
@@ -404,10 +409,10 @@ def report(
         from smc_mujoco.studies.report import paper as of_paper
         from smc_mujoco.studies.report import report as make
 
-    if paper and (seeds or records):
-        raise ScenarioError("--seeds and --records are of the study: leave them out with --paper")
+    if paper and (seeds or records or laws):
+        raise ScenarioError("--seeds, --laws and --records are of the study: leave them out with --paper")
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:
-        path = make(out, quick, seeds, threads, progress=True, records=records)
+        path = make(out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws))
     print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -63,13 +63,13 @@ def mounts(
     scenario: Scenario, joints: Sequence[int], slides: Sequence[bool], rail: float, front: np.ndarray
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
-    plant = scenario.plant
-    extent = float(assembly.model([scenario]).stat.extent) if plant.direct else 0.0
+    plant, own = scenario.plant, not scenario.plant.on_stage
+    extent = float(assembly.model([scenario]).stat.extent) if own else 0.0
     length, thick = (
-        (OWN_LENGTH * extent, OWN_THICKNESS * extent) if plant.direct else (SLIDE * rail, min(THICKNESS, SHORT * rail))
+        (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
     )
-    turning = NETWORK if plant.n > 1 and not plant.direct else 1.0
-    before = front if plant.direct or plant.free else None
+    turning = NETWORK if plant.n > 1 and not own else 1.0
+    before = front if own or plant.free else None
     return [Mount(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
 
 

@@ -59,7 +59,7 @@ class Puppet:
             if model.body_parentid[body] in moved:
                 moved.add(body)
         self.links = sorted(moved)
-        own = self.scenario.plant.own
+        own = not self.scenario.plant.on_stage
         self.whole = not own or len(self._joints) + len(self._rotors) == model.nq
         self._start = assembly.start(model, self.scenario)[0] if own else model.qpos0
 
@@ -111,7 +111,7 @@ class Puppet:
             return near.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
         size = (high - low).max()
-        if self.scenario.plant.own:
+        if not self.scenario.plant.on_stage:
             close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED * size
             close &= ((near < high + MAX_FIXED * size) & (near > low - MAX_FIXED * size)).all(axis=(1, 2))
             near, still = near[close], still[close]
@@ -134,6 +134,6 @@ def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.nd
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)
     found = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
-    if scenarios[0].plant.own:
+    if not scenarios[0].plant.on_stage:
         found[:, 2] += [scene.depth(puppet.shapes[0].model) for puppet in puppets]
     return found

@@ -1,7 +1,7 @@
 """The model of a film: one machine a trace, side by side, without their surroundings, and a camera that suits them.
 
 Machines are the scenarios' own mechanisms with all that they touch. The camera looks in the direction of the plant's
-own camera `look`, or of the chosen one. A user's own model keeps its lights and cameras.
+own camera `look`, or of the chosen one. A model that is not built on the theme keeps its lights and cameras.
 """
 
 import dataclasses
@@ -50,11 +50,11 @@ def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, 
     lit = False
     for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
         machine = assembly.spec([scenario])
-        if k == 0 and scenario.plant.own and (lit := bool(machine.lights)):
+        if k == 0 and not scenario.plant.on_stage and (lit := bool(machine.lights)):
             take(spec.visual.headlight, machine.visual.headlight)
             for light in list(spec.lights):
                 spec.delete(light)
-        if scenario.plant.own:
+        if not scenario.plant.on_stage:
             machine = own_machine(machine, spec, lit, first=k == 0)
             spec.attach(machine, frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
             continue
@@ -129,7 +129,7 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
         return named(scenario, chosen)
     if chosen is not None:
         return camera.turn(*chosen[:2])
-    if scenario.plant.own:
+    if not scenario.plant.on_stage:
         right, up = np.reshape(view(assembly.model([scenario])), (2, 3))
         right, back = right / np.linalg.norm(right), np.cross(right, up) / np.linalg.norm(np.cross(right, up))
         return np.column_stack([right, np.cross(back, right), back])
@@ -172,7 +172,7 @@ def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
     They do if the plant's lane lies across it, if they carry something that would hide the machine behind, and if the
     model is the user's.
     """
-    if scenario.plant.direct or scenario.plant.free:
+    if not scenario.plant.on_stage or scenario.plant.free:
         return True
     step = np.array(scenario.plant.lane)
     return bool(abs(step @ turn[:, 0]) > 0.5 * np.linalg.norm(step))
@@ -249,6 +249,6 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
     """Return the length of the rail, m: of what does not move, along x; inf for pendulums and own models."""
-    if scenario.plant.unit == "rad" or scenario.plant.direct:
+    if scenario.plant.unit == "rad" or not scenario.plant.on_stage:
         return np.inf
     return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())

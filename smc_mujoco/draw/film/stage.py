@@ -45,7 +45,7 @@ class Stage:
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown, self.own = [puppet.shown for puppet in self.puppets], scenarios[0].plant.own
+        self.shown, self.own = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
         self.motions = motions or [None] * len(traces)
         runs = zip(self.puppets, traces, self.motions, strict=True)

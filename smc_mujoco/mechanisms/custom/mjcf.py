@@ -158,6 +158,20 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
         text = _full_precision_xml(own)
     except (ValueError, mujoco.FatalError) as error:
         raise broken("the MjSpec", str(error)) from None
+    made = _of_text(text, _assets(spec, text))
+    if lost := _difference(model, made.compiled(made.read())):
+        raise ScenarioError(f"the MjSpec loses its {lost} when it is written as XML: write the file, and give its path")
+    return made
+
+
+def digest_of(spec: mujoco.MjSpec) -> str:
+    """Hash an MjSpec as it is now, and the files that it names: SHA-256, 64 hex digits."""
+    text = _full_precision_xml(spec)
+    return _sha256([text.encode(), *(part for _, part in sorted(_assets(spec, text).items()))])
+
+
+def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
+    """Return name -> content of each file that an MjSpec names, given its XML."""
     elements = _elements(text)
     inner = {"", *(element.get(name, "") for element in elements if element.tag == "compiler" for name in FOLDERS)}
     assets = dict(spec.assets)
@@ -165,10 +179,7 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
         places = [Path(spec.modelfiledir) / sub / name for sub in sorted(inner)]
         if name not in assets and (found := [place for place in places if place.is_file()]):
             assets[name] = found[0].read_bytes()
-    made = _of_text(text, assets)
-    if lost := _difference(model, made.compiled(made.read())):
-        raise ScenarioError(f"the MjSpec loses its {lost} when it is written as XML: write the file, and give its path")
-    return made
+    return assets
 
 
 def _full_precision_xml(spec: mujoco.MjSpec) -> str:

@@ -16,10 +16,12 @@ import sys
 import tomllib
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
+from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.errors import ScenarioError, find, name, shown, unknown
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
@@ -130,7 +132,7 @@ class Paper:
         """Return a plant by the paper's name or the suite's."""
         if plant in self.plants:
             return self.plants[plant]
-        find("plant", plant, {**plants_known(), **self.plants})
+        find("plant", plant, plants_known() | self.plants)
         return find_plant(plant)
 
     def condition(self, text: str | Condition) -> Condition:
@@ -154,7 +156,7 @@ class Paper:
 
     def _bound(self, law: str, gains: Mapping[str, float]) -> Component:
         """Return a law with these gains, and its own for the rest."""
-        base = find("law", law, {**laws_known(), **self.laws})
+        base = find("law", law, laws_known() | self.laws)
         if isinstance(base, Component):
             base = base if base.template is None else base.template
         if isinstance(base, Template):
@@ -168,15 +170,37 @@ def shipped() -> dict[str, Path]:
     return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{FILE}"))}
 
 
+class Home(NamedTuple):
+    """Where a paper is: its folder, and the name of the package that this folder is."""
+
+    folder: Path
+    package: str
+
+
+@functools.cache
+def catalogue() -> Catalogue[Home]:
+    """Return where every paper is that ships, or comes with another package, by name."""
+    own = {name: Home(folder, f"{SHIPPED}.{name}") for name, folder in shipped().items()}
+    return Catalogue(own, added("smc_mujoco.papers", _of_package))
+
+
+def _of_package(point: EntryPoint) -> Home:
+    """Return where the paper is that an entry point of another package names."""
+    found = source(point)
+    if not found.submodule_search_locations:
+        raise ScenarioError(f"{found.origin} is no folder: give {KINDS[point.group][1]}")
+    return Home(Path(next(iter(found.submodule_search_locations))), point.module)
+
+
 def paper(which: str | Path) -> Paper:
-    """Return a paper by the name of one that ships, or from its folder.
+    """Return a paper by its name in `smc-mujoco papers`, or from its folder.
 
     Raises:
       ScenarioError: there is none, or something is wrong with one of its files, in one sentence.
     """
-    known = shipped()
+    known = catalogue()
     if isinstance(which, str) and which in known:
-        return _shipped(which)
+        return _known(known[which])
     folder = Path(which)
     if not folder.is_dir():
         if isinstance(which, str) and not set("/\\.") & set(which):
@@ -186,13 +210,25 @@ def paper(which: str | Path) -> Paper:
 
 
 @functools.cache
-def _shipped(name: str) -> Paper:
-    return _read(shipped()[name], f"{SHIPPED}.{name}")
+def _known(home: Home) -> Paper:
+    return _read(home.folder, home.package)
 
 
 def papers() -> dict[str, Paper]:
-    """Return every paper that ships, by its name, in alphabetical order."""
-    return {name: paper(name) for name in shipped()}
+    """Return every paper that ships, or comes with another package, by its name, in alphabetical order.
+
+    Warns:
+      PackageWarning: another package's paper has something wrong with it, and is left out.
+    """
+    found: dict[str, Paper] = {}
+    for key, home in catalogue().items():
+        try:
+            found[key] = _known(home)
+        except ScenarioError as error:
+            if not (package := catalogue().package(key)):
+                raise
+            warn(f"package {package!r}: its paper {key!r}: {error}")
+    return found
 
 
 def new(folder: Path) -> list[Path]:
@@ -354,7 +390,7 @@ def _check_names(entry: Entry, paper: Paper) -> None:
     for one in entry.conditions:
         paper.condition(one)
     for law in entry.laws:
-        find("law", law, {**laws_known(), **paper.laws})
+        find("law", law, laws_known() | paper.laws)
         for gains, of_set in paper.sets.items():
             for plant in entry.plants if of_set is not None else ():
                 paper.law(plant, law, gains)

@@ -9,6 +9,7 @@ again it computes only what is missing.
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ def report(
     progress: bool = False,
     plan: "Plan | None" = None,
     records: str | os.PathLike | None = None,
+    laws: Sequence[str] = (),
 ) -> Path:
     """Compute a study and write its report, out/report.html.
 
@@ -35,9 +37,11 @@ def report(
       progress: whether to show a bar a stage.
       plan: how much of everything, instead of `quick`.
       records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
+      laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
 
     Raises:
-      ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, or records of no rig.
+      ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, records of no rig, or
+        a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
     from smc_mujoco.common import extras
@@ -51,6 +55,8 @@ def report(
     plan = plan or (QUICK if quick else FULL)
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
+    if laws:
+        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *laws))))
     folder = Path(out)
     html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
     with replacing(folder / "report.html") as part:

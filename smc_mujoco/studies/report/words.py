@@ -79,7 +79,7 @@ def unit(metric: str, plant: str | None = None) -> str:
     """Return a metric's unit on a plant, or on all of those that differ: "rad or m"."""
     if metric not in CATALOGUE:
         return ""
-    xs = [plants()[plant].unit] if plant in plants() else ["rad", "m"]
+    xs = [plants()[plant].unit] if plant and plant in plants() else ["rad", "m"]
     return either(CATALOGUE[metric].unit_for(x) for x in xs)
 
 

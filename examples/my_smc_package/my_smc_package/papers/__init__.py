@@ -1,0 +1,1 @@
+"""Papers: a folder for each. `smc-mujoco claims --paper NAME` audits one."""

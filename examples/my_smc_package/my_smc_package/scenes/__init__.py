@@ -1,0 +1,1 @@
+"""Scenes: one file for each question. `smc-mujoco run NAME` runs one."""

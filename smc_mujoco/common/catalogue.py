@@ -1,0 +1,217 @@
+"""Catalogues: entries of the library by name, and those that other installed packages add by entry points.
+
+    [project.entry-points."smc_mujoco.laws"]
+    my_law = "my_package.laws:my_law"
+
+The names of other packages' entries are read from the packages' metadata. An entry is imported when it is asked for by
+its name, or when all entries are listed. So a package that nobody asks for costs nothing, and cannot fail.
+
+What is wrong with an entry is one sentence. It is an error where the entry is asked for, and a `PackageWarning` where
+all are listed, because the others still work.
+"""
+
+import dataclasses
+import functools
+import importlib.metadata
+import importlib.util
+import operator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from importlib.machinery import ModuleSpec
+from importlib.metadata import EntryPoint
+from typing import Any, Generic, TypeVar, overload
+
+from smc_mujoco.common.errors import ScenarioError, one_line, shown, unknown, users_frame
+
+NAME = operator.attrgetter("name")
+PREFIX = "smc_mujoco."
+KINDS = {  # group of entry points -> what an entry is, and how one makes it
+    "smc_mujoco.laws": ("law", "a function decorated with smc.law_function"),
+    "smc_mujoco.joint_laws": ("law of many joints", "a function decorated with smc.law_function(joint=True)"),
+    "smc_mujoco.surfaces": ("surface", "a function decorated with smc.surface_function"),
+    "smc_mujoco.estimators": ("velocity estimator", "a function decorated with smc.estimator_function"),
+    "smc_mujoco.plants": ("plant", "a smc_mujoco.mechanisms.plant.Plant"),
+    "smc_mujoco.rigs": ("rig", "a smc_mujoco.twins.rig.Rig"),
+    "smc_mujoco.scenes": ("scene", "a module that declares a `scene`"),
+    "smc_mujoco.papers": ("paper", "a package with paper.toml and claims.py"),
+}
+
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+U = TypeVar("U")
+
+
+class PackageWarning(UserWarning):
+    """An installed package has an entry point for smc_mujoco that cannot be used. The message is one sentence."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Added(Generic[T_co]):
+    """An entry of another package, which is loaded at its first use.
+
+    Attributes:
+      make: returns the entry from its entry point, and raises any exception.
+    """
+
+    point: EntryPoint
+    make: Callable[[EntryPoint], T_co]
+
+    @property
+    def package(self) -> str:
+        """The name of the installed package."""
+        return self.point.dist.name if self.point.dist else self.point.module.partition(".")[0]
+
+    def __str__(self) -> str:
+        return f"package {self.package!r}: its {KINDS[self.point.group][0]} {self.point.name!r} ({self.point.value})"
+
+    @functools.cached_property
+    def value(self) -> T_co:
+        """The entry.
+
+        Raises:
+          ScenarioError: it cannot be loaded, or is not what it should be.
+        """
+        try:
+            return self.make(self.point)
+        except ScenarioError as error:
+            raise ScenarioError(f"{self}: {error}") from None
+        except (Exception, SystemExit) as error:  # whatever another package raises
+            why = one_line(f"{type(error).__name__}: {error}")
+            raise ScenarioError(f"{self} cannot be loaded ({why}): update or uninstall that package") from error
+
+
+class Catalogue(Mapping[str, T_co]):
+    """Entries by name, in alphabetical order.
+
+    `catalogue[name]` loads one entry. Iteration loads all, warns of those that cannot be loaded, and leaves them out.
+
+    Attributes:
+      own: the entries of the library, by name.
+      added: name -> the entries of that name of other packages.
+    """
+
+    def __init__(self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None):
+        self.own = dict(own)
+        self.added = dict(added or {})
+
+    def __getitem__(self, name: str) -> T_co:
+        if name in self.own:
+            for one in self.added.get(name, ()):
+                warn(f"{one} has the name of an entry of the library, which is used instead: give it another name")
+            return self.own[name]
+        first, *others = self.added[name]
+        if others:
+            kind, packages = KINDS[first.point.group][0], " and ".join(repr(one.package) for one in (first, *others))
+            raise ScenarioError(f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename it")
+        return first.value
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.own or name in self.added
+
+    def __iter__(self) -> Iterator[str]:
+        _warn_of_groups()
+        for name in sorted({*self.own, *self.added}):
+            try:
+                self[name]
+            except ScenarioError as error:
+                warn(str(error))
+            else:
+                yield name
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @overload
+    def get(self, key: str, /) -> T_co | None: ...
+    @overload
+    def get(self, key: str, default: T_co | U, /) -> T_co | U: ...
+    def get(self, key: str, default: Any = None, /) -> Any:
+        """Return an entry, or the default if there is none of that name or it cannot be loaded."""
+        try:
+            return self[key]
+        except KeyError:
+            return default
+        except ScenarioError as error:
+            warn(str(error))
+            return default
+
+    def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
+        """Return the entries of both. Those of a plain mapping replace entries of the same name."""
+        if not isinstance(other, Catalogue):
+            left = {name: entries for name, entries in self.added.items() if name not in other}
+            return Catalogue({**self.own, **other}, left)
+        names = {*self.added, *other.added}
+        both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
+        return Catalogue({**self.own, **other.own}, both)
+
+    def package(self, name: str) -> str:
+        """Return the name of the package that an entry is from, or "" if it is the library's."""
+        return "" if name in self.own or name not in self.added else self.added[name][0].package
+
+
+def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[T], ...]]:
+    """Return name -> the entries of other packages in a group of entry points."""
+    found: dict[str, tuple[Added[T], ...]] = {}
+    for point in points(group):
+        found[point.name] = (*found.get(point.name, ()), Added(point, make))
+    return found
+
+
+def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
+    """Return a function that imports the object which an entry point names, and checks its kind and its name."""
+
+    def make(point: EntryPoint) -> T:
+        found = point.load()
+        if not isinstance(found, kind) or not fits(found):
+            raise ScenarioError(f"it is {shown(found)}: give {KINDS[point.group][1]}")
+        if (own := NAME(found)) != point.name:
+            raise ScenarioError(f"its own name is {own!r}: give both one name")
+        return found
+
+    return make
+
+
+def source(point: EntryPoint) -> ModuleSpec:
+    """Return where the module is that an entry point names. It imports the packages around it, not the module itself.
+
+    Raises:
+      ScenarioError: there is no such module, or the entry point names something in it.
+    """
+    if point.attr:
+        raise ScenarioError(f"it is {point.attr!r} in a module: give {KINDS[point.group][1]}")
+    if (found := importlib.util.find_spec(point.module)) is None:
+        raise ScenarioError(f"there is no module {point.module}: update or uninstall that package")
+    if (own := point.module.rpartition(".")[2]) != point.name:
+        raise ScenarioError(f"its own name is {own!r}: give both one name")
+    return found
+
+
+@functools.cache
+def _points() -> dict[str, list[EntryPoint]]:
+    """Return group -> the entry points of all installed packages. It reads their metadata, and imports nothing."""
+    known = importlib.metadata.entry_points()
+    groups = [group for group in known.groups if group.startswith(PREFIX)]
+    return {group: sorted(known.select(group=group), key=lambda one: (one.name, one.value)) for group in groups}
+
+
+def points(group: str) -> list[EntryPoint]:
+    """Return the entry points in a group of all installed packages."""
+    return _points().get(group, [])
+
+
+_warned: set[str] = set()
+
+
+def warn(message: str) -> None:
+    """Warn of a package's entry, once in a process."""
+    if message not in _warned:
+        _warned.add(message)
+        warnings.warn(message, PackageWarning, users_frame())
+
+
+def _warn_of_groups() -> None:
+    """Warn of entry points in groups that do not exist."""
+    for group, (point, *_) in _points().items():
+        if group not in KINDS:
+            package = point.dist.name if point.dist else point.value
+            warn(f"package {package!r}: {unknown('group of entry points', group, KINDS)}")

@@ -1,0 +1,355 @@
+"""Entries of other packages: found by name, imported when asked for, and no harm if something is wrong with them."""
+
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from numpy.testing import assert_array_equal
+
+import smc_mujoco as smc
+from smc_mujoco.common import catalogue
+from smc_mujoco.common.errors import find
+from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
+from smc_mujoco.mechanisms import plant
+from smc_mujoco.studies import run_key, scene
+from smc_mujoco.studies.audit import paper
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "my_smc_package"
+CACHED = (
+    catalogue._points, law.catalogue, law.known_laws, joint_law.catalogue, surface.catalogue, estimator.catalogue,
+    plant.catalogue, scene.scenes, paper.catalogue,
+)  # fmt: skip
+
+LAW = """
+import smc_mujoco as smc
+@smc.law_function(gains={"k": 2.0})
+def NAME(y, gains, memory):
+    return -gains.k * y.e, y.e
+"""
+PLANT = """
+import dataclasses
+import smc_mujoco as smc
+NAME = dataclasses.replace(smc.plant("duffing"), name="NAME")
+"""
+
+Install = Callable[..., Path]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """A function that installs a package: its name, entry points by group, and the code of its modules."""
+
+    def forget() -> None:
+        for function in CACHED:
+            function.cache_clear()
+        catalogue._warned.clear()
+
+    def add(package: str, points: dict[str, dict[str, str]], **modules: str) -> Path:
+        folder = tmp_path / package
+        about = folder / f"{package}-1.0.dist-info"
+        about.mkdir(parents=True)
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        lines = [
+            f"[smc_mujoco.{group}]\n" + "".join(f"{k} = {v}\n" for k, v in of.items()) for group, of in points.items()
+        ]
+        (about / "entry_points.txt").write_text("\n".join(lines))
+        for name, code in modules.items():
+            (folder / f"{name}.py").write_text(code)
+        monkeypatch.syspath_prepend(str(folder))
+        forget()
+        return folder
+
+    yield add
+    monkeypatch.undo()
+    forget()
+
+
+@pytest.fixture
+def quiet() -> Iterator[None]:
+    """Warnings of packages are not errors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", smc.PackageWarning)
+        yield
+
+
+def said(call: Callable[[], object]) -> list[str]:
+    """What a call warns of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    return [str(one.message) for one in caught]
+
+
+# found, and imported when asked for
+
+
+def test_an_entry_runs_like_one_of_the_library(install, tmp_path):
+    install(
+        "theirs",
+        {"laws": {"their_law": "theirs_laws:their_law"}, "plants": {"their_plant": "theirs_plants:their_plant"}},
+        theirs_laws=LAW.replace("NAME", "their_law"),
+        theirs_plants=PLANT.replace("NAME", "their_plant"),
+    )
+    assert "their_law" in smc.laws()
+    assert "their_law" in smc.laws("their_plant")
+    assert smc.law("their_law", k=3.0).gains["k"] == 3.0
+    (run,) = smc.grid(["their_plant"], ["their_law"], ["nominal"], seeds=1, duration=0.02, gains="default")
+    trace = smc.run(run)
+    same = smc.run(smc.Scenario(plant="duffing", law="their_law", x0=run.x0, duration=0.02, u_max=run.u_max))
+    assert_array_equal(trace.x, same.x)
+    assert smc.load(trace.save(tmp_path / "a.npz")).scenario == run
+
+
+def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
+    install("lazy", {"laws": {"lazy_law": "lazy_laws:lazy_law"}}, lazy_laws=LAW.replace("NAME", "lazy_law"))
+    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
+    assert "lazy_law" in law.known_laws()
+    assert "lazy_laws" not in sys.modules
+    smc.law("lazy_law")
+    assert "lazy_laws" in sys.modules
+
+
+def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
+    """Also where it is imported first, and not by the catalogue."""
+    install(
+        "early",
+        {"plants": {"early_plant": "early_plants:early_plant"}},
+        early_plants=PLANT.replace("NAME", "early_plant"),
+    )
+    import early_plants  # pyright: ignore[reportMissingImports]
+
+    assert smc.plant("early_plant") is not None
+    assert plant.catalogue()["early_plant"] is early_plants.early_plant
+
+
+def test_every_catalogue_takes_entries(install):
+    install(
+        "many",
+        {
+            "joint_laws": {"many_joint": "many_all:many_joint"},
+            "surfaces": {"many_surface": "many_all:many_surface"},
+            "estimators": {"many_estimator": "many_all:many_estimator"},
+            "scenes": {"many_scene": "many_scene"},
+        },
+        many_all="""
+import smc_mujoco as smc
+@smc.law_function(joint=True, gains={"k": 2.0})
+def many_joint(y, gains, memory):
+    return -gains.k * y.e, y.e
+@smc.surface_function(gains={"k": 2.0})
+def many_surface(y, gains, memory):
+    return y.de + gains.k * y.e, -gains.k * y.de
+@smc.estimator_function(gains={"k": 2.0})
+def many_estimator(y, gains, memory):
+    return gains.k * y.v
+""",
+        many_scene='"""Is it listed?"""\nraise RuntimeError("a scene is not run to be listed")',
+    )
+    assert "many_joint" in smc.joint_laws()
+    assert "many_surface" in smc.surfaces()
+    assert "many_estimator" in smc.estimators()
+    assert scene.question(scene.find("many_scene")) == "Is it listed?"
+    assert "many_scene" not in sys.modules
+
+
+def test_a_package_brings_the_gains_of_its_law(install):
+    folder = install(
+        "tuned", {"laws": {"tuned_law": "tuned_laws:tuned_law"}}, tuned_laws=LAW.replace("NAME", "tuned_law")
+    )
+    with pytest.raises(smc.ScenarioError, match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune"):
+        gain_sets.law("duffing", "tuned_law")
+    (folder / "tuned_gains" / "balanced").mkdir(parents=True)
+    text = '{"scenario": {"law": {"gains": {"k": 7.0}}}}'
+    (folder / "tuned_gains" / "balanced" / "duffing-tuned_law.json").write_text(text)
+    assert gain_sets.law("duffing", "tuned_law").gains["k"] == 7.0
+
+
+def test_a_run_s_key_has_the_mjcf_that_a_plant_reads(install):
+    folder = install(
+        "files",
+        {"plants": {"file_plant": "file_plants:file_plant"}},
+        file_plants=PLANT.replace("NAME", "file_plant")
+        + """
+import mujoco
+from pathlib import Path
+def build(n):
+    return mujoco.MjSpec.from_file(str(Path(__file__).parent / "file_plant.xml"))
+file_plant = dataclasses.replace(file_plant, build=build)
+""",
+    )
+    xml = (EXAMPLE / "my_smc_package/models/sprung_cart.xml").read_text()
+    keys = []
+    for stiffness in ("8", "9"):
+        (folder / "file_plant.xml").write_text(xml.replace('stiffness="8"', f'stiffness="{stiffness}"'))
+        keys += [run_key.key(smc.Scenario(plant="file_plant", law="none", duration=0.1)) for _ in range(2)]
+    assert keys[0] == keys[1] != keys[2] == keys[3]
+
+
+# what is wrong is one sentence, and the rest works
+
+BROKEN = {
+    "missing": ("bad_law:missing", "AttributeError"),
+    "raises": ("bad_raises:raises", "ZeroDivisionError: division by zero"),
+    "exits": ("bad_exits:exits", "SystemExit: 3"),
+    "nowhere": ("bad_nowhere:nowhere", "ModuleNotFoundError: No module named 'bad_nowhere'"),
+    "number": ("bad_law:number", "it is 3: give a function decorated with smc.law_function"),
+    "other": ("bad_law:renamed", "its own name is 'renamed': give both one name"),
+    "flat": ("bad_law:flat", "give a function decorated with smc.law_function"),
+}
+
+
+@pytest.fixture
+def broken(install):
+    install(
+        "bad",
+        {"laws": {name: value for name, (value, _) in BROKEN.items()} | {"good": "bad_good:good"}},
+        bad_law=LAW.replace("NAME", "renamed")
+        + "number = 3\nflat = smc.surface_function(lambda y, gains, memory: (y.e, 0.0))",
+        bad_raises="1 / 0",
+        bad_exits="raise SystemExit(3)",
+        bad_good=LAW.replace("NAME", "good"),
+    )
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_entry_is_one_sentence_where_it_is_asked_for(broken, name):
+    with pytest.raises(smc.ScenarioError) as raised:
+        smc.law(name)
+    sentence = str(raised.value)
+    assert sentence.startswith(f"package 'bad': its law {name!r} ({BROKEN[name][0]})")
+    assert BROKEN[name][1] in sentence
+    assert "\n" not in sentence
+
+
+def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):
+    first = said(smc.laws)
+    assert len(first) == len(BROKEN)
+    assert all(f"its law {name!r}" in "".join(first) for name in BROKEN)
+    assert said(smc.laws) == []
+    assert "good" in smc.laws()
+    assert not BROKEN.keys() & {*smc.laws()}
+    assert smc.run(smc.Scenario(plant="duffing", law="good", duration=0.01)).failure is None
+
+
+def test_a_name_of_the_library_is_not_taken_over(install):
+    install("grab", {"laws": {"classical": "grab_laws:classical"}}, grab_laws=LAW.replace("NAME", "classical"))
+    (sentence,) = said(lambda: smc.law("classical"))
+    assert sentence.startswith(
+        "package 'grab': its law 'classical' (grab_laws:classical) has the name of an entry of the library"
+    )
+    assert smc.law("classical").function is law.catalogue().own["classical"].function
+    assert "grab_laws" not in sys.modules
+
+
+def test_a_name_of_the_library_s_laws_of_many_joints_is_not_taken_over(install):
+    install("grab", {"laws": {"unit_vector": "grab_laws:unit_vector"}}, grab_laws=LAW.replace("NAME", "unit_vector"))
+    assert len(said(lambda: smc.law("unit_vector"))) == 1
+    assert smc.law("unit_vector").joint
+
+
+def test_one_name_in_two_packages_is_one_sentence(install):
+    for package in ("first", "second"):
+        install(package, {"laws": {"twin": f"{package}_laws:twin"}}, **{f"{package}_laws": LAW.replace("NAME", "twin")})
+    cure = "law 'twin' is in the packages 'first' and 'second': uninstall one of them, or rename it"
+    with pytest.raises(smc.ScenarioError) as raised:
+        smc.law("twin")
+    assert str(raised.value) == cure
+    assert said(smc.laws) == [cure]
+    assert "twin" not in smc.laws()
+
+
+def test_a_group_that_does_not_exist_is_said_with_the_nearest(install):
+    install("typo", {"law": {"lost": "typo_laws:lost"}}, typo_laws=LAW.replace("NAME", "lost"))
+    (sentence,) = said(smc.laws)
+    assert "package 'typo': unknown group of entry points 'smc_mujoco.law': did you mean 'smc_mujoco.laws'?" in sentence
+
+
+def test_a_user_s_law_may_not_have_the_name_of_another_package_s(install):
+    install("theirs", {"laws": {"named_law": "named_laws:named_law"}}, named_laws=LAW.replace("NAME", "named_law"))
+
+    @smc.law_function(gains={"k": 1.0})
+    def named_law(y, gains, memory):
+        return -gains.k * y.e, y.e
+
+    with pytest.raises(smc.ScenarioError, match="the name of a law of package 'theirs': rename its function"):
+        smc.grid(["duffing"], [named_law], ["nominal"], seeds=1)
+
+
+def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path):
+    folder = install(
+        "papers", {"papers": {"their_paper": "their_papers.their_paper", "no_folder": "no_folder"}}, no_folder=""
+    )
+    home = folder / "their_papers" / "their_paper"
+    home.mkdir(parents=True)
+    (folder / "their_papers" / "__init__.py").touch()
+    for file in ("paper.toml", "claims.py"):
+        (home / file).write_text((ROOT / "smc_mujoco/studies/audit/template" / file).read_text())
+    (home / "__init__.py").touch()
+    first = said(paper.papers)
+    assert [sentence.partition(": its")[0] for sentence in first] == ["package 'papers'"]
+    assert "no_folder.py is no folder: give a package with paper.toml and claims.py" in first[0]
+    assert paper.papers()["their_paper"].name == "their_paper"
+    assert paper.catalogue().package("their_paper") == "papers"
+    paper._known.cache_clear()
+    (home / "paper.toml").write_text("title = 3")
+    (sentence,) = said(paper.papers)
+    assert sentence.startswith("package 'papers': its paper 'their_paper': ")
+    assert "their_paper" not in paper.papers()
+
+
+def test_a_union_of_catalogues_keeps_what_is_its_own(install, quiet):
+    install("theirs", {"laws": {"u_law": "u_laws:u_law"}}, u_laws=LAW.replace("NAME", "u_law"))
+    mine = law.catalogue() | {"u_law": 3}
+    assert mine["u_law"] == 3
+    assert find("law", "u_law", mine) == 3
+    assert (law.catalogue() | {}).package("u_law") == "theirs"
+    with pytest.raises(KeyError):
+        law.catalogue()["no such law"]
+    assert law.catalogue().get("no such law", 5) == 5
+
+
+# the template
+
+
+USE = """
+import concurrent.futures, multiprocessing, pickle, sys
+import smc_mujoco as smc
+assert "my_smc_package" not in sys.modules
+if __name__ == "__main__":
+    runs = smc.grid(["sprung_cart"], ["arctan_switching", "classical"], ["nominal"], 2, "default", 0.1)
+    assert pickle.loads(pickle.dumps(runs)) == runs
+    spawn = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawn) as pool:
+        there = smc.study(runs, "there", executor=pool)
+    here = smc.study(runs, "here")
+    assert there.data.drop(["hash"]).equals(here.data.drop(["hash"]))
+    print(len(here), len(smc.study(runs, "here")))
+    print([claim.verdict for claim in smc.claims(paper="my_paper")])
+"""
+
+
+def test_the_template_is_built_installed_without_network_and_passes_its_own_tests(tmp_path):
+    target, clean = tmp_path / "site", {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))}
+
+    def run(*command: object) -> str:
+        words = [sys.executable, *map(str, command)]
+        paths = os.pathsep.join(map(str, (target, ROOT)))
+        done = subprocess.run(
+            words, cwd=tmp_path, env=clean | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    offline = ("--no-index", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
+    run("-m", "pip", "install", "-q", *offline, "--target", target, EXAMPLE)
+    assert (target / "my_smc_package" / "models" / "sprung_cart.xml").is_file()
+    (tmp_path / "use.py").write_text(USE)
+    assert run("-W", "error", "use.py").splitlines() == ["4 4", "['supported', 'supported']"]
+    assert "4 passed" in run("-m", "pytest", "-q", "-p", "no:cacheprovider", EXAMPLE / "tests")
+    listed = run("-m", "smc_mujoco", "list")
+    assert listed.count("[my-smc-package]") == 3
