@@ -35,7 +35,7 @@ class JointMeasurement(NamedTuple):
     t: float  # time of the sample
     dt: float  # control period
     model: float  # 1 if the scenario lets the law use M, h and g, else 0
-    dynamics: Any  # what `coriolis` calls
+    dynamics: Any  # what `coriolis` and `jacobian` call
     x: np.ndarray  # measured positions
     v: np.ndarray  # measured or estimated velocities
     e: np.ndarray  # x - r
@@ -111,10 +111,33 @@ def _coriolis(y, w):
         for i in range(n):
             given[i] = w[i]
         if y.dynamics != 0:
-            own = carray(pointer(y.dynamics), (3,))  # function, parameters, force per unit of u
-            call(int(own[0]), given.ctypes.data, int(own[1]), 0, found.ctypes.data)
+            own = carray(pointer(y.dynamics), (4,))  # two functions, their parameters, force per unit of u
+            call(int(own[0]), given.ctypes.data, int(own[2]), 0, found.ctypes.data)
             for i in range(n):
-                found[i] /= own[2]
+                found[i] /= own[3]
+        return found
+
+    return compiled
+
+
+def jacobian(y):
+    """Return the nominal Jacobian of the plant's tip, (3, n): J v is the tip's velocity, J' F the torques of F there.
+
+    Raises:
+      ValueError: the law has no model, or the plant no tip.
+    """
+    return y.dynamics.jacobian()
+
+
+@overload(jacobian)
+def _jacobian(y):
+    def compiled(y):
+        found = np.zeros((3, len(y.x)))
+        if y.dynamics == 0:
+            raise ValueError
+        own = carray(pointer(y.dynamics), (4,))
+        if call(int(own[1]), 0, int(own[2]), 0, found.ctypes.data) != 0:
+            raise ValueError
         return found
 
     return compiled
@@ -128,6 +151,36 @@ def product(M, w):
         for j in range(len(w)):
             found[i] += M[i, j] * w[j]
     return found
+
+
+@njit
+def inner(a, b):
+    """Return the sum of a_i b_i. It adds in the same order in Python and compiled, as `a @ b` may not."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@njit
+def solve(M, b):
+    """Return M^-1 b for a positive definite M, by Cholesky's factors: the same in Python and compiled."""
+    n = len(b)
+    L, x = np.zeros((n, n)), b.copy()
+    for i in range(n):
+        for j in range(i + 1):
+            rest = M[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            L[i, j] = math.sqrt(rest) if i == j else rest / L[j, j]
+        for k in range(i):
+            x[i] -= L[i, k] * x[k]
+        x[i] /= L[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= L[k, i] * x[k]
+        x[i] /= L[i, i]
+    return x
 
 
 @njit

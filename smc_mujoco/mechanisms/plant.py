@@ -91,12 +91,20 @@ class Coupled(abc.ABC):
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
 
     @abc.abstractmethod
-    def native_dynamics(self, parameters: Mapping[str, float]) -> Native:
-        """Return the C function of `dynamics` for one simulation. Its values serve that of `coriolis`, too."""
+    def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
+        """Return how the position of a site, the tip, depends on the channels, (3, n)."""
+
+    @abc.abstractmethod
+    def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
+        """Return the C function of `dynamics` for one simulation. Its values serve the two functions below, too."""
 
     @abc.abstractmethod
     def native_coriolis(self) -> int:
         """Return the address of the C function of `coriolis`, at the state of the last call of `dynamics`."""
+
+    @abc.abstractmethod
+    def native_jacobian(self) -> int:
+        """Return the address of the C function of `jacobian`, at the state of the last call of `dynamics`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -131,6 +139,7 @@ class Plant:
       label, short: long and short name in figures; "": made from its name.
       jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
       ranges: joint, least and largest position of each channel, rad or m; empty: no joint has limits.
+      tip: name of the site that the mechanism moves: where an arm's tool is; "": none.
       suggested: "law", "u_max" or "reference" -> what each driven channel suggests to scenarios that are given none.
     """
 
@@ -161,6 +170,7 @@ class Plant:
     label: str = ""
     short: str = ""
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    tip: str = ""
     suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):

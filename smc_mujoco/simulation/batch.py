@@ -224,6 +224,6 @@ def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray
         return record["control"].tolist()
     stored = state.view(packed.numbers, int(record["joint"]), (joint_law.numbers(n),)).copy()
     y = joint_law.stored_measurement(stored, None)
-    function.together(y._replace(dynamics=reference.Coriolis(s, y.x, y.v)))
+    function.together(y._replace(dynamics=reference.OnRequest(s, y.x, y.v)))
     u, sliding = state.view(packed.numbers, int(record["torques"]), (2, n))[:, i].tolist()
     return u, sliding

@@ -271,7 +271,7 @@ def _inform_together(at, sim, t):
     """Write into the record what a law of many joints reads at time t, s. Return a failure code."""
     n, step, motion, r, dr, ddr = sim.n, 8 * sim.n, sim.motion, 0.0, 0.0, 0.0
     head, first = pointer(sim.joint), sim.joint + 8 * HEADER
-    head[0], head[1], head[2], head[3], head[4] = t, sim.period, sim.uses_model, sim.coriolis, n
+    head[0], head[1], head[2], head[3], head[4] = t, sim.period, sim.uses_model, sim.on_request, n
     y = pointer(first)
     x, v, a, limits = pointer(sim.x), pointer(sim.v), pointer(sim.a), pointer(sim.limits)
     for i in range(n):

@@ -163,7 +163,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     modelled = s.model == "nominal"
     own = None
     if coupled is not None and (modelled or not joint):
-        own = coupled.native_dynamics(s.plant.parameters) if joint else coupled.native(s.plant.parameters)
+        own = coupled.native_dynamics(s.plant.parameters, s.plant.tip) if joint else coupled.native(s.plant.parameters)
     functions = {
         "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
     }
@@ -196,7 +196,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
     measurement = buffer.reserve(joint_law.numbers(n)) if joint else None
     torques = buffer.reserve(2 * n) if joint else None
-    coriolis = buffer.reserve(3) if joint and own is not None else None
+    dynamics = buffer.reserve(4) if joint and own is not None else None
     numbers = buffer.array()
 
     def placed(found: dict[str, int]) -> dict[str, int]:
@@ -219,10 +219,10 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     values: dict[str, Any] = {name: placed(found) for name, found in functions.items()}
     if measurement is not None and torques is not None:
         values |= {"joint": buffer.address(measurement), "torques": buffer.address(torques)}
-    if coriolis is not None and coupled is not None:
-        called = coupled.native_coriolis(), values["dynamics"]["parameters"], s.drive.gain
-        numbers[coriolis : coriolis + 3] = called
-        values["coriolis"] = buffer.address(coriolis)
+    if dynamics is not None and coupled is not None:
+        called = coupled.native_coriolis(), coupled.native_jacobian(), values["dynamics"]["parameters"], s.drive.gain
+        numbers[dynamics : dynamics + 4] = called
+        values["on_request"] = buffer.address(dynamics)
     values |= {name: state.address(table) for name, table in tables.items() if len(table)}
     values |= {
         "n": n,

@@ -230,7 +230,7 @@ class Loop:
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
         a = np.where(np.isnan(self.a), ddr, self.a)
         y = JointMeasurement(
-            t, scenario.control_period, float(scenario.model == "nominal"), Coriolis(scenario, x, v), x.copy(),
+            t, scenario.control_period, float(scenario.model == "nominal"), OnRequest(scenario, x, v), x.copy(),
             v.copy(), x - r, v - dr, r, dr, ddr, a, self.limits.copy(), *dynamics(scenario, x, v),
         )  # fmt: skip
         u, s = self.law.together(y)
@@ -347,18 +347,31 @@ class PythonComponent:
         return u, s
 
 
-class Coriolis:
-    """What `control.joint_law.coriolis` calls in the reference loop."""
+class OnRequest:
+    """What `coriolis` and `jacobian` of control.joint_law call in the reference loop."""
 
     def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
         self.scenario, self.x, self.v = scenario, x, v
 
     def coriolis(self, w: np.ndarray) -> np.ndarray:
         """Return C(x, v) w per unit of u, (n,)."""
-        plant = self.scenario.plant
-        if self.scenario.resolved.model == "none" or not isinstance(plant.nominal, Coupled):
+        plant, nominal = self.scenario.plant, self.nominal
+        if nominal is None:
             return np.zeros(len(self.x))
-        return plant.nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.drive.gain
+        return nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.drive.gain
+
+    def jacobian(self) -> np.ndarray:
+        """Return the tip's Jacobian, (3, n)."""
+        plant, nominal = self.scenario.plant, self.nominal
+        if nominal is None or not plant.tip:
+            raise ValueError("there is no tip, or the law has no model: give the plant a tip, and the law the model")
+        return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
+
+    @property
+    def nominal(self) -> Coupled | None:
+        """The nominal model of all joints, if the plant has one and the law may use it."""
+        found = self.scenario.plant.nominal
+        return found if isinstance(found, Coupled) and self.scenario.resolved.model == "nominal" else None
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:

@@ -71,8 +71,9 @@ SIMULATION = np.dtype(
         # addresses of the nominal model's input (i, n, x, v, a, u; the last four (n,) each) and of x, v, a and u in it
         ("joints", "i8"), ("x", "i8"), ("v", "i8"), ("a", "i8"), ("u", "i8"),
         # a law of many joints: addresses of its measurement (0: a law of one channel) and of its u and s, (n,) each;
-        # the nominal M, h and g (0: from `nominal`, one equation per channel), and what `coriolis` calls
-        ("joint", "i8"), ("torques", "i8"), ("dynamics", FUNCTION), ("coriolis", "i8"),
+        # the nominal M, h and g (0: from `nominal`, one equation per channel), and the address of what is computed only
+        # if the law asks: the functions of C and of the tip's Jacobian, their parameters, and force per unit of u
+        ("joint", "i8"), ("torques", "i8"), ("dynamics", FUNCTION), ("on_request", "i8"),
         # inputs and outputs of functions
         ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("control", CONTROL), ("sliding", SLIDING),
         ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),

@@ -161,3 +161,12 @@ def test_time_delay_sliding_is_stable_below_twice_the_inertia_and_not_above():
     assert np.abs(np.diff(stable.u[-20:, 0])).max() < 1e-2
     above = smc.run(smc.Scenario(law=smc.law("time_delay_sliding", m=2.1 * M, k=1.0), **common))
     assert not np.abs(np.diff(above.u[-20:, 0])).max() < 10.0
+
+
+def test_solve_inverts_a_positive_definite_matrix():
+    rng = np.random.default_rng(3)
+    for n in (1, 3, 7):
+        root, b = rng.normal(size=(n, n)), rng.normal(size=n)
+        M = root @ root.T + 0.1 * np.eye(n)
+        np.testing.assert_allclose(joint_law.solve(M, b), np.linalg.solve(M, b), rtol=1e-9)
+        assert joint_law.solve.py_func(M, b).tolist() == joint_law.solve(M, b).tolist()

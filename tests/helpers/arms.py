@@ -33,4 +33,4 @@ ARM = """
 @functools.cache
 def arm() -> smc.Plant:
     """Three joints of two units, driven in another order than the model's, beside a tree without a channel."""
-    return smc.plant_from(ARM, channels=["reach", "turn", "lift"], name="arm")
+    return smc.plant_from(ARM, channels=["reach", "turn", "lift"], name="arm", tip="tip")

@@ -41,6 +41,7 @@ from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+VALUES = 15  # of `native_dynamics`: n, nv, addresses, whether h is of passive forces alone, the tip's site
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()
 
@@ -134,21 +135,37 @@ class NominalModel(Coupled):
                 found += sign * 0.25 * data.qfrc_bias[places.qvel]
         return found
 
-    def native_dynamics(self, parameters: Mapping[str, float]) -> Native:
+    def jacobian(self, x, p, tip):
+        """Return how the tip's position depends on the channels."""
+        model, places, data, _ = prepared(self, frozen(vars(p)))
+        found = np.zeros((3, model.nv))
+        with _lock:
+            data.qpos[:] = model.qpos0
+            data.qpos[places.qpos] = x
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_jacSite(model, data, found, None, model.site(tip).id)
+        return found[:, places.qvel]
+
+    def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
         table = np.concatenate([places.qpos, places.qvel]).astype(np.int64)
-        dense, state = np.zeros(model.nv**2), np.zeros(2 * len(places.qpos))
-        arrays = data.qpos, data.qvel, data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator, table, dense, state
+        dense, state, moves = np.zeros(model.nv**2), np.zeros(2 * len(places.qpos)), np.zeros(3 * model.nv)
+        forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
+        arrays = data.qpos, data.qvel, *forces, table, dense, state, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
-        values = (len(places.qpos), model.nv, *addresses, passive_alone(model))
+        values = (len(places.qpos), model.nv, *addresses, passive_alone(model), model.site(tip).id if tip else -1)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
     def native_coriolis(self) -> int:
         """Return the address of the C function of `coriolis`."""
         return native_coriolis().address
+
+    def native_jacobian(self) -> int:
+        """Return the address of the C function of `jacobian`."""
+        return native_jacobian().address
 
 
 @dataclasses.dataclass(eq=False)
@@ -250,9 +267,9 @@ def native_dynamics() -> Function:
     full = _called("mj_fullM", 1)
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (13,))
+        own = carray(pointer(p), (VALUES,))
         n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
-        biases, alone = int(own[6]), own[12] != 0.0
+        biases, alone = int(own[6]), own[13] != 0.0
         given, state = carray(pointer(y), (2 * n,)), carray(pointer(int(own[11])), (2 * n,))
         qpos, qvel = carray(pointer(int(own[4])), (1 << 40,)), carray(pointer(int(own[5])), (nv,))
         bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(own[7])), (nv,))
@@ -284,7 +301,7 @@ def native_coriolis() -> Function:
     rates, newton_euler, velocity = _called("mj_comVel"), _called("mj_rne", 2), _called("mj_fwdVelocity")
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (13,))
+        own = carray(pointer(p), (VALUES,))
         n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
         w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
         state, qvel = carray(pointer(int(own[11])), (2 * n,)), carray(pointer(int(own[5])), (nv,))
@@ -295,13 +312,34 @@ def native_coriolis() -> Function:
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[table[n + j]] = state[n + j] + sign * w[j]
-            if own[12] != 0.0:
+            if own[13] != 0.0:
                 rates(model, data)
                 newton_euler(model, data, 0, int(own[6]))
             else:
                 velocity(model, data)
             for j in range(n):
                 output[j] += sign * 0.25 * bias[table[n + j]]
+        return 0
+
+    return Function(native)
+
+
+@functools.cache
+def native_jacobian() -> Function:
+    """Return the C function of the tip's Jacobian, (3, n), at the state of the last call of `native_dynamics`."""
+    of_site = _called("mj_jacSite", 3)
+
+    def native(y, p, m, out):
+        own = carray(pointer(p), (VALUES,))
+        n, nv, site = int(own[0]), int(own[1]), int(own[14])
+        output, table = carray(pointer(out), (3, n)), carray(integers(int(own[9])), (2 * n,))
+        moves = carray(pointer(int(own[12])), (3, nv))
+        if site < 0:
+            return 1
+        of_site(int(own[2]), int(own[3]), int(own[12]), 0, site)
+        for i in range(3):
+            for j in range(n):
+                output[i, j] = moves[i, table[n + j]]
         return 0
 
     return Function(native)

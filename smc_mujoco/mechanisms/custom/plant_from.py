@@ -60,6 +60,7 @@ class OwnModel:
     keyframe: str | None
     channels: tuple[tuple[str, Channel], ...]
     motors: tuple[Motor, ...]
+    tip: str = ""
 
     def __call__(self, n: int) -> mujoco.MjSpec:
         """Return the model with a motor and two sensors per channel.
@@ -93,6 +94,7 @@ class OwnModel:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
         data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
+        data |= {"tip": self.tip} if self.tip else {}
         return data if self.source.path else data | _inside(self.source)
 
 
@@ -126,6 +128,7 @@ def plant_from(
     keyframe: str | None = None,
     assets: Mapping[str, bytes] | None = None,
     timeout: float = 20.0,
+    tip: str | None = None,
 ) -> Plant:
     """Make a plant of an MJCF model.
 
@@ -137,6 +140,7 @@ def plant_from(
       keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
         unless the scenario has a v0.
       assets: name -> content of the files that a text names.
+      tip: name of the site that films trace and `smc.tip_scores` scores; laws of many joints may read its Jacobian.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
@@ -149,7 +153,7 @@ def plant_from(
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=MAX_TIMEOUT))
-    return own_plant(source, channels, name, keyframe)
+    return own_plant(source, channels, name, keyframe, tip)
 
 
 def own_plant(
@@ -157,6 +161,7 @@ def own_plant(
     channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
     name: str | None,
     keyframe: str | None,
+    tip: str | None = None,
     recorded: bool = False,
 ) -> Plant:
     """Return the plant of a model, see `plant_from`. `recorded` skips checks added after a run was recorded."""
@@ -171,8 +176,10 @@ def own_plant(
     check(label, model, pairs)
     if keyframe is not None:
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
+    if tip is not None:
+        mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
     motors = tuple(motor_of(label, model, joint, channel) for joint, channel in pairs)
-    build = OwnModel(source, keyframe, pairs, motors)
+    build = OwnModel(source, keyframe, pairs, motors, tip or "")
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = OwnFields(mass, gravity), tuple(motor.limit for motor in motors)
@@ -200,6 +207,7 @@ def own_plant(
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
         ranges=ranges(model, joints),
+        tip=tip or "",
         suggested=scenarios,
     )
 
@@ -289,4 +297,6 @@ def restored(data: Mapping, name: str) -> Plant:
             raise ScenarioError(
                 f"its model {model}, or a file that it names, is another than in the run: put that one back"
             )
-    return own_plant(mjcf.source(model, assets), data["channels"], name, data["keyframe"], recorded=True)
+    return own_plant(
+        mjcf.source(model, assets), data["channels"], name, data["keyframe"], data.get("tip"), recorded=True
+    )

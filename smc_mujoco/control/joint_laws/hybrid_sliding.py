@@ -1,0 +1,63 @@
+"""Hybrid control: the tip presses with a wanted force along a direction n, and joints slide in all others.
+
+    u = M (w - z A w / G) + h + A' (force - B A v) + friction,    w = r'' - c de - k sat(s / width),
+
+with A = n' J the row of the tip's Jacobian along n, z = M^-1 A', G = A z, and s = P (de + c e), P = 1 - z A / G. P
+keeps what does not move the tip along n. While a wall holds the tip there, A v = 0, and with the perfect model
+
+    s' = -k P sat(s / width) + P d_a,    f = force - A M^-1 d / G + A' v / G,
+
+so the force errs by the disturbance d along n, whatever k is: nothing here measures it. A' v is small at slow motion.
+Friction of known joints is such a d. The law compensates f1 / (1 + exp(-f2 (v + f3))) - f1 / (1 + exp(-f2 f3)), the
+friction that C. Gaz et al. identified for a Panda. Without contact the tip moves along n at force / B.
+Gains: force, wanted, N; nx, ny, nz, direction in which it presses, in the world; B, damping along n [N s/m]; c, slope
+of the surface [1/s]; k, switching gain [rad/s^2]; width, of the boundary layer [rad/s]; f1, f2, f3, of the friction
+[N m, s/rad, rad/s].
+Sources: M. Raibert & J. Craig, "Hybrid position/force control of manipulators", J. Dyn. Syst. Meas. Control 102:126,
+1981; O. Khatib, "A unified approach for motion and force control of robot manipulators", IEEE J. Robotics and
+Automation 3(1):43, 1987 (the consistent projection). The sliding mode in the free directions is derived here.
+"""
+
+import math
+
+import numpy as np
+
+from smc_mujoco.control.joint_law import inner, jacobian, product, saturate, solve
+from smc_mujoco.control.law import law_function
+from smc_mujoco.control.units import ACCELERATION, FORCE, RATE, SPEED, Gain, Unit
+
+
+@law_function(
+    joint=True,
+    family="first-order",
+    continuous=True,
+    requires_model=True,
+    gains={
+        "force": Gain(10.0, held=True, shared=True),
+        "nx": Gain(1.0, held=True, shared=True),
+        "ny": Gain(0.0, held=True, shared=True),
+        "nz": Gain(0.0, held=True, shared=True),
+        "B": Gain(50.0, held=True, nonnegative=True, shared=True),
+        "c": Gain(10.0, RATE, positive=True),
+        "k": Gain(10.0, ACCELERATION, positive=True),
+        "width": Gain(0.1, SPEED, positive=True),
+        "f1": Gain(0.0, FORCE, held=True),
+        "f2": Gain(0.0, Unit(position=-1, time=1), held=True),
+        "f3": Gain(0.0, SPEED, held=True),
+    },
+)
+def hybrid_sliding(y, gains, memory):
+    n = np.array([gains.nx, gains.ny, gains.nz]) / math.sqrt(gains.nx**2 + gains.ny**2 + gains.nz**2)
+    J = jacobian(y)
+    A = n[0] * J[0] + n[1] * J[1] + n[2] * J[2]
+    z = solve(y.M, A)
+    G = inner(A, z)
+    s = y.de + gains.c * y.e
+    s = s - z * (inner(A, s) / G)
+    w = y.ddr - gains.c * y.de - gains.k * saturate(s / gains.width)
+    w = w - z * (inner(A, w) / G)
+    friction = np.zeros(len(s))
+    for i in range(len(s)):
+        friction[i] = gains.f1[i] / (1.0 + math.exp(-gains.f2[i] * (y.v[i] + gains.f3[i])))
+        friction[i] -= gains.f1[i] / (1.0 + math.exp(-gains.f2[i] * gains.f3[i]))
+    return product(y.M, w) + y.h + A * (gains.force - gains.B * inner(A, y.v)) + friction, s
