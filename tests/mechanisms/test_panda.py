@@ -111,7 +111,7 @@ def test_the_flange_is_where_the_makers_frames_put_it():
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         np.testing.assert_allclose(data.site("flange").xpos, place + 0.107 * turn[:, 2], atol=1e-12)
-        np.testing.assert_allclose(data.site("tip").xpos, place + 0.207 * turn[:, 2], atol=1e-12)
+        np.testing.assert_allclose(data.site("tip").xpos, place + 0.195 * turn[:, 2], atol=1e-12)
 
 
 def test_limits_are_the_makers():

@@ -54,10 +54,19 @@ def hybrid_sliding(y, gains, memory):
     G = inner(A, z)
     s = y.de + gains.c * y.e
     s = s - z * (inner(A, s) / G)
-    w = y.ddr - gains.c * y.de - gains.k * saturate(s / gains.width)
+    w = y.ddr - gains.c * y.de
     w = w - z * (inner(A, w) / G)
+    a = -gains.k * saturate(s / gains.width)
+    tip, inverse = np.zeros(3), np.zeros((3, 3))
+    for i in range(3):
+        tip[i] = inner(J[i], a)
+        column = solve(y.M, J[i])
+        for j in range(3):
+            inverse[j, i] = inner(J[j], column)
+    leak = inner(n, solve(inverse, tip))
     friction = np.zeros(len(s))
     for i in range(len(s)):
         friction[i] = gains.f1[i] / (1.0 + math.exp(-gains.f2[i] * (y.v[i] + gains.f3[i])))
         friction[i] -= gains.f1[i] / (1.0 + math.exp(-gains.f2[i] * gains.f3[i]))
-    return product(y.M, w) + y.h + A * (gains.force - gains.B * inner(A, y.v)) + friction, s
+    pressing = gains.force - gains.B * inner(A, y.v) - leak
+    return product(y.M, w + a) + y.h + A * pressing + friction, s

@@ -94,6 +94,7 @@ PANDA = Plant(
     contacts={"table": table, "wall": wall},
     added=("payload",),
     direct=True,
+    tip="tip",
     smooth=False,
     limits=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
     ranges=tuple((name, low, high) for name, (low, high) in zip(JOINTS, RANGES, strict=True)),
