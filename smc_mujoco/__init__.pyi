@@ -72,6 +72,7 @@ from smc_mujoco.simulation.signals import Impulse as Impulse
 from smc_mujoco.simulation.signals import MinimumJerk as MinimumJerk
 from smc_mujoco.simulation.signals import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from smc_mujoco.simulation.signals import Pulse as Pulse
+from smc_mujoco.simulation.signals import Push as Push
 from smc_mujoco.simulation.signals import Ramp as Ramp
 from smc_mujoco.simulation.signals import Signal as Signal
 from smc_mujoco.simulation.signals import Sine as Sine

@@ -43,7 +43,7 @@ class Chunk:
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         for i, (one, log) in enumerate(zip(prepared, self.logs, strict=True)):
-            self.records[i], packed = pack(one, self.channels, log, self.model.nq, self.model.nv)
+            self.records[i], packed = pack(one, self.channels, log, self.model)
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)

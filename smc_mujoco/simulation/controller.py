@@ -353,6 +353,25 @@ def _clear(data, channel):
 
 
 @njit(error_model="numpy")
+def _push(at, sim, data):
+    """Set all forces in space to 0, and apply those that push one body each. Return a failure code."""
+    for i in range(sim.n):
+        _clear(data, channel_at(sim.channels, i))
+    for j in range(sim.signal_count):
+        body = signal_at(sim.signals, j).body
+        for k in range(3 if body >= 0 else 0):
+            data.xfrc_applied[body + k] = 0.0
+    for j in range(sim.signal_count):
+        signal = signal_at(sim.signals, j)
+        if signal.body >= 0:
+            if _call(signal.function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+                return record.DISTURBANCE_RAISED
+            for k in range(3):
+                data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
+    return record.FINE
+
+
+@njit(error_model="numpy")
 def _disturb(at, sim, data, t):
     """Apply the sum of the disturbances at time t, s, to the body of each channel, or to its joint in a user's model.
 
@@ -360,11 +379,13 @@ def _disturb(at, sim, data, t):
     """
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
-    for i in range(sim.n):
-        _clear(data, channel_at(sim.channels, i))
+    if _push(at, sim, data) != record.FINE:
+        return record.DISTURBANCE_RAISED
     for j in range(sim.signal_count):
         signal = signal_at(sim.signals, j)
         instant.stream = signal.stream
+        if signal.body >= 0:
+            continue
         for i in range(sim.n):
             channel = channel_at(sim.channels, i)
             if signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel

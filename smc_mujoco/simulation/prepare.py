@@ -11,6 +11,7 @@ import math
 from collections.abc import Hashable
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
@@ -21,7 +22,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
+from smc_mujoco.simulation.signals import PerChannel, Push, Recorded, Signal
 
 PERFECT = Encoder(counts=math.inf)
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
@@ -141,13 +142,13 @@ class Packed:
     nominal: Any
 
 
-def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv: int) -> tuple[tuple, Packed]:
+def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: mujoco.MjModel) -> tuple[tuple, Packed]:
     """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
 
     Args:
       channels: (n,) CHANNEL.
       log: (K + 1, n) LOG, written at samples.
-      nq, nv: sizes of qpos and qvel.
+      mechanism: the compiled model.
 
     `channels` and `log` must outlive the run, too.
     """
@@ -204,7 +205,10 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
 
     signals = np.array(
         [
-            state.as_tuple(state.SIGNAL, {"function": placed(one), "stream": s.stream(i), "cartesian": d.cartesian})
+            state.as_tuple(
+                state.SIGNAL,
+                {"function": placed(one), "stream": s.stream(i), "cartesian": d.cartesian} | pushed(d, mechanism),
+            )
             for i, (one, d) in enumerate(zip(disturbances, s.disturbance, strict=True))
         ],
         state.SIGNAL,
@@ -227,8 +231,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
     values |= {
         "n": n,
         "driven": int(np.sum(channels["ctrl"] >= 0)),
-        "nq": nq,
-        "nv": nv,
+        "nq": mechanism.nq,
+        "nv": mechanism.nv,
         "samples": len(log),
         "signal_count": len(signals),
         "steps": s.steps,
@@ -265,6 +269,13 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, nq: int, nv:
         "u": at + 16 + 24 * n,
     }
     return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, **tables, nominal=own)
+
+
+def pushed(disturbance: Signal, mechanism: mujoco.MjModel) -> dict[str, Any]:
+    """Return the fields of a SIGNAL that say where a disturbance pushes."""
+    if not isinstance(disturbance, Push):
+        return {"body": -1, "peak": (0.0, 0.0, 0.0)}
+    return {"body": 6 * mechanism.body(disturbance.body).id, "peak": (disturbance.x, disturbance.y, disturbance.z)}
 
 
 def joint_gains(law: Component, n: int) -> list[float]:

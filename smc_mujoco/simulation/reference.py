@@ -26,7 +26,7 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import PerChannel, Signal
+from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
@@ -246,8 +246,11 @@ class Loop:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
         xfrc, at = data.xfrc_applied.ravel(), self.channels
         xfrc[at["xfrc"]] = xfrc[at["push"]] = 0.0
+        self.push(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
         for signal, memory, stream in zip(self.scenario.disturbance, self.signal_memory, self.streams, strict=True):
+            if isinstance(signal, Push):
+                continue
             if signal.random:
                 d = [evaluate(signal, t, own, self.scenario.seed, i, stream)[0] for i, own in enumerate(memory)]
             else:
@@ -264,6 +267,14 @@ class Loop:
         if not np.isfinite(d).all():
             raise Failure("the disturbance became NaN or inf")
         return d
+
+    def push(self, data: mujoco.MjData, t: float) -> None:
+        """Apply the disturbances that push one body each, at time t, s."""
+        pushes = [one for one in self.scenario.disturbance if isinstance(one, Push)]
+        bodies = [self.model.body(one.body).id for one in pushes]
+        data.xfrc_applied[bodies, :3] = 0.0
+        for body, one in zip(bodies, pushes, strict=True):
+            data.xfrc_applied[body, :3] += evaluate(one, t)[0] * np.array([one.x, one.y, one.z])
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""

@@ -16,7 +16,7 @@ from typing import Any, TypeVar, dataclass_transform
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, shown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import written
@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Signal
+from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Push, Signal
 
 MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -422,7 +422,9 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {least:.3g} s or more")
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
-    if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian]):
+    for push in [d for d in s.disturbance if isinstance(d, Push)]:
+        find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
+    if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]):
         raise ScenarioError(
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
             "joints: give another signal"
@@ -435,6 +437,13 @@ def check_signals(s: Resolved) -> None:
     if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random):
         kind = "noise" if s.feedforward.random else "a force on a body"
         raise ScenarioError(f"feedforward is {type(s.feedforward).__name__}, which is {kind}: give a known signal of u")
+
+
+@functools.lru_cache(maxsize=32)
+def bodies(plant: Plant) -> tuple[str, ...]:
+    """Return the names of a plant's bodies."""
+    model = compiled(plant.spec())
+    return tuple(name for i in range(1, model.nbody) if (name := model.body(i).name))
 
 
 def check_law(s: Resolved) -> None:

@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.simulation import philox
 
@@ -37,7 +37,8 @@ class Signal:
       random: whether `value` takes memory, seed, channel and stream.
       series: whether `value` takes data.
       rows: of the data of a series.
-      cartesian: whether it is a horizontal force on the body, N, instead of a force on the joint.
+      cartesian: whether it is a force on a body, N, instead of a force on the joint: a horizontal one on the body of
+        each channel, or that of a `Push`.
       data: the array of a series, (rows, N) float64, C-contiguous.
       value: static method that returns the value and its first and second derivative.
     """
@@ -214,6 +215,46 @@ class Gust(Signal):
         if not 0.0 <= part <= 1.0:
             return 0.0, 0.0, 0.0
         return p.amplitude / 2.0 * (1.0 - math.cos(2.0 * math.pi * part)), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Push(Signal):
+    """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on the arm.
+
+    (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0: of impulse 2 width / pi times the peak.
+    A trace's d, the disturbances of the joints, does not show it.
+
+    Attributes:
+      body: its name in the model.
+      x, y, z: the peak in the axes of the world, N.
+      time, width: s.
+    """
+
+    body: str
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    time: float = 1.0
+    width: float = 0.05
+
+    cartesian = True
+    positive = ("width",)
+
+    def __post_init__(self):
+        if not isinstance(self.body, str):
+            raise ScenarioError(f"Push's body is {shown(self.body)}: give the name of a body")
+        super().__post_init__()
+
+    def parameters(self) -> dict[str, float]:
+        """Return parameter name -> value."""
+        return {name: getattr(self, name) for name in ("x", "y", "z", "time", "width")}
+
+    @staticmethod
+    def value(t, p):
+        part = (t - p.time) / p.width
+        if not 0.0 <= part <= 1.0:
+            return 0.0, 0.0, 0.0
+        return math.sin(math.pi * part), 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -41,8 +41,11 @@ LOG = floats(LOGGED)
 # A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
 FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
 # A disturbance: its stream of random numbers (0: none, and then the same in every channel), and whether it is a
-# horizontal force on the body instead of a force on the joint.
-SIGNAL = np.dtype([("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8")], align=True)
+# horizontal force on the body instead of a force on the joint. A `Push` has the index of its body's force in
+# xfrc_applied, else -1, and its peak.
+SIGNAL = np.dtype(
+    [("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("body", "i8"), ("peak", "f8", (3,))], align=True
+)
 
 SIMULATION = np.dtype(
     [

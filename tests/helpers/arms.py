@@ -8,13 +8,13 @@ ARM = """
 <mujoco model="arm">
   <default><geom type="capsule" size="0.03" contype="0" conaffinity="0"/></default>
   <worldbody>
-    <body pos="0 0 1">
+    <body name="upper" pos="0 0 1">
       <joint name="turn" axis="0 0 1" damping="0.1" armature="0.02"/>
       <geom fromto="0 0 0 0 0 0.2" mass="1.5"/>
       <body pos="0 0 0.2">
         <joint name="lift" axis="0 1 0" stiffness="2" springref="0.2"/>
         <geom fromto="0 0 0 0.4 0 0" mass="0.8"/>
-        <body pos="0.4 0 0">
+        <body name="hand" pos="0.4 0 0">
           <joint name="reach" type="slide" axis="1 0 0" damping="0.3"/>
           <geom fromto="0 0 0 0.2 0 0" mass="0.5"/>
           <site name="tip" pos="0.2 0 0.05"/>

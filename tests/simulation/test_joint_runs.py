@@ -43,6 +43,12 @@ def cases(arm):
         if name != "hybrid_sliding":  # which needs a tip
             yield smc.Scenario(plant="double_pendulum", law=name, **common)
     yield smc.Scenario(plant=arm, law=curious(k=[10.0, 20.0, 30.0]), u_max=20.0, **common | loaded)
+    pushes = (
+        smc.Push("upper", x=3.0, z=-5.0, time=0.01, width=0.02),
+        smc.Push("hand", y=2.0, time=0.02),
+        smc.Sine(0.2, 9.0),
+    )
+    yield smc.Scenario(plant=arm, law=curious, disturbance=pushes, **common)
     yield smc.Scenario(plant=arm, law=curious, model="none", **common)
     yield smc.Scenario(plant="pendulum_network", law=curious, control_period=2e-3, **common)
     yield smc.Scenario(plant="servo_axis", law=curious, **common)
@@ -180,6 +186,19 @@ def tipped(y, gains, memory):
 def beyond(y, gains, memory):
     memory[len(y.e), 0] = 1.0
     return -y.e, y.e
+
+
+def test_a_push_gives_its_impulse_to_its_body():
+    """A sphere that swings freely, without gravity: l F dt of angular momentum, F dt = 2 width peak / pi."""
+    text = """<mujoco><option gravity="0 0 0"/><worldbody><body name="bob"><joint name="a" axis="0 1 0"/>
+      <geom type="sphere" size="0.01" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
+    plant = smc.plant_from(text, channels={"a": {"motor": True}}, name="bob")
+    push = smc.Push("bob", x=-30.0, y=9.0, time=0.1, width=0.02)
+    trace = smc.run(smc.Scenario(plant=plant, law="none", disturbance=push, duration=0.2))
+    assert np.abs(trace.v[trace.t < 0.1]).max() == 0.0
+    assert trace.v[-1, 0] == pytest.approx(30.0 * 0.02 * 2 / math.pi / 2.0, rel=1e-3)
+    with pytest.raises(smc.ScenarioError, match="unknown body of bob in a Push 'bub': did you mean 'bob'"):
+        smc.Scenario(plant=plant, law="none", disturbance=smc.Push("bub"))
 
 
 @pytest.mark.parametrize(
