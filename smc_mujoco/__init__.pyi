@@ -35,6 +35,7 @@ from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import clip as clip
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.film.film import still as still
+from smc_mujoco.draw.live.build import live as live
 from smc_mujoco.draw.notebook import frames as frames
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.envs import dm_control_env, gymnasium_env, vector_env

@@ -1,12 +1,10 @@
 """Laws, surfaces and velocity estimators in the terminal: a line for each, or a page about one.
 
-Everything comes from the templates and their docstrings. A docstring begins with `Name: formula`, continues with
-sentences on what is known, and ends with `Source: ...`.
+Everything comes from the templates and their docstrings, see `smc_mujoco.control.docstring`.
 """
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 from rich.console import Console
 from rich.padding import Padding
@@ -16,6 +14,7 @@ from rich.text import Text
 from smc_mujoco.cli.tables import plain, titled, with_package
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
+from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.joint_law import catalogue as joint_laws
 from smc_mujoco.control.law import Measurement
@@ -24,9 +23,6 @@ from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import Plant
 
-SOURCE = re.compile(r"(?<![\w.])Sources?: ")
-SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
-DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled)", re.I)
 INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
@@ -38,16 +34,6 @@ CALLS = {
 }
 
 
-class Entry(NamedTuple):
-    """The parts of a docstring: name in words, formula, sentences on discretisation, other sentences, source."""
-
-    title: str
-    formula: str
-    discretisation: str
-    known: str
-    source: str
-
-
 def catalogue() -> dict[str, list[tuple[Template, str]]]:
     """Return name -> the law, the surface and the velocity estimator of that name, each with its package."""
     by_name: dict[str, list[tuple[Template, str]]] = {}
@@ -55,25 +41,6 @@ def catalogue() -> dict[str, list[tuple[Template, str]]]:
         for name, template in templates().items():
             by_name.setdefault(name, []).append((template, templates().package(name)))
     return by_name
-
-
-def entry(template: Template) -> Entry:
-    """Return the parts of a template's docstring."""
-    text, *source = SOURCE.split(template.doc, maxsplit=1)
-    first, *paragraphs = (" ".join(p.split()) for p in text.strip().split("\n\n"))
-    head, *more = SENTENCE.split(first, maxsplit=1)
-    if head.endswith(":") and paragraphs:
-        head += " " + paragraphs.pop(0)
-    title, colon, formula = head.removesuffix(".").partition(": ")
-    sentences = [s for p in (*more, *paragraphs) for s in SENTENCE.split(p) if s]
-    discrete = [s for s in sentences if DISCRETE.search(s)]
-    return Entry(
-        title=title if colon else "",
-        formula=formula if colon else title,
-        discretisation=" ".join(discrete),
-        known=" ".join(s for s in sentences if s not in discrete),
-        source=" ".join("".join(source).split()),
-    )
 
 
 def brief(source: str) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, c, catalogue, rigs, runs, studies
+from smc_mujoco.cli.commands import analysis, c, catalogue, live, rigs, runs, studies
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
@@ -37,6 +37,7 @@ COMMANDS = {
     "papers": studies.papers,
     "report": studies.report,
     "view": runs.view,
+    "live": live.live,
     "check-c": c.check_c,
     "export-c": c.export_c,
 }

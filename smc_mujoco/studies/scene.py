@@ -161,7 +161,7 @@ def read(path: Path) -> Scene:
     if getattr(main, "__file__", None) and Path(str(main.__file__)).resolve() == path.resolve():
         scene = vars(main).get("scene")  # it is running already, as a script
     else:
-        scene = _execute(path).get("scene")
+        scene = execute(path).get("scene")
     if not isinstance(scene, Scene):
         raise ScenarioError(f"{path} declares no scene: write `scene = smc.Scene(title=..., conditions=...)`")
     return scene
@@ -172,8 +172,12 @@ def question(path: Path) -> str:
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
 
 
-def _execute(path: Path) -> dict:
-    """Return what a scene file defines. It can import modules beside it, as a script can."""
+def execute(path: Path) -> dict:
+    """Return what a user's script defines. It can import modules beside it.
+
+    Raises:
+      ScenarioError: the script raises anything.
+    """
     sys.path.insert(0, str(path.resolve().parent))
     try:
         return runpy.run_path(str(path))

@@ -115,6 +115,32 @@ def law(text: str) -> "str | Law":
     return find("law", ast.unparse(call.func), catalogue())(**gains)
 
 
+def laws_of(text: str) -> "list[Law]":
+    """Return the laws of a Python file, made by @smc.law_function; or the one law that another text means, see `law`.
+
+    Raises:
+      ScenarioError: there is no such file, it fails, or there is no law in it.
+    """
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.control.component import Template
+    from smc_mujoco.control.law import known_laws
+    from smc_mujoco.control.law import law as find
+
+    if not text.endswith(".py"):
+        found = law(text)
+        return [find(found) if isinstance(found, str) else found]
+    from smc_mujoco.studies.scene import execute
+
+    if not Path(text).is_file():
+        raise ScenarioError(f"no file {text!r}: give a Python file with a law in it")
+    values = execute(Path(text)).values()
+    own = {value.name: value() for value in values if isinstance(value, Template) and value.kind == "law"}
+    own = {name: made for name, made in own.items() if made.template is not known_laws().get(name)}
+    if not own:
+        raise ScenarioError(f"{text} has no law: write @smc.law_function above a function (y, gains, memory)")
+    return list(own.values())
+
+
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
     """Return the source of the laws' gains in words: a set, unless every law is given with its own gains."""
     return f"gains {gains!r}" if any(isinstance(one, str) for one in laws) else "gains as given"

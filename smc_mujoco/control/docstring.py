@@ -1,0 +1,42 @@
+"""The docstring of a law, surface or velocity estimator, in parts.
+
+It begins with `Name: formula`, continues with sentences on what is known, and ends with `Source: ...`.
+"""
+
+import re
+from typing import NamedTuple
+
+from smc_mujoco.control.component import Template
+
+SOURCE = re.compile(r"(?<![\w.])Sources?: ")
+SENTENCE = re.compile(r"(?<=\.)(?<!\b[A-Z]\.)\s+(?=[A-Z`|])")  # not after an author's initial
+DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled)", re.I)
+
+
+class Entry(NamedTuple):
+    """The parts of a docstring: name in words, formula, sentences on discretisation, other sentences, source."""
+
+    title: str
+    formula: str
+    discretisation: str
+    known: str
+    source: str
+
+
+def entry(template: Template) -> Entry:
+    """Return the parts of a template's docstring."""
+    text, *source = SOURCE.split(template.doc, maxsplit=1)
+    first, *paragraphs = (" ".join(p.split()) for p in text.strip().split("\n\n"))
+    head, *more = SENTENCE.split(first, maxsplit=1)
+    if head.endswith(":") and paragraphs:
+        head += " " + paragraphs.pop(0)
+    title, colon, formula = head.removesuffix(".").partition(": ")
+    sentences = [s for p in (*more, *paragraphs) for s in SENTENCE.split(p) if s]
+    discrete = [s for s in sentences if DISCRETE.search(s)]
+    return Entry(
+        title=title if colon else "",
+        formula=formula if colon else title,
+        discretisation=" ".join(discrete),
+        known=" ".join(s for s in sentences if s not in discrete),
+        source=" ".join("".join(source).split()),
+    )

@@ -1,0 +1,254 @@
+"""What the live page knows of plants and laws, as data for facts.json.
+
+Labels, formulas, colours, gains and their ranges come from the catalogues; the numbers of a model from the plant. The
+page loads the plant's MJCF and sets the same fields of the model as a run does.
+"""
+
+import contextlib
+import inspect
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.version import __version__
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.docstring import entry
+from smc_mujoco.control.law import fits, laws
+from smc_mujoco.control.properties import reads
+from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
+from smc_mujoco.mechanisms.plant import Field, Plant, array, as_plant, catalogue, model_path
+from smc_mujoco.simulation import scenario as defaults
+from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
+
+MODEL = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
+AROUND = 10.0  # factor on either side of a gain whose range tuning does not know: chosen
+START = ("observer_free", "classical")  # the laws that the page opens with: the paper's, and the first of all
+
+
+def plants() -> list[str]:
+    """List the plants that the page can have: one motor, a model that is one file, and no dry friction of its own."""
+    return [name for name, plant in catalogue().items() if _why_not(plant) == ""]
+
+
+def _why_not(plant: Plant) -> str:
+    """Return why the page cannot have a plant, or ""."""
+    if plant.driven != 1:
+        return f"has {plant.driven} motors"
+    if not plant.smooth:
+        return "has dry friction in its equation"
+    if plant.name not in catalogue() or not _mjcf(plant).is_file():
+        return "is not one MJCF file of the package"
+    return ""
+
+
+def checked(names: Sequence[str | Plant]) -> list[Plant]:
+    """Return the plants of these names.
+
+    Raises:
+      ScenarioError: there is no such plant, or the page cannot have it.
+    """
+    found = [as_plant(name) for name in dict.fromkeys(names)]
+    for plant in found:
+        if why := _why_not(plant):
+            known = ", ".join(plants())
+            raise ScenarioError(f"the live page cannot show {plant.name}, which {why}: choose from {known}")
+    return found
+
+
+def facts(chosen: Sequence[Plant], own: Sequence[Component]) -> dict[str, Any]:
+    """Return what the page knows of these plants, of the library's laws for them, and of the user's own laws."""
+    library = {name: law for plant in chosen for name in laws(plant) if (law := _library_law(name)) is not None}
+    known = library | {law.name: law for law in own}
+    suited = {plant.name: [law for law in known.values() if _suits(law, plant)] for plant in chosen}
+    return {
+        "version": __version__,
+        "includes": {name: model_path(name).read_text(encoding="utf-8") for name in _included(chosen)},
+        "noise": {"position": SENSOR_NOISE.position, "velocity": SENSOR_NOISE.velocity},
+        "max_step": defaults.MAX_STEP,
+        "realistic_step": defaults.REALISTIC_STEP,
+        "control_period": defaults.Scenario.control_period,
+        "own": [law.name for law in own],
+        "plants": {plant.name: _plant(plant, suited[plant.name], own) for plant in chosen},
+        "laws": {name: _law(law) for name, law in known.items()},
+    }
+
+
+def _library_law(name: str) -> Component | None:
+    """Return a law of the library with its defaults; None for the one whose numbers have 32 bits."""
+    return None if name == "observer_free_single" else gain_sets.find_law(name)
+
+
+def _suits(law: Component, plant: Plant) -> bool:
+    """Return whether the page offers a law on a plant."""
+    return law.name in laws(plant) if law.name in laws() else fits(law, plant)
+
+
+def _law(law: Component) -> dict[str, Any]:
+    """Return the facts about a law."""
+    template = law.template
+    parts = entry(template) if template is not None and template.doc else None
+    reading = template is None or bool(reads(template) & MODEL)
+    return {
+        "label": style.law_name(law),
+        "colour": style.law_colour(law),
+        "colour_dark": _lighter(style.law_colour(law)),
+        "formula": parts.formula if parts and parts.formula != law.name else "",
+        "source": parts.source if parts else "",
+        "family": template.family if template is not None else "",
+        "order": list(law.gains),
+        "gains": dict(law.gains),
+        "memory": law.memory,
+        "requires_model": law.requires_model,
+        "model_optional": reading and not law.requires_model,
+        "reads_model": reading,
+    }
+
+
+def _plant(plant: Plant, offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
+    """Return the facts about a plant, with the gains of the laws that are offered on it, the user's own first."""
+    model = mujoco.MjModel.from_xml_path(str(_mjcf(plant)))
+    joints = [model.joint(int(joint)) for joint in joint_ids(model)]
+    resolved = defaults.Scenario(plant=plant, law="none").resolved
+    gains = {law.name: _gains(law, plant, law in own) for law in offered}
+    return {
+        "label": style.plant_name(plant),
+        "equation": _equation(plant),
+        "mjcf": _mjcf(plant).read_text(encoding="utf-8"),
+        "x0": list(resolved.x0),
+        "u_max": resolved.limits[0],
+        "effort": plant.efforts[0],
+        "channels": [
+            {"name": joint.name, "qpos": int(joint.qposadr[0]), "dof": int(joint.dofadr[0]), "unit": unit}
+            for joint, unit in zip(joints, plant.units, strict=True)
+        ],
+        "ctrl": int(drive_ids(model)[0]),
+        "smooth": plant.smooth,
+        "fields": _fields(model, plant),
+        "friction": [_part(model, field) for field in Coulomb(1.0).fields(model)],
+        "laws": list(gains),
+        "gains": {name: values for name, (values, _) in gains.items()},
+        "ranges": {name: ranges for name, (_, ranges) in gains.items()},
+        "start": _opening([law.name for law in own if law.name in gains], list(gains)),
+        "started": max(range(plant.n), key=lambda i: abs(resolved.x0[i])),
+        "beside": abs(plant.lane[0]) > abs(plant.lane[1]),
+        "conditions": _conditions(plant, resolved),
+    }
+
+
+def _opening(own: Sequence[str], offered: Sequence[str]) -> list[str]:
+    """Return the laws that the page opens with: the user's own, then START, or whatever there is; at most two."""
+    found = dict.fromkeys([*own, *(name for name in START if name in offered)])
+    return list(found or dict.fromkeys(name for name in offered if name != "none"))[:2]
+
+
+def _mjcf(plant: Plant) -> Path:
+    return model_path(f"{plant.name}.xml")
+
+
+def _included(chosen: Sequence[Plant]) -> list[str]:
+    """Return the files that the plants' models include, relative to models/."""
+    texts = [_mjcf(plant).read_text(encoding="utf-8") for plant in chosen]
+    return sorted({name for text in texts for name in re.findall(r'<include file="([^"]+)"', text)})
+
+
+def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
+    """Return the conditions that have a slider: name, label, unit, range, value. The ranges are chosen."""
+    started = max(range(plant.n), key=lambda i: abs(s.x0[i]))
+    reach, bound, unit, effort = abs(s.x0[started]), s.limits[0], plant.units[started], plant.efforts[0]
+    far = min(2.0 * reach, defaults.MAX_ANGLE if unit == "rad" else math.inf)
+    noisy = f"× {SENSOR_NOISE.position:g} {plant.units[0]}, {SENSOR_NOISE.velocity:g} {plant.units[0]}/s"
+    begins = "Start, x at t = 0" if started == 0 else "Start of the free joint"
+    rows = [
+        ("start", begins, unit, -far, far, s.x0[started], 0.01),
+        ("reference", "Reference r", plant.units[0], -reach, reach, 0.0, 0.01),
+        ("bound", "Bound on u", effort, bound / 20, 3.0 * bound, bound, None),
+        ("mass", "Mass of the plant", "×", 0.5, 3.0, 1.0, 0.05),
+        ("friction", "Dry friction in each joint", effort, 0.0, 0.2 * bound, 0.0, bound / 200),
+        ("delay", "Delay of u", "ms", 0.0, 50.0, 0.0, 1.0),
+        ("period", "Control period", "ms", 1.0, 50.0, 1.0, 1.0),
+        ("noise", f"Measurement noise ({noisy})", "×", 0.0, 3.0, 0.0, 0.1),
+        ("amplitude", "Disturbance, amplitude of a sine", effort, 0.0, bound, 0.0, bound / 100),
+        ("omega", "Disturbance, frequency", "rad/s", 0.5, 30.0, SINE.omega, 0.5),
+    ]
+    names = ("name", "label", "unit", "least", "most", "value", "step")
+    return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def _lighter(colour: str) -> str:
+    """Return a law's colour for a dark page, as in the report: 65 % of it, the rest white."""
+    return "#" + "".join(f"{round(0.65 * part + 0.35 * 255):02X}" for part in style.rgb(colour))
+
+
+def _equation(plant: Plant) -> str:
+    """Return the plant's equation: what follows the colon in the first line of its file's docstring."""
+    lines = (inspect.getmodule(plant.build).__doc__ or "").splitlines()  # pyright: ignore[reportOptionalMemberAccess]
+    first = lines[0].partition(": ")[2]
+    return first.partition(", x the")[0].partition("  (")[0].rstrip(".") if "=" in first else ""
+
+
+def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]:
+    """Return field -> its flat values with the plant's parameters, and those with twice its mass.
+
+    All fields are linear in the mass, so that the page can take any factor on it.
+    """
+    found: dict[str, list[list[float]]] = {}
+    for factor in (1.0, 2.0):
+        for name, values in _written(model, plant, factor).items():
+            found.setdefault(name, []).append(values.ravel().tolist())
+    return found
+
+
+def _written(model: mujoco.MjModel, plant: Plant, factor: float) -> dict[str, np.ndarray]:
+    """Return field -> its values with a factor on the plant's mass."""
+    found: dict[str, np.ndarray] = {}
+    for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
+        values = found.setdefault(name, array(model, name).astype(float).copy())
+        values[at] = values[at] + value if adds else value
+    return found
+
+
+def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
+    """Return a part's write into a field, by places in the flat field."""
+    values = array(model, field.name)
+    places = np.arange(values.size).reshape(values.shape)[field.at]
+    return {
+        "name": field.name,
+        "at": places.ravel().tolist(),
+        "value": np.broadcast_to(field.value, places.shape).ravel().tolist(),
+        "adds": field.adds,
+    }
+
+
+def _gains(law: Component, plant: Plant, own: bool) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Return a law's gains on a plant, those of the library's laws tuned if they can be, and the sliders' ranges."""
+    values = dict(law.gains)
+    if not own:
+        with contextlib.suppress(ScenarioError):
+            values = dict(gain_sets.law(plant, law.name).gains)
+    try:
+        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=law.requires_model)
+        known: Mapping[str, tuple[float, float]] = search_space.box(law, scales)
+    except ScenarioError:
+        known = {}
+    ranges = {}
+    for name, value in values.items():
+        if name in known:
+            ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
+        elif 0.0 < value < float("inf") and _free(law, name):
+            ranges[name] = [value / AROUND, value * AROUND]
+    return values, ranges
+
+
+def _free(law: Component, name: str) -> bool:
+    """Return whether a gain is one to choose, and not an initial value, an exponent or the like."""
+    return law.template is None or not law.template.gains[name].held

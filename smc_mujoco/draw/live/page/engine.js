@@ -1,0 +1,274 @@
+// One simulation of a plant under a law: the scenario of smc_mujoco, with MuJoCo's WebAssembly build.
+//
+// It does what the package's control callback does, in the same order. At each control sample
+//     state -> noise -> law -> saturation -> delay buffer
+// and at each physics step the command whose delay has passed goes to the actuator and is held. Time counts in steps.
+// Nothing here knows the page, so that node runs it as well.
+
+const MAX_STATE = 1e6; // SI units: a run beyond it has diverged
+const LAST_STAGE = 1 - 1e-8; // of a step: where the last stage of RK4 evaluates signals
+const MAX_CONTROL = 1e10;
+
+// Return the scenario for what the reader has chosen; `facts` are the numbers that the package wrote.
+export function scenario(facts, chosen) {
+  const plant = facts.plants[chosen.plant];
+  const law = facts.laws[chosen.law];
+  const given = Object.fromEntries(Object.entries(chosen).filter(([, value]) => value !== undefined));
+  const s = {
+    x0: plant.x0, reference: 0, u_max: plant.u_max, control_period: facts.control_period, input_delay: 0, friction: 0,
+    mass: 1, seed: 0, noise: { position: 0, velocity: 0 }, disturbance: { amplitude: 0, omega: 5 },
+    model: law.requires_model ? "nominal" : "none",
+    ...given,
+    gains: { ...law.gains, ...plant.gains[chosen.law], ...chosen.gains },
+  };
+  s.realistic = s.friction > 0 || !plant.smooth;
+  const largest = s.realistic ? facts.realistic_step : facts.max_step;
+  s.steps = Math.ceil(s.control_period / largest - 1e-9);
+  s.physics_step = s.control_period / s.steps;
+  s.delay_steps = Math.round(s.input_delay / s.physics_step);
+  return s;
+}
+
+export class Simulation {
+  // mujoco: the module. vfs: an MjVFS with the files that models include. laws: name -> function.
+  constructor(mujoco, vfs, facts, laws, chosen) {
+    this.mujoco = mujoco;
+    this.facts = facts;
+    this.chosen = chosen;
+    this.s = scenario(facts, chosen);
+    this.plant = facts.plants[chosen.plant];
+    this.lawFacts = facts.laws[chosen.law];
+    this.law = laws[chosen.law];
+    this.model = this.compile(vfs, true);
+    this.data = new mujoco.MjData(this.model);
+    // what a law may know: the nominal mechanism, without friction and with the nominal mass
+    this.nominal = this.lawFacts.reads_model ? this.compile(vfs, false) : null;
+    this.nominalData = this.nominal && new mujoco.MjData(this.nominal);
+    this.reset();
+  }
+
+  // Free the memory of MuJoCo's objects.
+  delete() {
+    for (const each of [this.data, this.model, this.nominalData, this.nominal]) each?.delete();
+  }
+
+  compile(vfs, mechanism) {
+    const { mujoco, plant, s } = this;
+    const model = mujoco.MjModel.from_xml_string(plant.mjcf, vfs);
+    const array = (name) => (name.startsWith("opt.") ? model.opt[name.slice(4)] : model[name]);
+    const mass = mechanism ? s.mass : 1;
+    for (const [name, [values, more]] of Object.entries(plant.fields)) {
+      array(name).set(values.map((value, i) => value + (mass - 1) * (more[i] - value)));
+    }
+    if (mechanism && s.friction > 0) {
+      for (const { name, at, value, adds } of plant.friction) {
+        const values = array(name);
+        at.forEach((i, k) => (values[i] = adds ? values[i] + s.friction * value[k] : value[k]));
+      }
+    }
+    const integrators = mujoco.mjtIntegrator;
+    model.opt.timestep = s.physics_step;
+    model.opt.integrator = (s.realistic ? integrators.mjINT_IMPLICITFAST : integrators.mjINT_RK4).value;
+    const scratch = new mujoco.MjData(model);
+    mujoco.mj_setConst(model, scratch);
+    scratch.delete();
+    return model;
+  }
+
+  // Go back to the initial state.
+  reset() {
+    const { mujoco, plant, s, lawFacts } = this;
+    mujoco.mj_resetData(this.model, this.data);
+    plant.channels.forEach((channel, i) => (this.data.qpos[channel.qpos] = s.x0[i]));
+    mujoco.mj_forward(this.model, this.data);
+    this.step = 0; // physics steps done
+    this.failed = null; // why and when, once it has
+    this.push = new Float64Array(this.model.nv); // generalised force of the reader's hand
+    this.memory = new Float64Array(lawFacts.memory);
+    this.gains = lawFacts.order.map((name) => s.gains[name]);
+    this.commands = new Float64Array(Math.floor(s.delay_steps / s.steps) + 2); // a ring
+    this.y = {};
+    this.out = [0, 0];
+    this.latest = { t: 0, x: [...s.x0], v: plant.channels.map(() => 0), u: 0, s: 0, r: s.reference, d: 0 };
+    this.views = null;
+  }
+
+  // Go on from the state of another simulation of the same plant and law.
+  resume(other) {
+    this.data.qpos.set(other.data.qpos);
+    this.data.qvel.set(other.data.qvel);
+    this.mujoco.mj_forward(this.model, this.data);
+    this.step = Math.round(other.time / this.s.control_period) * this.s.steps;
+    this.memory.set(other.memory);
+    this.commands.fill(other.latest.u);
+    this.push.set(other.push);
+    this.latest = other.latest;
+    this.failed = other.failed;
+  }
+
+  // Change the gains of a running law.
+  setGains(gains) {
+    this.s.gains = { ...this.s.gains, ...gains };
+    this.gains = this.lawFacts.order.map((name) => this.s.gains[name]);
+  }
+
+  get time() {
+    const k = Math.floor(this.step / this.s.steps);
+    return k * this.s.control_period + (this.step % this.s.steps) * this.s.physics_step;
+  }
+
+  // MuJoCo's arrays. They are views of its memory, and void when that grows.
+  get arrays() {
+    if (!this.views || this.views.qpos.length === 0) {
+      const { qpos, qvel, qacc, ctrl, qfrc_applied } = this.data;
+      this.views = { qpos, qvel, qacc, ctrl, qfrc_applied };
+      if (this.nominalData) {
+        const { qpos, qvel, qacc, ctrl } = this.nominalData;
+        this.views.nominal = { qpos, qvel, qacc, ctrl };
+      }
+    }
+    return this.views;
+  }
+
+  // Do one physics step. Return the sample that was taken at its start, if one was, else null.
+  advance() {
+    if (this.failed) return null;
+    const { s, plant } = this;
+    const { qpos, qvel, ctrl } = this.arrays;
+    const sampled = this.step % s.steps === 0;
+    if (![...qpos, ...qvel].every((value) => Math.abs(value) < MAX_STATE)) return this.fail("diverged");
+    if (sampled && !this.sample(this.step / s.steps)) return this.fail("law is not finite");
+    const past = this.step - s.delay_steps;
+    if (past >= 0 && past % s.steps === 0) ctrl[plant.ctrl] = this.commands[(past / s.steps) % this.commands.length];
+    this.latest.d = this.disturb(0);
+    if (s.disturbance.amplitude !== 0 && !s.realistic) this.rungeKutta();
+    else this.mujoco.mj_step(this.model, this.data);
+    this.step += 1;
+    return sampled ? this.latest : null;
+  }
+
+  fail(why) {
+    this.failed = { why, time: this.time };
+    return null;
+  }
+
+  // Measure, and compute the command of sample k. Return whether it is finite.
+  sample(k) {
+    const { s, plant, y, out } = this;
+    const { qpos, qvel } = this.arrays;
+    const x = plant.channels.map((channel) => qpos[channel.qpos]);
+    const v = plant.channels.map((channel) => qvel[channel.dof]);
+    const seen = { x: [...x], v: [...v] };
+    if (s.noise.position !== 0 || s.noise.velocity !== 0) {
+      x.forEach((_, i) => {
+        const [first, second] = normals(s.seed, i, k);
+        seen.x[i] += s.noise.position * first;
+        seen.v[i] += s.noise.velocity * second;
+      });
+    }
+    const partner = plant.channels.length > 1; // a joint without actuator, which the driven one moves
+    const [f, g] = this.equation(seen);
+    Object.assign(y, {
+      t: k * s.control_period, dt: s.control_period, x: seen.x[0], v: seen.v[0],
+      e: seen.x[0] - s.reference, de: seen.v[0], r: s.reference, dr: 0, ddr: 0,
+      f: f[0], g: g[0], a: 0, limit: s.u_max, model: s.model === "nominal" ? 1 : 0,
+      has_surface: 0, s: 0, v_eq: 0,
+      q: partner ? seen.x[1] : 0, dq: partner ? seen.v[1] : 0, fq: partner ? f[1] : 0, gq: partner ? g[1] : 0,
+    });
+    this.law(y, this.gains, this.memory, out);
+    const u = Math.min(Math.max(out[0], -s.u_max), s.u_max);
+    this.commands[k % this.commands.length] = u;
+    this.latest = { t: y.t, x, v, u, s: out[1], r: s.reference, d: 0 };
+    return Number.isFinite(out[0]) && Number.isFinite(out[1]) && Math.abs(u) < MAX_CONTROL;
+  }
+
+  // The nominal f and g of x'' = f + g u in each channel: the accelerations without a command, and what one adds.
+  equation(seen) {
+    const { plant } = this;
+    if (!this.nominal) return [plant.channels.map(() => 0), plant.channels.map(() => 1)];
+    const { qpos, qvel, qacc, ctrl } = this.arrays.nominal;
+    const accelerations = (u) => {
+      ctrl[plant.ctrl] = u;
+      this.mujoco.mj_forward(this.nominal, this.nominalData);
+      return plant.channels.map((channel) => qacc[channel.dof]);
+    };
+    plant.channels.forEach((channel, i) => {
+      qpos[channel.qpos] = seen.x[i];
+      qvel[channel.dof] = seen.v[i];
+    });
+    const f = accelerations(0);
+    return [f, accelerations(1).map((value, i) => value - f[i])];
+  }
+
+  // Apply the disturbance at a fraction of the physics step, beside the reader's push. Return it.
+  disturb(fraction) {
+    const { s, plant } = this;
+    const k = Math.floor(this.step / s.steps);
+    const t = k * s.control_period + ((this.step % s.steps) + fraction) * s.physics_step;
+    const d = s.disturbance.amplitude * Math.sin(s.disturbance.omega * t);
+    const force = this.arrays.qfrc_applied;
+    force.set(this.push);
+    force[plant.channels[0].dof] += d;
+    return d;
+  }
+
+  // A step of MuJoCo's RK4 with the disturbance at each stage: mj_step has no callback in a browser.
+  rungeKutta() {
+    const { mujoco, model, data, s } = this;
+    const h = s.physics_step;
+    const { qpos, qvel, qacc } = this.arrays;
+    const start = [qpos.slice(), qvel.slice()];
+    const rates = []; // velocities and accelerations of each stage
+    const moveTo = (weights) => {
+      for (let i = 0; i < qpos.length; i++) {
+        let [dx, dv] = [0, 0];
+        weights.forEach((weight, j) => {
+          dx += weight * rates[j][0][i];
+          dv += weight * rates[j][1][i];
+        });
+        qpos[i] = start[0][i] + h * dx;
+        qvel[i] = start[1][i] + h * dv;
+      }
+    };
+    for (const [fraction, weights] of [[0, []], [0.5, [0.5]], [0.5, [0, 0.5]], [LAST_STAGE, [0, 0, 1]]]) {
+      moveTo(weights);
+      this.disturb(fraction);
+      mujoco.mj_forward(model, data);
+      rates.push([qvel.slice(), qacc.slice()]);
+    }
+    moveTo([1 / 6, 1 / 3, 1 / 3, 1 / 6]);
+  }
+}
+
+// Simulate a scenario of a duration, s. Return {t, u, s, x: [...channels], v: [...]}, an array of samples each.
+export function trace(mujoco, vfs, facts, laws, chosen, duration) {
+  const run = new Simulation(mujoco, vfs, facts, laws, chosen);
+  const samples = Math.floor(duration / run.s.control_period + 1e-6);
+  const found = { t: [], u: [], s: [], d: [], x: run.plant.channels.map(() => []), v: run.plant.channels.map(() => []) };
+  for (let step = 0; step < samples * run.s.steps && !run.failed; step++) {
+    const sample = run.advance();
+    if (sample) {
+      for (const name of ["t", "u", "s", "d"]) found[name].push(sample[name]);
+      for (const name of ["x", "v"]) sample[name].forEach((value, i) => found[name][i].push(value));
+    }
+  }
+  found.failed = run.failed;
+  run.delete();
+  return found;
+}
+
+// Two standard normal numbers: block k of numpy's Philox4x64-10 with key (seed, channel), by Box and Muller.
+export function normals(seed, channel, k) {
+  let [c0, c1, c2, c3] = [BigInt(k), 0n, 0n, 0n];
+  let [key0, key1] = [BigInt(seed), BigInt(channel)];
+  for (let round = 0; round < 10; round++) {
+    const [one, other] = [c0 * 0xd2e7470ee14c6c93n, c2 * 0xca5a826395121157n];
+    [c0, c1, c2, c3] = [(other >> 64n) ^ c1 ^ key0, other & WORD, (one >> 64n) ^ c3 ^ key1, one & WORD];
+    key0 = (key0 + 0x9e3779b97f4a7c15n) & WORD;
+    key1 = (key1 + 0xbb67ae8584caa73bn) & WORD;
+  }
+  const radius = Math.sqrt(-2 * Math.log(Number((c0 >> 11n) + 1n) * 2 ** -53));
+  const angle = 2 * Math.PI * (Number(c1 >> 11n) * 2 ** -53);
+  return [radius * Math.cos(angle), radius * Math.sin(angle)];
+}
+const WORD = (1n << 64n) - 1n;

@@ -1,0 +1,354 @@
+// The machines: MuJoCo's geoms drawn by three.js, a part of one canvas for each simulation.
+
+import * as THREE from "./vendor/three.module.js";
+
+const [PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX] = [0, 1, 2, 3, 4, 5, 6];
+const POSES = 9; // of a swing, which the picture leaves room for
+const MARGIN = 1.06; // of the picture around the machine
+const SEAM = 2; // px between two machines
+// How the picture is made, from the finest to the fastest: px of the canvas per px of the page, and shadows.
+const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.75, shadows: false }];
+const SLOW = 24; // frames a second, below which the next grade is taken
+const PATIENCE = 1.5; // s
+
+function css(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+// Whether WebGL is computed by the processor, as in a virtual machine without a GPU.
+function software() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const about = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+// The shape of a geom; null for one that is not drawn.
+function shape(model, i) {
+  const [a, b, c] = model.geom_size.subarray(3 * i, 3 * i + 3);
+  const upright = (geometry) => geometry.rotateX(Math.PI / 2); // three's cylinders stand along y
+  switch (model.geom_type[i]) {
+    case SPHERE: return new THREE.SphereGeometry(a, 32, 20);
+    case CAPSULE: return upright(new THREE.CapsuleGeometry(a, 2 * b, 8, 24));
+    case ELLIPSOID: return new THREE.SphereGeometry(1, 32, 20).scale(a, b, c);
+    case CYLINDER: return upright(new THREE.CylinderGeometry(a, a, 2 * b, 40));
+    case BOX: return new THREE.BoxGeometry(2 * a, 2 * b, 2 * c);
+    case HFIELD: return heights(model, model.geom_dataid[i]);
+    default: return null;
+  }
+}
+
+// A height field with walls in front and behind.
+function heights(model, id) {
+  const [rx, ry, top, base] = model.hfield_size.subarray(4 * id, 4 * id + 4);
+  const [rows, columns, first] = [model.hfield_nrow[id], model.hfield_ncol[id], model.hfield_adr[id]];
+  const points = [];
+  const faces = [];
+  const sheet = (row) => { // a grid of corners: row(j) gives y and height of each column
+    const from = points.length / 3;
+    row.forEach(([y, z]) => {
+      for (let k = 0; k < columns; k++) points.push(-rx + (2 * rx * k) / (columns - 1), y, z(k));
+    });
+    for (let j = 0; j + 1 < row.length; j++) {
+      for (let k = 0; k + 1 < columns; k++) {
+        const p = from + j * columns + k;
+        faces.push(p, p + 1, p + columns, p + 1, p + columns + 1, p + columns);
+      }
+    }
+  };
+  const ground = (j) => (k) => top * model.hfield_data[first + j * columns + k];
+  const y = (j) => -ry + (2 * ry * j) / (rows - 1);
+  sheet(Array.from({ length: rows }, (_, j) => [y(j), ground(j)]));
+  for (const j of [0, rows - 1]) sheet([[y(j), () => -base], [y(j), ground(j)]]);
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  geometry.setIndex(faces);
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+// One machine: the scene of a simulation.
+class Machine {
+  constructor(simulation, colour) {
+    this.simulation = simulation;
+    this.scene = new THREE.Scene();
+    this.meshes = [];
+    const { model, mujoco } = simulation;
+    const accent = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL.value, "accent");
+    for (let i = 0; i < model.ngeom; i++) {
+      const material = model.geom_matid[i];
+      const geometry = shape(model, i);
+      const source = material >= 0 ? model.mat_rgba : model.geom_rgba;
+      const at = 4 * (material >= 0 ? material : i);
+      if (!geometry || source[at + 3] === 0) continue;
+      const flat = model.geom_type[i] === HFIELD;
+      const mesh = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({
+        color: material === accent ? colour : new THREE.Color().setRGB(source[at], source[at + 1], source[at + 2], THREE.SRGBColorSpace),
+        shininess: 60, specular: flat ? 0x111111 : 0x333333, side: flat ? THREE.DoubleSide : THREE.FrontSide,
+      }));
+      mesh.castShadow = !flat;
+      mesh.receiveShadow = true;
+      mesh.matrixAutoUpdate = false;
+      mesh.userData = { geom: i, body: model.geom_bodyid[i] };
+      this.scene.add(mesh);
+      this.meshes.push(mesh);
+    }
+    this.moving = this.meshes.filter((mesh) => model.body_weldid[mesh.userData.body] !== 0);
+    this.arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 1, css("--focus"), 0.1, 0.05);
+    this.arrow.visible = false;
+    this.light();
+    this.scene.add(this.arrow);
+    this.place(this.meshes);
+  }
+
+  // The set: floor, grid and lights, in the colours of the page.
+  light() {
+    const { scene } = this;
+    const extent = this.simulation.model.stat.extent;
+    const floor = new THREE.Mesh(new THREE.PlaneGeometry(40, 40), new THREE.MeshLambertMaterial({ color: css("--floor") }));
+    floor.receiveShadow = true;
+    const grid = new THREE.GridHelper(40, 80, css("--floor-line"), css("--floor-line")).rotateX(Math.PI / 2);
+    grid.position.z = 0.0015;
+    const key = new THREE.DirectionalLight(0xffffff, 1.9);
+    const target = new THREE.Vector3(...this.simulation.model.stat.center);
+    key.position.set(-0.35, -0.55, 0.8).multiplyScalar(3 * extent).add(target);
+    key.target.position.copy(target);
+    key.castShadow = true;
+    key.shadow.mapSize.set(1024, 1024);
+    Object.assign(key.shadow.camera, { left: -extent, right: extent, top: extent, bottom: -extent, near: 0.01, far: 8 * extent });
+    key.shadow.bias = -0.0005;
+    const fill = new THREE.DirectionalLight(0xdfe6ff, 0.6);
+    fill.position.set(0.45, -0.8, 0.35);
+    scene.add(floor, grid, key, key.target, fill, new THREE.HemisphereLight(0xffffff, 0xb0b0b8, 1.2));
+    scene.background = new THREE.Color(css("--stage"));
+    scene.fog = new THREE.Fog(css("--stage"), 5 * extent, 12 * extent);
+  }
+
+  // Put meshes where MuJoCo's geoms are.
+  place(meshes = this.moving) {
+    const { geom_xpos: p, geom_xmat: m } = this.simulation.data;
+    for (const mesh of meshes) {
+      const i = mesh.userData.geom;
+      const [a, b] = [3 * i, 9 * i];
+      mesh.matrix.set(
+        m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
+      );
+      mesh.matrixWorldNeedsUpdate = true;
+    }
+  }
+
+  // Where the model's camera sees the machine, at rest and as it swings: bounds of x/z and y/z.
+  bounds(camera) {
+    const { simulation: { mujoco, model, data, plant, s } } = this;
+    const kept = data.qpos.slice();
+    const toCamera = camera.matrixWorld.clone().invert();
+    const seen = { left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity };
+    const corner = new THREE.Vector3();
+    for (let k = 0; k < POSES; k++) {
+      plant.channels.forEach((channel, i) => {
+        const reach = channel.unit === "rad" ? Math.PI : Math.abs(s.x0[i]);
+        data.qpos[channel.qpos] = reach * (-1 + (2 * k) / (POSES - 1));
+      });
+      mujoco.mj_kinematics(model, data);
+      this.place(this.meshes);
+      for (const mesh of k === 0 ? this.meshes : this.moving) {
+        mesh.geometry.computeBoundingBox();
+        const { min, max } = mesh.geometry.boundingBox;
+        for (let c = 0; c < 8; c++) {
+          corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z);
+          corner.applyMatrix4(mesh.matrix).applyMatrix4(toCamera);
+          const [x, y] = [-corner.x / corner.z, -corner.y / corner.z];
+          seen.left = Math.min(seen.left, x);
+          seen.right = Math.max(seen.right, x);
+          seen.bottom = Math.min(seen.bottom, y);
+          seen.top = Math.max(seen.top, y);
+        }
+      }
+    }
+    data.qpos.set(kept);
+    mujoco.mj_kinematics(model, data);
+    this.place(this.meshes);
+    return seen;
+  }
+}
+
+export class Stage {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.slow = software();
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.slow });
+    this.setGrade(this.slow ? 2 : 0);
+    this.renderer.setScissorTest(true);
+    this.camera = new THREE.PerspectiveCamera();
+    this.machines = [];
+    this.ray = new THREE.Raycaster();
+    this.held = null; // what the pointer has grabbed
+  }
+
+  setGrade(grade) {
+    this.grade = grade;
+    this.renderer.shadowMap.enabled = GRADES[grade].shadows;
+    this.since = null; // when the grade's first frame was
+    this.frames = 0;
+    for (const machine of this.machines ?? []) machine.scene.traverse((each) => each.material && (each.material.needsUpdate = true));
+  }
+
+  // Take the next grade if the frames come too slowly; `now` in ms.
+  watch(now) {
+    this.since ??= now;
+    this.frames += 1;
+    const seconds = (now - this.since) / 1000;
+    if (seconds < PATIENCE) return;
+    if (this.frames / seconds < SLOW && this.grade < GRADES.length - 1) this.setGrade(this.grade + 1);
+    [this.since, this.frames] = [now, 0];
+  }
+
+  // Show simulations, with their colours.
+  show(simulations, colours) {
+    for (const machine of this.machines) for (const mesh of machine.meshes) mesh.geometry.dispose();
+    this.machines = simulations.map((simulation, i) => new Machine(simulation, colours[i]));
+    this.beside = simulations[0].plant.beside;
+    const { mujoco, model, data } = simulations[0];
+    const look = Math.max(0, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, "look"));
+    mujoco.mj_forward(model, data);
+    const m = data.cam_xmat.slice(9 * look, 9 * look + 9);
+    const p = data.cam_xpos.slice(3 * look, 3 * look + 3);
+    this.camera.matrixAutoUpdate = false;
+    this.camera.matrix.set(m[0], m[1], m[2], p[0], m[3], m[4], m[5], p[1], m[6], m[7], m[8], p[2], 0, 0, 0, 1);
+    this.camera.updateMatrixWorld(true);
+    this.camera.matrixWorld.copy(this.camera.matrix);
+    this.camera.matrixWorldInverse.copy(this.camera.matrix).invert();
+    this.seen = this.machines[0].bounds(this.camera);
+    this.near = model.stat.extent / 50;
+  }
+
+  // Replace the simulations of the machines.
+  swap(simulations) {
+    this.machines.forEach((machine, i) => (machine.simulation = simulations[i]));
+  }
+
+  // The parts of the canvas, in px from its upper left corner.
+  parts() {
+    const [width, height, n] = [this.canvas.clientWidth, this.canvas.clientHeight, this.machines.length];
+    const seams = SEAM * (n - 1);
+    const [w, h] = this.beside ? [(width - seams) / n, height] : [width, (height - seams) / n];
+    return this.machines.map((_, i) => ({ x: this.beside ? i * (w + SEAM) : 0, y: this.beside ? 0 : i * (h + SEAM), width: w, height: h }));
+  }
+
+  // Choose the camera's opening so that the machine fills a part.
+  open(part) {
+    const { left, right, bottom, top } = this.seen;
+    let [halfX, halfY] = [((right - left) / 2) * MARGIN, ((top - bottom) / 2) * MARGIN];
+    const aspect = part.width / part.height;
+    [halfX, halfY] = [Math.max(halfX, halfY * aspect), Math.max(halfY, halfX / aspect)];
+    const [x, y, near] = [(left + right) / 2, (bottom + top) / 2, this.near];
+    const { camera } = this;
+    camera.projectionMatrix.makePerspective(
+      near * (x - halfX), near * (x + halfX), near * (y + halfY), near * (y - halfY), near, 5000 * near,
+    );
+    camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+  }
+
+  draw() {
+    const { renderer, canvas } = this;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    renderer.setPixelRatio(Math.min(GRADES[this.grade].ratio, window.devicePixelRatio || 1));
+    const size = renderer.getSize(new THREE.Vector2());
+    if (size.x !== width || size.y !== height) renderer.setSize(width, height, false);
+    this.parts().forEach((part, i) => {
+      const machine = this.machines[i];
+      machine.place();
+      this.pointArrow(machine);
+      this.open(part);
+      const bottom = height - part.y - part.height;
+      renderer.setViewport(part.x, bottom, part.width, part.height);
+      renderer.setScissor(part.x, bottom, part.width, part.height);
+      renderer.render(machine.scene, this.camera);
+    });
+  }
+
+  // The ray of a pointer, and the machine that it is over.
+  aim(event) {
+    const box = this.canvas.getBoundingClientRect();
+    const [px, py] = [event.clientX - box.left, event.clientY - box.top];
+    const parts = this.parts();
+    const i = this.held?.index ?? parts.findIndex(({ x, y, width, height }) => px >= x && px < x + width && py >= y && py < y + height);
+    if (i < 0) return null;
+    const part = parts[i];
+    this.open(part);
+    const at = new THREE.Vector2((2 * (px - part.x)) / part.width - 1, 1 - (2 * (py - part.y)) / part.height);
+    this.ray.setFromCamera(at, this.camera);
+    return i;
+  }
+
+  // Where a geom of machine i is on the canvas, px.
+  onScreen(i, name) {
+    const { mujoco, model, data } = this.machines[i].simulation;
+    const geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM.value, name);
+    const part = this.parts()[i];
+    this.open(part);
+    const at = new THREE.Vector3(...data.geom_xpos.subarray(3 * geom, 3 * geom + 3)).project(this.camera);
+    return [part.x + ((at.x + 1) / 2) * part.width, part.y + ((1 - at.y) / 2) * part.height];
+  }
+
+  // Grab the moving body under the pointer. Return whether there is one.
+  grab(event) {
+    const index = this.aim(event);
+    if (index === null) return false;
+    const machine = this.machines[index];
+    const [hit] = this.ray.intersectObjects(machine.moving, false);
+    if (!hit) return false;
+    const mesh = hit.object;
+    const local = hit.point.clone().applyMatrix4(mesh.matrix.clone().invert());
+    this.held = { index, mesh, local, target: hit.point.clone(), depth: hit.point.clone() };
+    return true;
+  }
+
+  drag(event) {
+    if (!this.held || this.aim(event) === null) return;
+    const normal = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 2);
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, this.held.depth);
+    this.ray.ray.intersectPlane(plane, this.held.target);
+  }
+
+  release() {
+    if (this.held) this.machines[this.held.index].arrow.visible = false;
+    this.held = null;
+  }
+
+  // The generalised force with which the pointer pulls each simulation: that of a spring to the grabbed point.
+  pulls() {
+    const forces = this.machines.map(({ simulation }) => new Float64Array(simulation.model.nv));
+    if (!this.held) return forces;
+    const { index, mesh, local, target } = this.held;
+    const { model, data, s } = this.machines[index].simulation;
+    const point = local.clone().applyMatrix4(mesh.matrix);
+    const pull = target.clone().sub(point);
+    const extent = model.stat.extent;
+    pull.multiplyScalar((12 * s.u_max) / extent ** 2 / Math.max(1, (4 * pull.length()) / extent) * Math.min(1, extent));
+    for (let body = mesh.userData.body; body > 0; body = model.body_parentid[body]) {
+      for (let j = model.body_jntadr[body], n = model.body_jntnum[body]; n > 0; j++, n--) {
+        const axis = new THREE.Vector3(...data.xaxis.subarray(3 * j, 3 * j + 3));
+        const arm = point.clone().sub(new THREE.Vector3(...data.xanchor.subarray(3 * j, 3 * j + 3)));
+        const hinge = model.jnt_type[j] === 3;
+        forces[index][model.jnt_dofadr[j]] += hinge ? arm.cross(pull).dot(axis) : pull.dot(axis);
+      }
+    }
+    return forces;
+  }
+
+  pointArrow(machine) {
+    const { arrow } = machine;
+    const held = this.held && this.machines[this.held.index] === machine ? this.held : null;
+    arrow.visible = held !== null;
+    if (!held) return;
+    const from = held.local.clone().applyMatrix4(held.mesh.matrix);
+    const to = held.target.clone().sub(from);
+    const length = Math.max(to.length(), 1e-3);
+    arrow.position.copy(from);
+    arrow.setDirection(to.normalize());
+    const head = Math.min(length / 2, machine.simulation.model.stat.extent / 15);
+    arrow.setLength(length, head, head / 2);
+  }
+}

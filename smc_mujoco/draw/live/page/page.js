@@ -1,0 +1,472 @@
+// The page: what the reader chooses, its simulations, pictures and plots.
+
+import loadMujoco from "./vendor/mujoco.js";
+import { Simulation, trace } from "./engine.js";
+import { laws } from "./laws.js";
+import { Stage } from "./machine.js";
+import { History, overTime, phasePlane } from "./plots.js";
+
+const SECONDS = 10; // of the plots
+const SLOWEST = 0.1; // s: a frame that took longer slows the simulation down instead
+const GRADES = 1000; // of a slider
+const WORDS = { NaN, Infinity, "-Infinity": -Infinity };
+const SIDES = ["a", "b"];
+
+const $ = (id) => document.getElementById(id);
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+let facts, mujoco, vfs, stage;
+// What the reader has chosen: {plant, a: {law, gains, model}, b: {...}, and a number for each condition}
+let chosen;
+let running = [];
+let playing = true;
+let pressed = 0; // of the arrow keys: -1, 0 or 1
+let owed = 0; // s of simulated time
+
+const plantFacts = () => facts.plants[chosen.plant];
+const sides = () => SIDES.filter((side) => chosen[side].law);
+
+// ---- what is chosen, as an address and as a scenario
+
+function opening(plant) {
+  const { start, conditions } = facts.plants[plant];
+  const numbers = Object.fromEntries(conditions.map(({ name, value }) => [name, value]));
+  return { plant, ...numbers, a: { law: start[0], gains: {} }, b: { law: start[1] ?? "", gains: {} } };
+}
+
+function fromAddress() {
+  const given = new URLSearchParams(location.hash.slice(1));
+  const plant = given.get("plant") in facts.plants ? given.get("plant") : Object.keys(facts.plants)[0];
+  const made = opening(plant);
+  for (const { name, least, most } of facts.plants[plant].conditions) {
+    const value = parseFloat(given.get(name));
+    if (Number.isFinite(value)) made[name] = Math.min(Math.max(value, least), most);
+  }
+  for (const side of SIDES) {
+    if (!given.has(side)) continue;
+    const law = given.get(side);
+    if (!facts.plants[plant].laws.includes(law) && !(side === "b" && law === "")) continue;
+    made[side] = { law, gains: {} };
+    if (law === "") continue;
+    for (const name of facts.laws[law].order) {
+      const value = parseFloat(given.get(`${side}.${name}`));
+      if (!Number.isNaN(value)) made[side].gains[name] = value;
+    }
+    if (given.has(`${side}.model`)) made[side].model = given.get(`${side}.model`) === "nominal" ? "nominal" : "none";
+  }
+  return made;
+}
+
+function toAddress() {
+  const words = new URLSearchParams({ plant: chosen.plant });
+  for (const side of SIDES) {
+    words.set(side, chosen[side].law);
+    for (const [name, value] of Object.entries(chosen[side].gains)) words.set(`${side}.${name}`, value);
+    if (chosen[side].model) words.set(`${side}.model`, chosen[side].model);
+  }
+  for (const { name, value } of plantFacts().conditions) if (chosen[name] !== value) words.set(name, chosen[name]);
+  history.replaceState(null, "", `#${words}`);
+}
+
+// The scenario of one side, as the engine takes it.
+function scenarioOf(side) {
+  const { plant, start, reference, mass, friction, delay, noise, amplitude, omega, period, bound } = chosen;
+  const x0 = [...plantFacts().x0];
+  x0[plantFacts().started] = start;
+  return {
+    plant, law: chosen[side].law, gains: chosen[side].gains, model: chosen[side].model, x0, reference, mass, friction,
+    input_delay: delay / 1000, control_period: period / 1000, u_max: bound, disturbance: { amplitude, omega },
+    noise: { position: noise * facts.noise.position, velocity: noise * facts.noise.velocity },
+  };
+}
+
+// ---- simulations
+
+const made = (side) => new Simulation(mujoco, vfs, facts, laws, scenarioOf(side));
+
+function colours() {
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const names = sides().map((side) => chosen[side].law);
+  const known = names.map((name) => facts.laws[name][dark ? "colour_dark" : "colour"]);
+  // one law twice, with other gains: the second in a neutral colour
+  return known.map((colour, i) => (i && names[i] === names[0] ? css("--muted") : colour));
+}
+
+// Begin anew with what is chosen.
+function restart() {
+  for (const { simulation } of running) simulation.delete();
+  const palette = colours();
+  running = sides().map((side, i) => ({ side, simulation: made(side), colour: palette[i] }));
+  for (const each of running) each.history = new History(each.simulation.s.control_period, SECONDS);
+  stage.show(running.map(({ simulation }) => simulation), palette);
+  owed = 0;
+  named();
+  say("");
+}
+
+// Go on from the present state with other conditions.
+function change() {
+  for (const each of running) {
+    const simulation = made(each.side);
+    simulation.resume(each.simulation);
+    each.simulation.delete();
+    if (simulation.s.control_period !== each.simulation.s.control_period) {
+      const before = each.history;
+      each.history = new History(simulation.s.control_period, SECONDS);
+      before.each((i) => each.history.add({ t: before.t[i], x: [before.x[i]], v: [before.v[i]], u: before.u[i], s: before.s[i] }));
+    }
+    each.simulation = simulation;
+  }
+  stage.swap(running.map(({ simulation }) => simulation));
+}
+
+function reset() {
+  for (const each of running) {
+    each.simulation.reset();
+    each.history = new History(each.simulation.s.control_period, SECONDS);
+  }
+  owed = 0;
+  say("");
+}
+
+// Simulate `seconds` of every simulation.
+function simulate(seconds) {
+  owed += seconds;
+  const pulls = stage.pulls();
+  let done = 0;
+  running.forEach(({ simulation, history }, i) => {
+    const push = pulls[i];
+    push[simulation.plant.channels[0].dof] += 0.5 * pressed * simulation.s.u_max;
+    simulation.push.set(push);
+    const steps = Math.floor(owed / simulation.s.physics_step + 1e-9);
+    for (let k = 0; k < steps && !simulation.failed; k++) {
+      const sample = simulation.advance();
+      if (sample) history.add(sample);
+    }
+    done = Math.max(done, steps * simulation.s.physics_step);
+  });
+  owed -= done;
+  const failures = running.filter(({ simulation }) => simulation.failed);
+  if (failures.length) {
+    say(failures.map(({ simulation: { failed, lawFacts } }) =>
+      `${lawFacts.label}: ${failed.why} at ${failed.time.toFixed(2)} s`).join("; "));
+  }
+}
+
+// The line s = 0 of a law in the phase plane, as a function v(x); null if s is not linear in v.
+function surfaceOf({ simulation }) {
+  const { y, memory, law, gains, s } = simulation;
+  const at = (x, v) => {
+    const out = [0, 0];
+    law({ ...y, x, v, e: x - s.reference, de: v }, gains, memory.slice(), out);
+    return out[1];
+  };
+  const line = (x) => {
+    const [zero, one] = [at(x, 0), at(x, 1)];
+    return -zero / (one - zero);
+  };
+  const x = s.reference + 0.3;
+  const error = Math.abs(at(x, line(x))) + Math.abs(at(x, 2) - 2 * at(x, 1) + at(x, 0));
+  return error < 1e-9 ? line : null;
+}
+
+// ---- the loop
+
+let before = null;
+let frames = [];
+
+function frame(now) {
+  const elapsed = before === null ? 0 : (now - before) / 1000;
+  before = now;
+  if (playing && !document.hidden) simulate(Math.min(elapsed, SLOWEST) * parseFloat($("speed").value));
+  stage.draw();
+  stage.watch(now);
+  plot();
+  frames.push(now);
+  while (frames[0] < now - 1000) frames.shift();
+  const seconds = (now - frames[0]) / 1000;
+  $("clock").value = `${running[0].simulation.time.toFixed(1)} s`;
+  $("rate").value = seconds > 0.5 ? `${Math.round((frames.length - 1) / seconds)} fps` : "";
+  requestAnimationFrame(frame);
+}
+
+function plot() {
+  const palette = { grid: css("--grid"), muted: css("--muted"), bound: css("--bound") };
+  const now = Math.max(...running.map(({ simulation }) => simulation.time));
+  const { u_max: bound, reference } = running[0].simulation.s;
+  const least = Math.abs(plantFacts().x0[0]) || 0.2;
+  const over = (name, levels, height) =>
+    overTime($(`plot-${name}`), palette, running, name, { now, seconds: SECONDS, levels, least: height });
+  over("x", [reference], 0.4 * least);
+  over("u", [-bound, bound], 0.2 * bound);
+  over("s", [0], 0.4 * least);
+  const series = running.map((each) => ({ ...each, surface: each.history.count ? surfaceOf(each) : null }));
+  phasePlane($("plot-phase"), palette, series, { reference, least: 0.4 * least, unit: plantFacts().channels[0].unit });
+}
+
+// ---- words
+
+const GREEK = { lam: "λ", alpha: "α", beta: "β", gamma: "γ", delta: "δ", mu: "μ", phi: "φ", eps: "ε", omega: "ω" };
+
+// A formula in plain letters, with Greek ones, exponents and primes.
+function pretty(text) {
+  return text
+    .replace(/\b([A-Za-z]+)(?![\w(])/g, (word) => (Object.hasOwn(GREEK, word) ? GREEK[word] : word))
+    .replace(/\^2\b/g, "²").replace(/\^3\b/g, "³").replace(/\^\(1\/2\)/g, "^½").replace(/<=/g, "≤").replace(/''/g, "″").replace(/'/g, "′").replace(/ - |(?<=[= (])-(?=\S)/g, (minus) => minus.replace("-", "−"))
+    .replace(/\b([a-zA-Z])([0-9])\b/g, (_, letter, digit) => letter + "₀₁₂₃₄₅₆₇₈₉"[digit]);
+}
+
+function say(text) {
+  if ($("status").textContent !== text) $("status").textContent = text;
+}
+
+function named() {
+  const { label, equation, channels, effort } = plantFacts();
+  const [{ unit }] = channels;
+  $("plant").value = chosen.plant;
+  $("equation").textContent = pretty(equation);
+  $("cap-x").textContent = `x, position (${unit})`;
+  $("cap-u").textContent = `u, command (${effort.replace(" ", " ")}), and its bound`;
+  $("cap-s").textContent = "s, sliding variable";
+  $("cap-phase").textContent = `Phase plane: v (${unit}/s) over x; dashed: s = 0`;
+  const parts = stage.parts();
+  SIDES.forEach((side) => {
+    const i = running.findIndex((each) => each.side === side);
+    const badge = $(`name-${side}`);
+    badge.textContent = i < 0 ? "" : facts.laws[chosen[side].law].label;
+    $(`law-${side}`).style.setProperty("--law", i < 0 ? "" : running[i].colour);
+    if (i < 0) return;
+    badge.style.setProperty("--law", running[i].colour);
+    badge.style.left = `${parts[i].x + 10}px`;
+    badge.style.top = `${parts[i].y + 10}px`;
+  });
+  const names = running.map(({ side }) => facts.laws[chosen[side].law].label).join(" and ");
+  $("machines").setAttribute("aria-label", `${label} under ${names}`);
+  document.title = `${label}: ${names}`;
+}
+
+// ---- controls
+
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false && value !== undefined) made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+const four = (value) => parseFloat(value.toPrecision(4));
+
+// A number with a slider: `logarithmic` where its range spans more than a decade.
+function slider({ name, label, unit, least, most, value, step }, put) {
+  const logarithmic = least > 0 && most / least > 10 && !step;
+  const toGrade = (number) => logarithmic
+    ? (GRADES * Math.log(number / least)) / Math.log(most / least)
+    : (GRADES * (number - least)) / (most - least);
+  const fromGrade = (grade) => {
+    const part = grade / GRADES;
+    const number = logarithmic ? least * (most / least) ** part : least + part * (most - least);
+    return step ? parseFloat((Math.round(number / step) * step).toFixed(6)) : four(number);
+  };
+  const clipped = (number) => Math.min(Math.max(number, least), most);
+  const text = unit ? `${label}, ${unit}` : label;
+  const range = element("input", { type: "range", min: 0, max: GRADES, step: "any", "aria-label": text, "data-name": name });
+  const exact = element("input", { type: "number", step: "any", "aria-label": `${text}, exactly`, "data-exact": name });
+  const show = (number) => {
+    range.value = toGrade(clipped(number));
+    range.setAttribute("aria-valuetext", `${number} ${unit ?? ""}`.trim());
+  };
+  show(value);
+  exact.value = value;
+  range.addEventListener("input", () => {
+    const number = fromGrade(parseFloat(range.value));
+    exact.value = number;
+    range.setAttribute("aria-valuetext", `${number} ${unit ?? ""}`.trim());
+    put(number);
+  });
+  range.addEventListener("keydown", (event) => { // a step of a hundredth of the range, not of a grade
+    const sign = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!sign) return;
+    event.preventDefault();
+    const before = parseFloat(exact.value);
+    let number = fromGrade(Math.min(Math.max(parseFloat(range.value) + (sign * GRADES) / 100, 0), GRADES));
+    if (step && number === before) number = clipped(parseFloat((before + sign * step).toFixed(6)));
+    exact.value = number;
+    show(number);
+    put(number);
+  });
+  exact.addEventListener("change", () => {
+    const number = clipped(parseFloat(exact.value));
+    if (Number.isNaN(number)) {
+      exact.value = fromGrade(parseFloat(range.value));
+      return;
+    }
+    exact.value = number;
+    show(number);
+    put(number);
+  });
+  return element("div", { class: "slider" }, element("span", {}, label), range, exact, element("small", {}, unit ?? ""));
+}
+
+function lawForm(side) {
+  const form = $(`law-${side}`);
+  const { laws: offered, gains: tuned, ranges } = plantFacts();
+  const { law } = chosen[side];
+  const groups = new Map();
+  for (const name of offered) {
+    const family = facts.own.includes(name) ? "your own" : facts.laws[name].family || "other";
+    groups.set(family, [...(groups.get(family) ?? []), name]);
+  }
+  const select = element("select", { id: `choice-${side}`, onchange: (event) => choose(side, event.target.value) });
+  if (side === "b") select.append(element("option", { value: "" }, "no second law"));
+  for (const [family, names] of groups) {
+    select.append(element("optgroup", { label: family }, ...names.map((name) => element("option", { value: name }, facts.laws[name].label))));
+  }
+  select.value = law;
+  const parts = [element("h2", {}, element("label", { for: `choice-${side}` }, side === "a" ? "First law" : "Second law")), select];
+  if (law) {
+    const known = facts.laws[law];
+    parts.push(element("p", { class: "formula", title: known.source }, pretty(known.formula)));
+    for (const name of known.order) {
+      const value = chosen[side].gains[name] ?? tuned[law][name];
+      const [least, most] = ranges[law][name] ?? [];
+      if (least === undefined) continue; // held: an initial value, an exponent, the size of a table
+      parts.push(slider({ name, label: pretty(name), least, most, value }, (number) => {
+        chosen[side].gains[name] = number;
+        running.find((each) => each.side === side).simulation.setGains({ [name]: number });
+        toAddress();
+      }));
+    }
+    if (known.model_optional) {
+      const knows = element("input", { type: "checkbox", onchange: (event) => {
+        chosen[side].model = event.target.checked ? "nominal" : "none";
+        change();
+        toAddress();
+      } });
+      knows.checked = (chosen[side].model ?? (known.requires_model ? "nominal" : "none")) === "nominal";
+      parts.push(element("label", { class: "check" }, knows, "knows the plant's equation"));
+    }
+  }
+  form.replaceChildren(...parts);
+}
+
+function conditionsForm() {
+  const parts = plantFacts().conditions.map((condition) => slider({ ...condition, value: chosen[condition.name] }, (number) => {
+    chosen[condition.name] = number;
+    if (condition.name === "start") restart();
+    else change();
+    toAddress();
+  }));
+  $("conditions").replaceChildren(element("h2", {}, "Conditions"), ...parts);
+}
+
+function choose(side, law) {
+  chosen[side] = { law, gains: {} };
+  lawForm(side);
+  restart();
+  toAddress();
+}
+
+function forms() {
+  SIDES.forEach(lawForm);
+  conditionsForm();
+}
+
+function toggle() {
+  playing = !playing;
+  $("play").querySelector(".word").textContent = playing ? "Pause" : "Play";
+  $("play").firstElementChild.textContent = playing ? "❚❚" : "▶";
+}
+
+async function share() {
+  toAddress();
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say("The link to this setting is copied.");
+  } catch {
+    say(`The link to this setting: ${location.href}`);
+  }
+}
+
+function listen() {
+  const canvas = $("machines");
+  $("play").addEventListener("click", toggle);
+  $("reset").addEventListener("click", reset);
+  $("share").addEventListener("click", share);
+  $("plant").addEventListener("change", (event) => {
+    chosen = opening(event.target.value);
+    forms();
+    restart();
+    toAddress();
+  });
+  canvas.addEventListener("pointerdown", (event) => {
+    if (!stage.grab(event)) return;
+    event.preventDefault();
+    canvas.setPointerCapture(event.pointerId);
+    canvas.classList.add("pushing");
+  });
+  canvas.addEventListener("pointermove", (event) => stage.drag(event));
+  for (const end of ["pointerup", "pointercancel"]) {
+    canvas.addEventListener(end, () => {
+      stage.release();
+      canvas.classList.remove("pushing");
+    });
+  }
+  canvas.addEventListener("touchstart", (event) => stage.held && event.preventDefault(), { passive: false });
+  const typing = ({ target }) => target.closest("input, select, button, a");
+  document.addEventListener("keydown", (event) => {
+    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " ") toggle();
+    else if (event.key === "r" || event.key === "R") reset();
+    else if (event.key === "ArrowLeft") pressed = -1;
+    else if (event.key === "ArrowRight") pressed = 1;
+    else return;
+    event.preventDefault();
+  });
+  document.addEventListener("keyup", ({ key }) => {
+    if (key === "ArrowLeft" || key === "ArrowRight") pressed = 0;
+  });
+  window.addEventListener("blur", () => (pressed = 0));
+  window.addEventListener("resize", named);
+  window.addEventListener("hashchange", () => {
+    chosen = fromAddress();
+    forms();
+    restart();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    restart();
+  });
+}
+
+async function begin() {
+  const read = async () => JSON.parse(await (await fetch("facts.json")).text(), (_, value) => (Object.hasOwn(WORDS, value) ? WORDS[value] : value));
+  [facts, mujoco] = await Promise.all([read(), loadMujoco()]);
+  vfs = new mujoco.MjVFS();
+  for (const [name, text] of Object.entries(facts.includes)) vfs.addBuffer(name, new TextEncoder().encode(text));
+  stage = new Stage($("machines"));
+  for (const [name, { label }] of Object.entries(facts.plants)) $("plant").append(element("option", { value: name }, label));
+  $("mujoco").textContent = mujoco.mj_versionString();
+  $("version").textContent = facts.version;
+  chosen = fromAddress();
+  forms();
+  restart();
+  listen();
+  $("loading").hidden = true;
+  // for tests, and for the curious in the console
+  window.live = {
+    facts,
+    running: () => running,
+    trace: (chosen, duration) => trace(mujoco, vfs, facts, laws, chosen, duration),
+    onScreen: (i, geom) => stage.onScreen(i, geom),
+  };
+  document.documentElement.dataset.ready = "";
+  requestAnimationFrame(frame);
+}
+
+begin().catch((error) => {
+  $("loading").textContent = `The page could not start: ${error.message ?? error}`;
+  throw error;
+});

@@ -1,0 +1,194 @@
+// Plots of the last seconds of a few simulations, on canvases.
+
+const ROOM = { left: 46, right: 8, top: 4, bottom: 18 }; // px around the axes
+const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
+
+// The last `seconds` of a simulation's samples, in rings.
+export class History {
+  constructor(period, seconds) {
+    this.size = Math.ceil(seconds / period) + 1;
+    for (const name of ["t", "x", "v", "u", "s"]) this[name] = new Float64Array(this.size);
+    this.count = 0;
+  }
+
+  add(sample) {
+    const i = this.count % this.size;
+    [this.t[i], this.x[i], this.v[i], this.u[i], this.s[i]] = [sample.t, sample.x[0], sample.v[0], sample.u, sample.s];
+    this.count += 1;
+  }
+
+  // Call f(i) for the place of each sample, the oldest first.
+  each(f) {
+    for (let k = Math.max(0, this.count - this.size); k < this.count; k++) f(k % this.size);
+  }
+}
+
+function prepared(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  pen.font = LETTERS;
+  return { pen, width, height };
+}
+
+// A round step that divides a range into about `count` parts.
+function stepOf(range, count) {
+  const rough = range / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
+}
+
+function digits(step) {
+  return Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+}
+
+const shortly = (value, step) => (step >= 1e4 || step < 1e-3 ? value.toExponential(0) : value.toFixed(digits(step))).replace("-", "−");
+
+// The range of some numbers with room around it, at least `least` wide.
+function padded(low, high, least) {
+  if (!(high >= low)) [low, high] = [-1, 1];
+  const middle = (low + high) / 2;
+  const half = Math.max((high - low) / 2, least / 2) * 1.08;
+  return [middle - half, middle + half];
+}
+
+function axes({ pen, width, height }, colours, [x0, x1], [y0, y1], xUnit) {
+  const place = {
+    x: (x) => ROOM.left + ((x - x0) / (x1 - x0)) * (width - ROOM.left - ROOM.right),
+    y: (y) => height - ROOM.bottom - ((y - y0) / (y1 - y0)) * (height - ROOM.top - ROOM.bottom),
+  };
+  pen.lineWidth = 1;
+  pen.strokeStyle = colours.grid;
+  pen.fillStyle = colours.muted;
+  const ruled = (low, high, step, draw) => {
+    for (let value = Math.ceil(low / step) * step; value <= high + step * 1e-9; value += step) draw(Math.abs(value) < step * 1e-9 ? 0 : value);
+  };
+  const yStep = stepOf(y1 - y0, Math.max(2, height / 45));
+  pen.textAlign = "right";
+  pen.textBaseline = "middle";
+  ruled(y0, y1, yStep, (y) => {
+    line(pen, [[ROOM.left, place.y(y)], [width - ROOM.right, place.y(y)]]);
+    pen.fillText(shortly(y, yStep), ROOM.left - 5, place.y(y));
+  });
+  const xStep = stepOf(x1 - x0, Math.max(2, width / 90));
+  pen.textBaseline = "top";
+  ruled(x0, x1, xStep, (x) => {
+    line(pen, [[place.x(x), ROOM.top], [place.x(x), height - ROOM.bottom]]);
+    pen.textAlign = place.x(x) > width - ROOM.right - 16 ? "right" : "center";
+    pen.fillText(`${shortly(x, xStep)}${xUnit}`, place.x(x), height - ROOM.bottom + 4);
+  });
+  return place;
+}
+
+function line(pen, points) {
+  pen.beginPath();
+  points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+  pen.stroke();
+}
+
+// Draw one signal of the histories over time. `levels` are values with a dashed line; `least` is the least height.
+export function overTime(canvas, colours, series, name, { now, seconds, levels = [], least }) {
+  const on = prepared(canvas);
+  let [low, high] = [Infinity, -Infinity];
+  for (const { history } of series) {
+    history.each((i) => {
+      const value = history[name][i];
+      if (value < low) low = value;
+      if (value > high) high = value;
+    });
+  }
+  const end = Math.max(now, seconds);
+  const place = axes(on, colours, [end - seconds, end], padded(low, high, least), " s");
+  const { pen, width, height } = on;
+  pen.save();
+  pen.beginPath();
+  pen.rect(ROOM.left, 0, width - ROOM.left - ROOM.right, height - ROOM.bottom);
+  pen.clip();
+  pen.strokeStyle = colours.bound;
+  pen.setLineDash([5, 4]);
+  for (const level of levels) line(pen, [[ROOM.left, place.y(level)], [width, place.y(level)]]);
+  pen.setLineDash([]);
+  for (const { history, colour } of series) {
+    // a column of pixels shows the lowest and highest of its samples, so that chattering is drawn whole
+    pen.strokeStyle = colour;
+    pen.lineWidth = 1.6;
+    pen.beginPath();
+    let [column, least, most, last] = [null, 0, 0, 0];
+    const finish = () => {
+      if (column === null) return;
+      pen.lineTo(column, least);
+      if (most !== least) pen.lineTo(column, most);
+      pen.lineTo(column, last);
+    };
+    history.each((i) => {
+      const [x, y] = [Math.round(place.x(history.t[i]) * 2) / 2, place.y(history[name][i])];
+      if (x !== column) {
+        finish();
+        [column, least, most] = [x, y, y];
+      }
+      least = Math.min(least, y);
+      most = Math.max(most, y);
+      last = y;
+    });
+    finish();
+    pen.stroke();
+  }
+  pen.restore();
+}
+
+// Draw the phase plane: v over x of the histories, and the line s = 0 of each law that has one.
+export function phasePlane(canvas, colours, series, { reference, least, unit }) {
+  const on = prepared(canvas);
+  const range = { x: [Infinity, -Infinity], v: [Infinity, -Infinity] };
+  for (const { history } of series) {
+    history.each((i) => {
+      for (const name of ["x", "v"]) {
+        range[name][0] = Math.min(range[name][0], history[name][i]);
+        range[name][1] = Math.max(range[name][1], history[name][i]);
+      }
+    });
+  }
+  range.x = [Math.min(range.x[0], reference), Math.max(range.x[1], reference)];
+  range.v = [Math.min(range.v[0], 0), Math.max(range.v[1], 0)];
+  const x = padded(...range.x, least);
+  const place = axes(on, colours, x, padded(...range.v, least), ` ${unit}`);
+  const { pen, width, height } = on;
+  pen.save();
+  pen.beginPath();
+  pen.rect(ROOM.left, 0, width - ROOM.left - ROOM.right, height - ROOM.bottom);
+  pen.clip();
+  pen.lineWidth = 1.6;
+  for (const { colour, surface } of series) {
+    if (!surface) continue;
+    pen.strokeStyle = colour;
+    pen.globalAlpha = 0.55;
+    pen.setLineDash([5, 4]);
+    const points = Array.from({ length: 41 }, (_, i) => x[0] + ((x[1] - x[0]) * i) / 40);
+    line(pen, points.map((at) => [place.x(at), place.y(surface(at))]));
+  }
+  pen.setLineDash([]);
+  pen.globalAlpha = 1;
+  pen.strokeStyle = colours.muted;
+  line(pen, [[place.x(reference) - 4, place.y(0)], [place.x(reference) + 4, place.y(0)]]);
+  line(pen, [[place.x(reference), place.y(0) - 4], [place.x(reference), place.y(0) + 4]]);
+  for (const { history, colour } of series) {
+    if (history.count === 0) continue;
+    const every = Math.max(1, Math.floor(Math.min(history.count, history.size) / 2500));
+    pen.strokeStyle = pen.fillStyle = colour;
+    pen.beginPath();
+    let k = 0;
+    history.each((i) => k++ % every === 0 && pen.lineTo(place.x(history.x[i]), place.y(history.v[i])));
+    pen.stroke();
+    const end = (history.count - 1) % history.size;
+    pen.beginPath();
+    pen.arc(place.x(history.x[end]), place.y(history.v[end]), 4.5, 0, 7);
+    pen.fill();
+  }
+  pen.restore();
+}

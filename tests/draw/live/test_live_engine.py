@@ -1,0 +1,70 @@
+"""The engine of the live page, in node: its traces are those of `smc.run`, under every condition that it offers."""
+
+import pytest
+from helpers.live import farthest, packages, scenario, traces
+
+import smc_mujoco as smc
+
+SECONDS = 5.0
+# What is chosen, and the largest difference in x, v, u and s over the run. The issue asks for 1e-6; found: below 1e-9.
+CASES = {
+    "a law with memory, saturated": {"plant": "inverted_pendulum", "law": "pid", "u_max": 2.0},
+    "hold and reference": {"plant": "duffing", "law": "observer_free", "control_period": 0.01, "reference": 0.2},
+    "delay and mass": {"plant": "van_der_pol", "law": "observer_free", "input_delay": 0.005, "mass": 1.3},
+    "delay below a period": {
+        "plant": "duffing", "law": "observer_free", "control_period": 0.01, "input_delay": 0.003, "friction": 0.05,
+    },
+    "noise": {
+        "plant": "inverted_pendulum", "law": "observer_free", "noise": {"position": 0.01, "velocity": 0.05}, "seed": 3,
+    },
+    "a sine at every stage": {
+        "plant": "duffing", "law": "boundary_layer", "disturbance": {"amplitude": 0.5, "omega": 5.0},
+    },
+    "friction": {"plant": "inverted_pendulum", "law": "observer_free", "friction": 0.2, "x0": [0.3]},
+    "the nominal equation": {"plant": "van_der_pol", "law": "lqr", "model": "nominal", "mass": 1.2},
+    "a free joint": {"plant": "cart_pole", "law": "hierarchical"},
+}  # fmt: skip
+TOLERANCE = 1e-8
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    packages()
+    plants = {chosen["plant"]: None for chosen in CASES.values()}
+    return smc.live(list(plants), out=tmp_path_factory.mktemp("live") / "page").parent
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    return dict(zip(CASES, traces(folder, [(chosen, SECONDS) for chosen in CASES.values()]), strict=True))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_trace_is_that_of_run(found, name):
+    assert farthest(found[name], smc.run(scenario(CASES[name], SECONDS))) < TOLERANCE
+
+
+def test_no_condition_goes_unnoticed(found):
+    """Each condition moves the trace by far more than the tolerance, so that ignoring it fails the test above."""
+    for name, chosen in CASES.items():
+        plain = {key: chosen[key] for key in ("plant", "law", "x0") if key in chosen}
+        if plain != chosen:
+            bare = smc.run(scenario(plain | {"control_period": chosen.get("control_period", 1e-3)}, 1.0))
+            samples = len(bare.t) - 1
+            cut = {key: found[name][key][:samples] for key in ("t", "u", "s")} | {"failed": None}
+            assert farthest(cut, bare, ("u", "s")) > 1e4 * TOLERANCE, name
+
+
+@pytest.mark.parametrize(
+    ("chosen", "why"),
+    [
+        ({"plant": "duffing", "law": "pid", "gains": {"kp": 1.7e308}, "x0": [2.0]}, "law is not finite"),
+        ({"plant": "van_der_pol", "law": "observer_free", "x0": [3e4]}, "diverged"),
+    ],
+)
+def test_a_run_that_fails_ends_where_run_ends_it(folder, chosen, why):
+    (found,) = traces(folder, [(chosen, 0.1)])
+    trace = smc.run(scenario(chosen, 0.1))
+    assert trace.diverged_at is not None
+    assert found["failed"]["why"] == why
+    assert found["failed"]["time"] == pytest.approx(trace.diverged_at, abs=1e-9)

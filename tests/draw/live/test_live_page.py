@@ -1,0 +1,239 @@
+"""The live page in a browser: it loads offline and says nothing, its traces are those of `smc.run`, keys, sliders and
+links work, and it fits a phone.
+
+The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it these tests are skipped.
+"""
+
+import functools
+import gzip
+import http.server
+import re
+import shutil
+import threading
+
+import pytest
+from helpers.live import farthest, packages, scenario
+
+import smc_mujoco as smc
+from smc_mujoco.draw import style
+from smc_mujoco.draw.live.build import PLANTS
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+PHONE = {"width": 390, "height": 844}
+MOST = 6e6  # bytes of the page of three plants, compressed
+
+
+@smc.law_function(gains={"lam": 6.0, "k1": 3.0})
+def my_law(y, gains, memory):
+    s = y.de + gains.k1 * y.e
+    return -gains.lam * s / (1.0 + abs(s)), s
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    packages()
+    return smc.live(laws=[my_law], out=tmp_path_factory.mktemp("live") / "page").parent
+
+
+@pytest.fixture(scope="module")
+def address(folder):
+    """The page on a plain web server, as a static host serves it."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, format, *args):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder))) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        pytest.skip("no Chromium to open the live page in: apt-get install chromium")
+    sync = pytest.importorskip("playwright.sync_api")
+    with sync.sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=path, args=SWITCHES)
+        yield opened
+        opened.close()
+
+
+class Seen:
+    """The page in a browser that reaches its server and nothing else, with all that it said and asked for."""
+
+    def __init__(self, browser, address, **options):
+        self.said, self.asked, self.address = [], [], address
+        self.page = browser.new_page(**options)
+        self.page.on("console", lambda m: self.said.append(m.text) if m.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.route(
+            lambda url: not url.startswith((address, "data:", "blob:")),
+            lambda route: route.abort("internetdisconnected"),
+        )
+        self.open("")
+
+    def open(self, setting):
+        self.page.goto("about:blank")
+        self.page.goto(self.address + setting)
+        self.page.wait_for_selector("html[data-ready]", timeout=60_000)
+
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.page.evaluate("live.running()[0].simulation.time")
+
+    def chosen(self, part) -> object:
+        """A part of the first simulation's scenario."""
+        return self.page.evaluate(f"live.running()[0].simulation.s.{part}")
+
+
+@pytest.fixture(scope="module")
+def seen(browser, address):
+    return Seen(browser, address)
+
+
+@pytest.fixture
+def page(seen):
+    seen.open("")
+    return seen.page
+
+
+def test_it_loads_without_network_and_says_nothing(seen, page):
+    page.wait_for_function("live.running()[0].simulation.time > 0.2", timeout=30_000)
+    assert seen.said == []
+    assert [url for url in seen.asked if not url.startswith((seen.address, "data:", "blob:", "about:"))] == []
+
+
+def test_a_trace_in_the_page_is_that_of_run(seen):
+    for chosen in (
+        {"plant": "inverted_pendulum", "law": "observer_free", "input_delay": 0.002, "friction": 0.1},
+        {"plant": "duffing", "law": "super_twisting", "noise": {"position": 0.001, "velocity": 0.005}},
+        {"plant": "van_der_pol", "law": "observer_free", "disturbance": {"amplitude": 0.3, "omega": 4.0}},
+    ):
+        found = seen.page.evaluate("chosen => live.trace(chosen, 5.0)", chosen)
+        assert farthest(found, smc.run(scenario(chosen, 5.0))) < 1e-6
+
+
+def test_a_law_of_the_user_runs_in_the_page_as_in_run(seen):
+    chosen = {"plant": "duffing", "law": "my_law", "gains": {"lam": 5.0}}
+    found = seen.page.evaluate("chosen => live.trace(chosen, 2.0)", chosen)
+    trace = smc.run(smc.Scenario(plant="duffing", law=my_law(lam=5.0), duration=2.0))
+    assert farthest(found, trace) < 1e-6
+    assert seen.page.locator("#choice-a option[value=my_law]").count() == 1
+
+
+def test_keys_pause_reset_and_push(seen, page):
+    page.locator("#machines").focus()
+    page.wait_for_function("live.running()[0].simulation.time > 0.3")
+    page.keyboard.press("Space")
+    paused = seen.time()
+    page.wait_for_timeout(200)
+    assert seen.time() == paused > 0.0
+    page.keyboard.press("r")
+    assert seen.time() == 0.0
+    page.keyboard.down("ArrowRight")
+    page.keyboard.press("Space")
+    page.wait_for_function("live.running().every(({ simulation }) => simulation.push[0] > 0)")
+    page.keyboard.up("ArrowRight")
+    page.wait_for_function("live.running().every(({ simulation }) => simulation.push[0] === 0)")
+
+
+def test_a_key_in_a_field_is_no_command(seen, page):
+    exact = page.locator("[data-exact=mass]")
+    exact.focus()
+    page.keyboard.press("r")
+    page.wait_for_timeout(50)
+    assert seen.time() > 0.0 or page.evaluate("document.activeElement.dataset.exact") == "mass"
+    before = seen.time()
+    page.wait_for_function(f"live.running()[0].simulation.time > {before}")
+
+
+def test_the_mouse_pushes_one_machine(seen, page):
+    box = page.locator("#machines").bounding_box()
+    # the bob of the upright pendulum of the left half: where the page draws its geom
+    page.wait_for_function("live.running()[0].simulation.time > 1.5", timeout=60_000)
+    at = page.evaluate("live.onScreen(0, 'bob')")
+    page.mouse.move(box["x"] + at[0], box["y"] + at[1])
+    page.mouse.down()
+    page.mouse.move(box["x"] + at[0] + 60, box["y"] + at[1])
+    page.wait_for_function("Math.abs(live.running()[0].simulation.push[0]) > 0.1")
+    assert page.evaluate("live.running()[0].simulation.push[0]") > 0.0  # to the right, where x grows
+    assert page.evaluate("live.running()[1].simulation.push[0]") == 0.0
+    page.mouse.up()
+    page.wait_for_function("live.running()[0].simulation.push[0] === 0")
+
+
+def test_a_slider_moves_its_condition_and_the_link_holds_it(seen, page):
+    delay, gain = page.locator("[data-exact=delay]"), page.locator("#law-a [data-exact=k1]")
+    delay.fill("7")
+    delay.press("Enter")
+    gain.fill("4.25")
+    gain.press("Enter")
+    slider = page.locator("[data-name=friction]")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    assert seen.chosen("input_delay") == pytest.approx(0.007)
+    assert seen.chosen("gains.k1") == 4.25
+    friction = seen.chosen("friction")
+    assert friction > 0.0
+    assert seen.chosen("physics_step") == 2.5e-4  # as in a scenario with friction
+    setting = page.evaluate("location.hash")
+    assert "a.k1=4.25" in setting
+    seen.open(setting)
+    assert (seen.chosen("input_delay"), seen.chosen("gains.k1"), seen.chosen("friction")) == (0.007, 4.25, friction)
+
+
+def test_a_link_with_nonsense_opens_the_page(seen):
+    seen.open("#plant=nothing&a=classical&a.k=much&delay=1e9&b=<script>")
+    assert seen.page.input_value("#plant") == PLANTS[0]
+    assert seen.chosen("input_delay") == 0.05  # the slider's end
+    assert seen.said == []
+
+
+def test_two_laws_have_the_colours_of_the_figures(seen, page):
+    seen.open("#plant=duffing&a=super_twisting&b=classical")
+    shown = page.evaluate("live.running().map(({ colour }) => colour)")
+    assert shown == [style.law_colour("super_twisting"), style.law_colour("classical")]
+    page.select_option("#choice-b", "")
+    assert page.evaluate("live.running().length") == 1
+    assert page.inner_text("#name-a") == style.law_name("super_twisting")
+
+
+def test_every_plant_and_law_can_be_chosen(seen, page):
+    for plant in PLANTS:
+        page.select_option("#plant", plant)
+        for law in ("pid", "twisting", "lqr"):
+            page.select_option("#choice-a", law)
+            before = seen.time()
+            page.wait_for_function(f"live.running()[0].simulation.time > {before}")
+    assert seen.said == []
+
+
+def test_every_control_has_a_name(page):
+    nameless = page.eval_on_selector_all(
+        "input, select, button, canvas",
+        """all => all.filter(one => !(one.labels?.length || one.getAttribute('aria-label')
+          || one.getAttribute('aria-labelledby') || one.textContent.trim())).map(one => one.outerHTML)""",
+    )
+    assert nameless == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone(browser, address, scheme):
+    seen = Seen(browser, address, viewport=PHONE, color_scheme=scheme)
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    paper = seen.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    light = sum(map(int, re.findall(r"\d+", paper)[:3])) > 3 * 128
+    assert light == (scheme == "light")
+    assert seen.page.locator("#machines").bounding_box()["height"] >= 250
+    assert seen.said == []
+    seen.page.close()
+
+
+def test_the_page_of_three_plants_is_small(folder):
+    sizes = {path.name: len(gzip.compress(path.read_bytes(), 6)) for path in folder.rglob("*") if path.is_file()}
+    assert 1e6 < sum(sizes.values()) < MOST
