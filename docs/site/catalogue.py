@@ -14,11 +14,12 @@ from collections.abc import Iterator, Mapping
 import figures
 import notation
 
-from smc_mujoco.cli.law_pages import DEGREES, SOURCE, entry
+from smc_mujoco.cli.law_pages import DEGREES
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.c.export import law_to_c
 from smc_mujoco.control.component import Template
+from smc_mujoco.control.docstring import SOURCE, entry
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Measurement, law
 from smc_mujoco.control.law import catalogue as laws

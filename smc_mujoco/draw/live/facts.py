@@ -133,6 +133,8 @@ def _plant(plant: Plant, offered: Sequence[Component], own: Sequence[Component])
         ],
         "ctrl": int(drive_ids(model)[0]),
         "smooth": plant.smooth,
+        "extent": float(model.stat.extent),  # m, of the picture
+        "center": model.stat.center.tolist(),
         "fields": _fields(model, plant),
         "friction": [_part(model, field) for field in Coulomb(1.0).fields(model)],
         "laws": list(gains),
@@ -166,7 +168,7 @@ def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
     started = max(range(plant.n), key=lambda i: abs(s.x0[i]))
     reach, bound, unit, effort = abs(s.x0[started]), s.limits[0], plant.units[started], plant.efforts[0]
     far = min(2.0 * reach, defaults.MAX_ANGLE if unit == "rad" else math.inf)
-    noisy = f"× {SENSOR_NOISE.position:g} {plant.units[0]}, {SENSOR_NOISE.velocity:g} {plant.units[0]}/s"
+    noisy = f"Noise (× {SENSOR_NOISE.position:g} {plant.units[0]}, {SENSOR_NOISE.velocity:g} {plant.units[0]}/s)"
     begins = "Start, x at t = 0" if started == 0 else "Start of the free joint"
     rows = [
         ("start", begins, unit, -far, far, s.x0[started], 0.01),
@@ -176,7 +178,7 @@ def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
         ("friction", "Dry friction in each joint", effort, 0.0, 0.2 * bound, 0.0, bound / 200),
         ("delay", "Delay of u", "ms", 0.0, 50.0, 0.0, 1.0),
         ("period", "Control period", "ms", 1.0, 50.0, 1.0, 1.0),
-        ("noise", f"Measurement noise ({noisy})", "×", 0.0, 3.0, 0.0, 0.1),
+        ("noise", noisy, "×", 0.0, 3.0, 0.0, 0.1),
         ("amplitude", "Disturbance, amplitude of a sine", effort, 0.0, bound, 0.0, bound / 100),
         ("omega", "Disturbance, frequency", "rad/s", 0.5, 30.0, SINE.omega, 0.5),
     ]

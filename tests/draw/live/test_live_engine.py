@@ -8,7 +8,7 @@ import smc_mujoco as smc
 SECONDS = 5.0
 # What is chosen, and the largest difference in x, v, u and s over the run. The issue asks for 1e-6; found: below 1e-9.
 CASES = {
-    "a law with memory, saturated": {"plant": "inverted_pendulum", "law": "pid", "u_max": 2.0},
+    "a law with memory, saturated": {"plant": "inverted_pendulum", "law": "pid", "u_max": 2.0, "control_period": 0.005},
     "hold and reference": {"plant": "duffing", "law": "observer_free", "control_period": 0.01, "reference": 0.2},
     "delay and mass": {"plant": "van_der_pol", "law": "observer_free", "input_delay": 0.005, "mass": 1.3},
     "delay below a period": {
@@ -20,7 +20,7 @@ CASES = {
     "a sine at every stage": {
         "plant": "duffing", "law": "boundary_layer", "disturbance": {"amplitude": 0.5, "omega": 5.0},
     },
-    "friction": {"plant": "inverted_pendulum", "law": "observer_free", "friction": 0.2, "x0": [0.3]},
+    "friction": {"plant": "inverted_pendulum", "law": "observer_free", "friction": 0.2, "mass": 1.5, "x0": [0.3]},
     "the nominal equation": {"plant": "van_der_pol", "law": "lqr", "model": "nominal", "mass": 1.2},
     "a free joint": {"plant": "cart_pole", "law": "hierarchical"},
 }  # fmt: skip

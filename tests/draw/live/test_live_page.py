@@ -7,12 +7,15 @@ The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it t
 import functools
 import gzip
 import http.server
+import io
 import re
 import shutil
 import threading
 
+import numpy as np
 import pytest
 from helpers.live import farthest, packages, scenario
+from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
@@ -194,6 +197,15 @@ def test_a_link_with_nonsense_opens_the_page(seen):
     assert seen.said == []
 
 
+def coloured(page, colour) -> int:
+    """The pixels of the machines with about the hue of a colour."""
+    picture = Image.open(io.BytesIO(page.locator("#machines").screenshot())).convert("RGB")
+    r, g, b = np.moveaxis(np.asarray(picture, float), -1, 0)
+    wanted = np.array(style.rgb(colour), float)
+    here = np.stack([r, g, b]) / np.maximum(np.linalg.norm([r, g, b], axis=0), 1.0)
+    return int((np.tensordot(wanted / np.linalg.norm(wanted), here, 1) > 0.985).sum())
+
+
 def test_two_laws_have_the_colours_of_the_figures(seen, page):
     seen.open("#plant=duffing&a=super_twisting&b=classical")
     shown = page.evaluate("live.running().map(({ colour }) => colour)")
@@ -206,6 +218,8 @@ def test_two_laws_have_the_colours_of_the_figures(seen, page):
 def test_every_plant_and_law_can_be_chosen(seen, page):
     for plant in PLANTS:
         page.select_option("#plant", plant)
+        page.wait_for_function("live.running()[0].simulation.time > 0")
+        assert coloured(page, style.law_colour("observer_free")) > 100, f"{plant} is not in the picture"
         for law in ("pid", "twisting", "lqr"):
             page.select_option("#choice-a", law)
             before = seen.time()

@@ -5,6 +5,7 @@ import * as THREE from "./vendor/three.module.js";
 const [PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX] = [0, 1, 2, 3, 4, 5, 6];
 const POSES = 9; // of a swing, which the picture leaves room for
 const MARGIN = 1.06; // of the picture around the machine
+const TILES = 80; // along an edge of the floor
 const SEAM = 2; // px between two machines
 // How the picture is made, from the finest to the fastest: px of the canvas per px of the page, and shadows.
 const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.75, shadows: false }];
@@ -68,6 +69,23 @@ function heights(model, id) {
   return geometry;
 }
 
+// The floor's tiles, in the colours of the page.
+function tiles() {
+  const [canvas, size] = [document.createElement("canvas"), 128];
+  canvas.width = canvas.height = size;
+  const pen = canvas.getContext("2d");
+  pen.fillStyle = css("--floor-line");
+  pen.fillRect(0, 0, size, size);
+  pen.fillStyle = css("--floor");
+  pen.fillRect(1, 1, size - 2, size - 2);
+  const texture = new THREE.CanvasTexture(canvas);
+  texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+  texture.repeat.setScalar(TILES);
+  texture.anisotropy = 4;
+  texture.colorSpace = THREE.SRGBColorSpace;
+  return texture;
+}
+
 // One machine: the scene of a simulation.
 class Machine {
   constructor(simulation, colour) {
@@ -102,16 +120,30 @@ class Machine {
     this.place(this.meshes);
   }
 
+  // Free what the graphics card holds.
+  dispose() {
+    this.scene.traverse((each) => {
+      each.geometry?.dispose();
+      each.material?.dispose();
+    });
+    for (const material of this.floors) {
+      material.map?.dispose();
+      material.dispose();
+    }
+  }
+
   // The set: floor, grid and lights, in the colours of the page.
   light() {
     const { scene } = this;
-    const extent = this.simulation.model.stat.extent;
-    const floor = new THREE.Mesh(new THREE.PlaneGeometry(40, 40), new THREE.MeshLambertMaterial({ color: css("--floor") }));
+    const { extent, center } = this.simulation.plant;
+    // without shadows the floor has no tiles and no light, which take most of the time of a picture without a GPU
+    this.floors = [new THREE.MeshLambertMaterial({ map: tiles() }), new THREE.MeshBasicMaterial({ color: css("--floor") })];
+    const floor = this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), this.floors[0]);
+    const tile = extent > 1 ? 0.5 : 0.1; // m
+    floor.scale.setScalar(TILES * tile);
     floor.receiveShadow = true;
-    const grid = new THREE.GridHelper(40, 80, css("--floor-line"), css("--floor-line")).rotateX(Math.PI / 2);
-    grid.position.z = 0.0015;
-    const key = new THREE.DirectionalLight(0xffffff, 1.9);
-    const target = new THREE.Vector3(...this.simulation.model.stat.center);
+    const key = new THREE.DirectionalLight(0xffffff, 2.0);
+    const target = new THREE.Vector3(...center);
     key.position.set(-0.35, -0.55, 0.8).multiplyScalar(3 * extent).add(target);
     key.target.position.copy(target);
     key.castShadow = true;
@@ -120,7 +152,7 @@ class Machine {
     key.shadow.bias = -0.0005;
     const fill = new THREE.DirectionalLight(0xdfe6ff, 0.6);
     fill.position.set(0.45, -0.8, 0.35);
-    scene.add(floor, grid, key, key.target, fill, new THREE.HemisphereLight(0xffffff, 0xb0b0b8, 1.2));
+    scene.add(floor, key, key.target, fill, new THREE.HemisphereLight(0xffffff, 0xc8c8d0, 1.9));
     scene.background = new THREE.Color(css("--stage"));
     scene.fog = new THREE.Fog(css("--stage"), 5 * extent, 12 * extent);
   }
@@ -191,7 +223,15 @@ export class Stage {
     this.renderer.shadowMap.enabled = GRADES[grade].shadows;
     this.since = null; // when the grade's first frame was
     this.frames = 0;
-    for (const machine of this.machines ?? []) machine.scene.traverse((each) => each.material && (each.material.needsUpdate = true));
+    this.furnish();
+  }
+
+  // Give the machines what belongs to the grade.
+  furnish() {
+    for (const machine of this.machines ?? []) {
+      machine.floor.material = machine.floors[GRADES[this.grade].shadows ? 0 : 1];
+      machine.scene.traverse((each) => each.material && (each.material.needsUpdate = true));
+    }
   }
 
   // Take the next grade if the frames come too slowly; `now` in ms.
@@ -206,8 +246,9 @@ export class Stage {
 
   // Show simulations, with their colours.
   show(simulations, colours) {
-    for (const machine of this.machines) for (const mesh of machine.meshes) mesh.geometry.dispose();
+    for (const machine of this.machines) machine.dispose();
     this.machines = simulations.map((simulation, i) => new Machine(simulation, colours[i]));
+    this.furnish();
     this.beside = simulations[0].plant.beside;
     const { mujoco, model, data } = simulations[0];
     const look = Math.max(0, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, "look"));
@@ -220,7 +261,7 @@ export class Stage {
     this.camera.matrixWorld.copy(this.camera.matrix);
     this.camera.matrixWorldInverse.copy(this.camera.matrix).invert();
     this.seen = this.machines[0].bounds(this.camera);
-    this.near = model.stat.extent / 50;
+    this.near = simulations[0].plant.extent / 50;
   }
 
   // Replace the simulations of the machines.
@@ -322,10 +363,9 @@ export class Stage {
     const forces = this.machines.map(({ simulation }) => new Float64Array(simulation.model.nv));
     if (!this.held) return forces;
     const { index, mesh, local, target } = this.held;
-    const { model, data, s } = this.machines[index].simulation;
+    const { model, data, s, plant: { extent } } = this.machines[index].simulation;
     const point = local.clone().applyMatrix4(mesh.matrix);
     const pull = target.clone().sub(point);
-    const extent = model.stat.extent;
     pull.multiplyScalar((12 * s.u_max) / extent ** 2 / Math.max(1, (4 * pull.length()) / extent) * Math.min(1, extent));
     for (let body = mesh.userData.body; body > 0; body = model.body_parentid[body]) {
       for (let j = model.body_jntadr[body], n = model.body_jntnum[body]; n > 0; j++, n--) {
@@ -348,7 +388,7 @@ export class Stage {
     const length = Math.max(to.length(), 1e-3);
     arrow.position.copy(from);
     arrow.setDirection(to.normalize());
-    const head = Math.min(length / 2, machine.simulation.model.stat.extent / 15);
+    const head = Math.min(length / 2, machine.simulation.plant.extent / 15);
     arrow.setLength(length, head, head / 2);
   }
 }

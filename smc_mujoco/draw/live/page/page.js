@@ -113,7 +113,7 @@ function change() {
     if (simulation.s.control_period !== each.simulation.s.control_period) {
       const before = each.history;
       each.history = new History(simulation.s.control_period, SECONDS);
-      before.each((i) => each.history.add({ t: before.t[i], x: [before.x[i]], v: [before.v[i]], u: before.u[i], s: before.s[i] }));
+      before.each((i) => each.history.add({ t: before.t[i], x: [before.x[i], before.q[i]], v: [before.v[i]], u: before.u[i], s: before.s[i] }));
     }
     each.simulation = simulation;
   }
@@ -195,8 +195,9 @@ function plot() {
   const now = Math.max(...running.map(({ simulation }) => simulation.time));
   const { u_max: bound, reference } = running[0].simulation.s;
   const least = Math.abs(plantFacts().x0[0]) || 0.2;
+  const free = plantFacts().channels.length > 1 ? ["q"] : [];
   const over = (name, levels, height) =>
-    overTime($(`plot-${name}`), palette, running, name, { now, seconds: SECONDS, levels, least: height });
+    overTime($(`plot-${name}`), palette, running, name === "x" ? ["x", ...free] : [name], { now, seconds: SECONDS, levels, least: height });
   over("x", [reference], 0.4 * least);
   over("u", [-bound, bound], 0.2 * bound);
   over("s", [0], 0.4 * least);
@@ -222,10 +223,10 @@ function say(text) {
 
 function named() {
   const { label, equation, channels, effort } = plantFacts();
-  const [{ unit }] = channels;
+  const [{ unit }, free] = channels;
   $("plant").value = chosen.plant;
   $("equation").textContent = pretty(equation);
-  $("cap-x").textContent = `x, position (${unit})`;
+  $("cap-x").textContent = `x, position (${unit})${free ? `; pale: ${free.name} (${free.unit})` : ""}`;
   $("cap-u").textContent = `u, command (${effort.replace(" ", " ")}), and its bound`;
   $("cap-s").textContent = "s, sliding variable";
   $("cap-phase").textContent = `Phase plane: v (${unit}/s) over x; dashed: s = 0`;

@@ -7,13 +7,14 @@ const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
 export class History {
   constructor(period, seconds) {
     this.size = Math.ceil(seconds / period) + 1;
-    for (const name of ["t", "x", "v", "u", "s"]) this[name] = new Float64Array(this.size);
+    for (const name of ["t", "x", "v", "u", "s", "q"]) this[name] = new Float64Array(this.size);
     this.count = 0;
   }
 
   add(sample) {
     const i = this.count % this.size;
-    [this.t[i], this.x[i], this.v[i], this.u[i], this.s[i]] = [sample.t, sample.x[0], sample.v[0], sample.u, sample.s];
+    [this.t[i], this.u[i], this.s[i]] = [sample.t, sample.u, sample.s];
+    [this.x[i], this.v[i], this.q[i]] = [sample.x[0], sample.v[0], sample.x[1] ?? 0]; // q: of a free joint
     this.count += 1;
   }
 
@@ -69,7 +70,7 @@ function axes({ pen, width, height }, colours, [x0, x1], [y0, y1], xUnit) {
   const ruled = (low, high, step, draw) => {
     for (let value = Math.ceil(low / step) * step; value <= high + step * 1e-9; value += step) draw(Math.abs(value) < step * 1e-9 ? 0 : value);
   };
-  const yStep = stepOf(y1 - y0, Math.max(2, height / 45));
+  const yStep = stepOf(y1 - y0, Math.max(3, height / 30));
   pen.textAlign = "right";
   pen.textBaseline = "middle";
   ruled(y0, y1, yStep, (y) => {
@@ -92,16 +93,43 @@ function line(pen, points) {
   pen.stroke();
 }
 
-// Draw one signal of the histories over time. `levels` are values with a dashed line; `least` is the least height.
-export function overTime(canvas, colours, series, name, { now, seconds, levels = [], least }) {
+// Draw a signal: a column of pixels shows the lowest and highest of its samples, so that chattering is drawn whole.
+function curve(pen, place, history, name) {
+  let [column, least, most, last] = [null, 0, 0, 0];
+  const finish = () => {
+    if (column === null) return;
+    pen.lineTo(column, least);
+    if (most !== least) pen.lineTo(column, most);
+    pen.lineTo(column, last);
+  };
+  pen.beginPath();
+  history.each((i) => {
+    const [x, y] = [Math.round(place.x(history.t[i]) * 2) / 2, place.y(history[name][i])];
+    if (x !== column) {
+      finish();
+      [column, least, most] = [x, y, y];
+    }
+    least = Math.min(least, y);
+    most = Math.max(most, y);
+    last = y;
+  });
+  finish();
+  pen.stroke();
+}
+
+// Draw signals of the histories over time, those after the first pale. `levels` are values with a dashed line; `least` is
+// the least height.
+export function overTime(canvas, colours, series, names, { now, seconds, levels = [], least }) {
   const on = prepared(canvas);
   let [low, high] = [Infinity, -Infinity];
   for (const { history } of series) {
-    history.each((i) => {
-      const value = history[name][i];
-      if (value < low) low = value;
-      if (value > high) high = value;
-    });
+    for (const name of names) {
+      history.each((i) => {
+        const value = history[name][i];
+        if (value < low) low = value;
+        if (value > high) high = value;
+      });
+    }
   }
   const end = Math.max(now, seconds);
   const place = axes(on, colours, [end - seconds, end], padded(low, high, least), " s");
@@ -115,29 +143,12 @@ export function overTime(canvas, colours, series, name, { now, seconds, levels =
   for (const level of levels) line(pen, [[ROOM.left, place.y(level)], [width, place.y(level)]]);
   pen.setLineDash([]);
   for (const { history, colour } of series) {
-    // a column of pixels shows the lowest and highest of its samples, so that chattering is drawn whole
-    pen.strokeStyle = colour;
-    pen.lineWidth = 1.6;
-    pen.beginPath();
-    let [column, least, most, last] = [null, 0, 0, 0];
-    const finish = () => {
-      if (column === null) return;
-      pen.lineTo(column, least);
-      if (most !== least) pen.lineTo(column, most);
-      pen.lineTo(column, last);
-    };
-    history.each((i) => {
-      const [x, y] = [Math.round(place.x(history.t[i]) * 2) / 2, place.y(history[name][i])];
-      if (x !== column) {
-        finish();
-        [column, least, most] = [x, y, y];
-      }
-      least = Math.min(least, y);
-      most = Math.max(most, y);
-      last = y;
+    names.forEach((name, j) => {
+      pen.globalAlpha = j ? 0.5 : 1;
+      pen.strokeStyle = colour;
+      pen.lineWidth = j ? 1.2 : 1.6;
+      curve(pen, place, history, name);
     });
-    finish();
-    pen.stroke();
   }
   pen.restore();
 }
