@@ -1,5 +1,6 @@
 """The live page as a folder: the page's own files, the facts, the laws in JavaScript, and the packages from npm."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -12,6 +13,7 @@ from smc_mujoco.control.c.javascript import law_to_js
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.control.law import law as find_law
+from smc_mujoco.control.law import laws as laws_for
 from smc_mujoco.draw.live import facts as known
 from smc_mujoco.draw.live import npm
 from smc_mujoco.mechanisms.plant import Plant
@@ -45,9 +47,12 @@ def live(
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
     chosen = known.checked(names or PLANTS)
     own = [_own(law) for law in taken("laws", laws)]
-    page = known.facts(chosen, own)
     functions = {law.name: law_to_js(law) for law in own}
-    functions |= {name: law_to_js(find_law(name)) for name in page["laws"] if name not in functions}
+    library = [law for law in _library(chosen) if law.name not in functions]
+    for law in library:
+        with contextlib.suppress(ScenarioError):  # of one that no browser runs, such as a law in C
+            functions[law.name] = law_to_js(law)
+    page = known.facts(chosen, [law for law in library if law.name in functions], own)
     folder = _free(Path(out))
     vendor = npm.fetched()
     shutil.copytree(PAGE, folder, dirs_exist_ok=True)
@@ -56,6 +61,11 @@ def live(
     (folder / "laws.js").write_text(f"export const laws = {{\n{entries},\n}};\n", encoding="utf-8")
     (folder / MARK).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
     return folder / "index.html"
+
+
+def _library(chosen: Sequence[Plant]) -> list[Component]:
+    """Return the laws of the library that suit one of the plants."""
+    return [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
 
 
 def _own(law: object) -> Component:

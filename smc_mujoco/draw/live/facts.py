@@ -65,10 +65,9 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
     return found
 
 
-def facts(chosen: Sequence[Plant], own: Sequence[Component]) -> dict[str, Any]:
-    """Return what the page knows of these plants, of the library's laws for them, and of the user's own laws."""
-    library = {name: law for plant in chosen for name in laws(plant) if (law := _library_law(name)) is not None}
-    known = library | {law.name: law for law in own}
+def facts(chosen: Sequence[Plant], library: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
+    """Return what the page knows of these plants, of laws of the library, and of the user's own laws."""
+    known = {law.name: law for law in (*library, *own)}
     suited = {plant.name: [law for law in known.values() if _suits(law, plant)] for plant in chosen}
     return {
         "version": __version__,
@@ -81,11 +80,6 @@ def facts(chosen: Sequence[Plant], own: Sequence[Component]) -> dict[str, Any]:
         "plants": {plant.name: _plant(plant, suited[plant.name], own) for plant in chosen},
         "laws": {name: _law(law) for name, law in known.items()},
     }
-
-
-def _library_law(name: str) -> Component | None:
-    """Return a law of the library with its defaults; None for the one whose numbers have 32 bits."""
-    return None if name == "observer_free_single" else gain_sets.find_law(name)
 
 
 def _suits(law: Component, plant: Plant) -> bool:
