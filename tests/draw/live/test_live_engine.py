@@ -59,7 +59,7 @@ def test_no_condition_goes_unnoticed(found):
     ("chosen", "why"),
     [
         ({"plant": "duffing", "law": "pid", "gains": {"kp": 1.7e308}, "x0": [2.0]}, "law is not finite"),
-        ({"plant": "van_der_pol", "law": "observer_free", "x0": [3e6]}, "diverged"),
+        ({"plant": "van_der_pol", "law": "observer_free", "x0": [1e6]}, "diverged"),
     ],
 )
 def test_a_run_that_fails_ends_where_run_ends_it(folder, chosen, why):
