@@ -10,7 +10,7 @@ anyway. Super-twisting stands still, once its integral holds the friction.
 
 import smc_mujoco as smc
 
-HANGING = -3.14159265  # rad
+HANGING = -3.1416  # rad: just past -pi, from where the way up that the laws take ends at 0 and not at -2 pi
 LAWS = {
     "relay": smc.law("rotary_swing_up", k=0.04, phi=1e-4, k1=0.0, k2=0.0),
     "boundary layer": smc.law("rotary_swing_up", k=0.05, phi=0.025, k1=0.0, k2=0.0),
@@ -31,8 +31,8 @@ def rocking(trace):
 def answer(runs):
     rubs = runs["arm rubs"]
     return (
-        f"the pendulum stands with {rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1).named}; where it rubs the arm "
-        f"rocks least, in degrees, with {rubs.least(rocking)}, most with {rubs.most(rocking)}"
+        f"where the arm rubs it stands with {rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1).named}; the arm rocks "
+        f"least, in degrees, with {rubs.least(rocking)}, most with {rubs.most(rocking)}"
     )
 
 

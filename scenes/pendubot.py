@@ -27,7 +27,8 @@ def lean(trace):
 
 
 def answer(runs):
-    return f"it stands after {runs.those(stands).named}; it leans farthest, in degrees, after {runs.most(lean)}"
+    standing = runs.those(stands)
+    return f"it stands after {standing.named}; of these it leans farthest, in degrees, after {standing.most(lean)}"
 
 
 scene = smc.Scene(

@@ -20,9 +20,9 @@ def answer(runs):
 scene = smc.Scene(
     title="Relative degree 3",
     conditions={
-        name: {
+        condition: {
             label: smc.Scenario(
-                plant=name,
+                plant=plant,
                 law=law,
                 surface=surface,
                 duration=6.0,
@@ -36,7 +36,10 @@ scene = smc.Scene(
                 ("classical, 3rd", "classical", "higher_order"),
             )
         }
-        for name, jerk in {"duffing": 200.0, "inverted_pendulum": 1000.0}.items()
+        for condition, plant, jerk in (
+            ("Duffing", "duffing", 200.0),
+            ("inverted pendulum", "inverted_pendulum", 1000.0),
+        )
     },
     answers=("settling_time", "ultimate_bound", "tv_rate"),
     answer=answer,

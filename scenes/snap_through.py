@@ -18,7 +18,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Duffing as a snap-through of two springs",
+    title="Double well",
     conditions={
         name: smc.paper.comparison(
             "duffing", laws=("observer_free", "super_twisting"), duration=5.0, changes={"mechanism": name}

@@ -19,7 +19,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Van der Pol under measurement noise",
+    title="Van der Pol oscillator",
     conditions={name: smc.paper.comparison("van_der_pol", name) for name in ("nominal", "noise")},
     film="noise",
     answer=answer,

@@ -19,7 +19,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Van der Pol, nominal",
+    title="Van der Pol oscillator, nominal",
     conditions={"nominal": smc.paper.comparison("van_der_pol", "nominal")},
     answer=answer,
 )

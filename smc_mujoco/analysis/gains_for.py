@@ -44,7 +44,7 @@ class Design:
     Attributes:
       law: the law with these gains.
       chattering: predicted for it.
-      disturbance: the largest constant force that it bears, N m or N, in runs of 10 s: see `smc.margins`. NaN if it
+      disturbance: the largest constant force that it tolerates, N m or N, in runs of 10 s: see `smc.margins`. NaN if it
         does not hold the plant even without one.
       size, speed: q and w, over the gains that were given.
     """
@@ -115,14 +115,14 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
                 f"{base.law.name} of amplitude {amplitude:g} oscillates at {found.frequency:.3g} Hz, above the wanted "
                 f"{frequency:g}: give a larger frequency, or another amplitude"
             )
-        (borne,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
-    if math.isnan(borne.value):
+        (tolerated,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
+    if math.isnan(tolerated.value):
         warnings.warn(
             f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",
             ScenarioWarning,
             users_frame(),
         )
-    return Design(law=chosen.law, chattering=found, disturbance=borne.value, size=size, speed=speed)
+    return Design(law=chosen.law, chattering=found, disturbance=tolerated.value, size=size, speed=speed)
 
 
 def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, strength: float) -> float:

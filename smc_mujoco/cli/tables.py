@@ -398,8 +398,8 @@ def _share(share: float) -> str:
 
 
 def designs(designs: Sequence[Design], unit: str) -> Table:
-    """Return the gains of each design and the constant disturbance, in this unit, that it bears."""
-    table = titled("largest gains", "law", "gains", Column(f"bears ({unit})", justify="right"))
+    """Return the gains of each design and the constant disturbance, in this unit, that it tolerates."""
+    table = titled("largest gains", "law", "gains", Column(f"tolerates ({unit})", justify="right"))
     for one in designs:
         gains = ", ".join(f"{name}={number(gain)}" for name, gain in one.law.gains.items() if math.isfinite(gain))
         table.add_row(Text(one.law.name, style=style.law_colour(one.law.name)), gains, number(one.disturbance))

@@ -42,7 +42,7 @@ class Trace:
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
       d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
-      r: reference, (K + 1, n).
+      r: reference, (K + 1, n); of free joints, which have none, the plant's goal.
       force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
         over the control period that ends at t_k, of the values at its physics steps, so that no blow is missed; at
@@ -242,6 +242,8 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     diverged_at = None
     end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
     arrays = {name: np.ascontiguousarray(log[name]) for name in LOGGED}
+    if scenario.plant.goal:
+        arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
     finite = np.array([np.isfinite(values[:end]).all(axis=1) for values in arrays.values()])
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))

@@ -602,3 +602,10 @@ def test_a_file_from_before_there_was_a_voltage_loads_as_the_same_scenario(tmp_p
     del about["feedforward"], about["actuator"][0]["values"]["command"]
     np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
     assert smc.load(tmp_path / "old.npz").scenario == trace.scenario
+
+
+def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
+    upright = (0.0, math.pi)
+    trace = smc.run(smc.Scenario(plant="acrobot", law="none", x0=upright, duration=0.05))
+    assert (trace.r == upright).all()
+    assert smc.scores(trace)["free"]["ultimate_bound"] < 1e-9

@@ -245,7 +245,7 @@ def chatter(
     motion: where that is not small, they oscillate together, and the prediction, for one channel alone, fails.
 
     With --amplitude or --frequency the gains of each law are made larger or smaller, in proportion, until the
-    prediction is what was asked for, and the constant disturbance that they bear is measured.
+    prediction is what was asked for, and the constant disturbance that they tolerate is measured.
 
     Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
     """

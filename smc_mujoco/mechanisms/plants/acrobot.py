@@ -6,6 +6,7 @@ upright. Dry friction is left out of the nominal f and g.
 """
 
 import dataclasses
+import math
 
 from smc_mujoco.mechanisms.plants import double_pendulum as both
 
@@ -30,5 +31,6 @@ ACROBOT = dataclasses.replace(
     build=build,
     nominal=nominal,
     underactuated=True,
+    goal=(math.pi,),
     limits=(both.LIMIT,),
 )
