@@ -52,6 +52,9 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder as Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb as Coulomb
 from smc_mujoco.mechanisms.hardware.friction import LuGre as LuGre
 from smc_mujoco.mechanisms.hardware.friction import Viscous as Viscous
+from smc_mujoco.mechanisms.hardware.servos import ServoFriction as ServoFriction
+from smc_mujoco.mechanisms.hardware.servos import servo as servo
+from smc_mujoco.mechanisms.hardware.sliding import Sigmoid as Sigmoid
 from smc_mujoco.mechanisms.plant import Plant as Plant
 from smc_mujoco.mechanisms.plant import plant as plant
 from smc_mujoco.mechanisms.plant import plants as plants

@@ -76,6 +76,11 @@ class Setting:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
+        if self.scenario.sliding is not None:
+            raise ScenarioError(
+                f"friction {type(self.scenario.sliding).__name__} is computed by the runs of a law, and an environment "
+                "has MuJoCo's frictions alone: give Viscous, Coulomb or LuGre"
+            )
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)

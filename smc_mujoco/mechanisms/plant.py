@@ -136,6 +136,7 @@ class Plant:
       smooth: whether its model has no limits, contacts, dry friction and equality constraints.
       dry: names of the parameters that are dry friction. A plant with one that is not 0 is not smooth.
       unmodelled: why there is no nominal model, or "".
+      friction: that of its joints by its source, to give to a scenario, whose default is none; or None.
       limits: largest force of each driven channel's motor, N m or N; empty: no limits.
       label, short: long and short name in figures; "": made from its name.
       jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
@@ -167,6 +168,7 @@ class Plant:
     smooth: bool = True
     dry: tuple[str, ...] = ()
     unmodelled: str = ""
+    friction: Any = None  # a hardware.part.Friction
     limits: tuple[float, ...] = ()
     ranges: tuple[tuple[str, float, float], ...] = ()
     label: str = ""

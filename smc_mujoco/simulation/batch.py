@@ -43,7 +43,8 @@ class Chunk:
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         for i, (one, log) in enumerate(zip(prepared, self.logs, strict=True)):
-            self.records[i], packed = pack(one, self.channels, log, self.model)
+            own = self.model if one.scenario.sliding is None else assembly.with_values(self.compiled, one.scenario)
+            self.records[i], packed = pack(one, self.channels, log, own)
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
@@ -164,6 +165,7 @@ class Chunk:
             state.LAW_RAISED: f"{law} raised an exception",
             state.DISTURBANCE_RAISED: "a disturbance raised an exception",
             state.INTERRUPTED: reference.INTERRUPTED,
+            state.FRICTION_RAISED: f"friction {type(scenario.sliding).__name__} raised an exception",
             state.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[failure]
 

@@ -65,6 +65,8 @@ def callback():
             pointer(integers(data + at.xanchor)[0]),
             pointer(integers(data + at.actuator_force)[0]),
             pointer(integers(data + at.qfrc_constraint)[0]),
+            pointer(integers(data + at.qfrc_bias)[0]),
+            pointer(integers(data + at.qfrc_spring)[0]),
         )
         run_simulation(address, simulation_at(address, 0), arrays)
 

@@ -13,14 +13,14 @@ from smc_mujoco.mechanisms.plant import DIRECTLY
 #   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
 #   push: of a horizontal force on the body in xfrc_applied, with `push_sign`
 #   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor; -1 for a slide
-#   friction: of a friction in actuator_force
+#   friction, brake: of a friction in actuator_force, and in ctrl if the callback computes it
 #   direct: in qfrc_applied, in users' models, whose disturbances act on the joint itself
 CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
             "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "xfrc", "sign", "push", "push_sign", "tip",
-            "anchor", "friction", "direct",
+            "anchor", "friction", "brake", "direct",
         )
     ]
 )  # fmt: skip
@@ -78,6 +78,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "tip": -1,
         "anchor": -1,
         "friction": -1 if friction < 0 else model.actuator_outadr[friction],
+        "brake": -1 if friction < 0 or not model.actuator_ctrlnum[friction] else model.actuator_ctrladr[friction],
         "direct": model.jnt_dofadr[joint] if direct else -1,
     }
     if hinge:

@@ -5,8 +5,8 @@ At the first stage of a control sample, for each channel:
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through the first of two drives
-in series. At every stage, disturbance(t) goes to xfrc_applied. Each sample is logged with the mean forces since the
-last one.
+in series. At every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
+Each sample is logged with the mean forces since the last one.
 
 Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
 again, so the clock cannot distinguish a sample from a last stage. A run that diverges, or whose law raises an
@@ -22,6 +22,7 @@ from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import HEADER, VECTORS
+from smc_mujoco.mechanisms.hardware.sliding import SLOW
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at
@@ -45,6 +46,8 @@ class Arrays(NamedTuple):
     xanchor: object
     actuator_force: object
     qfrc_constraint: object
+    qfrc_bias: object
+    qfrc_spring: object
 
 
 @njit(error_model="numpy")
@@ -78,6 +81,8 @@ def control(at, sim, data):
     if sim.signal_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
         failure = _disturb(at, sim, data, k * sim.period + (within + fraction) * sim.step)
+    if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
+        failure = _rub(at, sim, data)
     if failure != record.FINE:
         sim.failure, sim.failed_step = failure, step
         _release(sim, data)
@@ -342,6 +347,8 @@ def _release(sim, data):
         _clear(data, channel)
         if channel.ctrl >= 0:
             data.ctrl[channel.ctrl] = 0.0
+        if channel.brake >= 0:
+            data.ctrl[channel.brake] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -417,6 +424,36 @@ def _disturbance(data, channel):
         arm = data.xipos[channel.tip] - data.xanchor[channel.anchor]
         d += channel.push_sign * arm * data.xfrc_applied[channel.push]
     return d
+
+
+@njit(error_model="numpy")
+def _rub(at, sim, data):
+    """Give every joint its friction by a formula for a physics step, see hardware/sliding.py. Return a failure code."""
+    rubbing, resistance = sim.rubbing, sim.resistance
+    for i in range(sim.n):
+        channel, state, function = channel_at(sim.channels, i), state_at(sim.states, i), function_at(sim.frictions, i)
+        x, v, joint = data.qpos[channel.qpos], data.qvel[channel.qvel], channel.qvel
+        rubbing.v, rubbing.motor = v, data.actuator_force[channel.force] if channel.force >= 0 else 0.0
+        rubbing.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
+        rubbing.load += data.qfrc_constraint[joint] + _disturbance(data, channel)
+        pointer(sim.joints)[0] = i
+        if _call(function, 0, at + record.RUBBING_AT, at + record.RESISTANCE_AT) != 0:
+            return record.FRICTION_RAISED
+        f, low, high = resistance.f, resistance.low, resistance.high
+        if state.stuck == 0.0:
+            slows = abs(v) < SLOW and abs(v) <= abs(state.speed)
+            if slows or v * state.speed < 0.0:
+                state.stuck, state.stuck_at = 1.0, x
+        if state.stuck != 0.0:
+            bristle = pointer(function.memory)
+            bend = bristle[0] * (x - state.stuck_at)
+            if low <= bend <= high and low < high:
+                f = min(max(bend + bristle[1] * v, low), high)
+            else:
+                state.stuck = 0.0
+        state.speed = v
+        data.ctrl[channel.brake] = -f
+    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")

@@ -38,6 +38,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import HEADER, measurement_at
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
 
@@ -167,6 +168,25 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
     return made
 
 
+@functools.cache
+def _friction(function: Callable, names: tuple[str, ...]) -> Function:
+    """Compile v, motor, load -> what resists, and the bounds of what holds, of a friction by a formula."""
+    body, values = jit(function), loader(named(names))
+
+    def native(y, p, m, out):
+        i = carray(pointer(y), (3,))
+        ok, result = attempt(body, (i[0], i[1], i[2], values(p)))
+        if ok:
+            f, low, high = result
+            output = carray(pointer(out), (3,))
+            output[0], output[1], output[2] = f, low, high
+        return not ok
+
+    made = Function(native, _cached(function, names))
+    fingerprint.hold(function)
+    return made
+
+
 def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
     """Return the name and the hash under which a compiled function is kept on disk.
 
@@ -200,6 +220,11 @@ def component(c: Component) -> Function | AtAddress:
 def of_signal(s: Signal) -> Function:
     """Return a signal, compiled; raises as `component`."""
     return _named(type(s).__name__, _signal, type(s), tuple(s.parameters()))
+
+
+def of_friction(f: Sliding) -> Function:
+    """Return the formula of a friction, compiled; raises as `component`."""
+    return _named(type(f).__name__, _friction, type(f).value, f.names)
 
 
 def values_of(s: Signal) -> tuple[float, ...]:

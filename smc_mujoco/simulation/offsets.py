@@ -49,6 +49,8 @@ class Offsets(NamedTuple):
     sensordata: int
     xipos: int
     xanchor: int
+    qfrc_bias: int
+    qfrc_spring: int
     actuator_force: int
     qfrc_constraint: int
 

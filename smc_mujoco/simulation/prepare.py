@@ -19,6 +19,7 @@ from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, at
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Coupled
 from smc_mujoco.simulation import model, native, state
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -39,6 +40,7 @@ class Compiled:
     references: tuple[Function, ...]  # one for all channels, or one for each driven channel
     feedforward: Function | None
     disturbances: tuple[Function, ...]
+    friction: Function | None  # by a formula
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -111,6 +113,7 @@ def _compile(s: Resolved) -> Compiled:
         references=tuple(native.of_signal(signal) for signal in references(s)),
         feedforward=s.feedforward and native.of_signal(s.feedforward),
         disturbances=tuple(map(native.of_signal, s.disturbance)),
+        friction=s.sliding and native.of_friction(s.sliding),
     )
 
 
@@ -132,6 +135,7 @@ class Packed:
       numbers: gains, memories and all else that is float64.
       signals: the disturbances, (m,) SIGNAL.
       laws, references: those of the driven channels, (driven,) FUNCTION; (0,) where all have the same.
+      frictions: by a formula, (n,) FUNCTION, or (0,).
       nominal: the data of MuJoCo's own nominal model, or None.
     """
 
@@ -139,6 +143,7 @@ class Packed:
     signals: np.ndarray
     laws: np.ndarray
     references: np.ndarray
+    frictions: np.ndarray
     nominal: Any
 
 
@@ -148,7 +153,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
     Args:
       channels: (n,) CHANNEL.
       log: (K + 1, n) LOG, written at samples.
-      mechanism: the compiled model.
+      mechanism: the compiled model, with the scenario's own values if it has a friction by a formula.
 
     `channels` and `log` must outlive the run, too.
     """
@@ -191,6 +196,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         function(made, native.values_of(d), d.memory)
         for made, d in zip(compiled.disturbances, s.disturbance, strict=True)
     ]
+    frictions = _frictions(compiled.friction, s.sliding, mechanism.dof_M0[channels["qvel"]], buffer)
     slots = s.delay_steps // s.steps + 1
     joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
     states = buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n)
@@ -213,11 +219,13 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         ],
         state.SIGNAL,
     )
+    several = {
+        name: [] if len(each) == 1 else each
+        for name, each in (("laws", law_functions), ("references", signal_functions))
+    }
     tables = {
-        name: np.array(
-            [state.as_tuple(state.FUNCTION, placed(one)) for one in listed] if len(listed) > 1 else [], state.FUNCTION
-        )
-        for name, listed in (("laws", law_functions), ("references", signal_functions))
+        name: np.array([state.as_tuple(state.FUNCTION, placed(one)) for one in each], state.FUNCTION)
+        for name, each in (several | {"frictions": frictions}).items()
     }
     at = buffer.address(joints)
     values: dict[str, Any] = {name: placed(found) for name, found in functions.items()}
@@ -276,6 +284,16 @@ def pushed(disturbance: Signal, mechanism: mujoco.MjModel) -> dict[str, Any]:
     if not isinstance(disturbance, Push):
         return {"body": -1, "peak": (0.0, 0.0, 0.0)}
     return {"body": 6 * mechanism.body(disturbance.body).id, "peak": (disturbance.x, disturbance.y, disturbance.z)}
+
+
+def _frictions(
+    made: Function | None, friction: Sliding | None, inertia: np.ndarray, buffer: state.Buffer
+) -> list[dict[str, int]]:
+    """Put the numbers of a friction by a formula into the buffer. Return the FUNCTIONs of joints of these inertias."""
+    if made is None or friction is None:
+        return []
+    places = [(buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))) for i, a in enumerate(inertia)]
+    return [{"address": made.address, "parameters": first, "memory": second} for first, second in places]
 
 
 def joint_gains(law: Component, n: int) -> list[float]:

@@ -19,6 +19,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware import encoder
+from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
 from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Plant, Values
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox, trace
@@ -91,6 +92,10 @@ class Loop:
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.tandem, self.first = scenario.tandem, np.zeros(n)  # two drives in series, and the output of the first
         self.limits = np.array(scenario.limits)
+        inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.sliding
+        self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
+        self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
+        self.stuck, self.speed = [math.nan] * n, [0.0] * n  # where joints stick, NaN: they slide; speeds a step before
         self.arrived = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -126,6 +131,8 @@ class Loop:
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.disturb(data, t)
+            if self.sliding:
+                self.rub(data, d)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
@@ -276,6 +283,28 @@ class Loop:
         for body, one in zip(bodies, pushes, strict=True):
             data.xfrc_applied[body, :3] += evaluate(one, t)[0] * np.array([one.x, one.y, one.z])
 
+    def rub(self, data: mujoco.MjData, d: np.ndarray) -> None:
+        """Give the joints their friction by a formula for a physics step, under the disturbances d, (n,)."""
+        at = self.channels
+        for i, formula in enumerate(self.sliding):
+            dof = at["qvel"][i]
+            x, v = float(data.qpos[at["qpos"][i]]), float(data.qvel[dof])
+            motor = float(data.actuator_force[at["force"][i]]) if self.forced[i] else 0.0
+            load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
+            friction, low, high = formula(v, motor, load + float(data.qfrc_constraint[dof] + d[i]))
+            stuck, before = not math.isnan(self.stuck[i]), self.speed[i]
+            slows = abs(v) < SLOW and abs(v) <= abs(before)
+            if not stuck and (slows or v * before < 0.0):
+                stuck, self.stuck[i] = True, x
+            if stuck:
+                stiffness, damping = self.bristles[i]
+                bend = stiffness * (x - self.stuck[i])
+                if low < high and low <= bend <= high:
+                    friction = min(max(bend + damping * v, low), high)
+                else:
+                    self.stuck[i] = math.nan
+            self.speed[i], data.ctrl[at["brake"][i]] = v, -friction
+
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
         self.forces[0] += np.where(self.forced, data.actuator_force[self.channels["force"]], 0.0)
@@ -356,6 +385,22 @@ class PythonComponent:
         if u.shape != (n,) or s.shape != (n,):
             raise Failure(f"{self.name} returned {shown(out)} instead of two vectors u, s of {n} numbers each")
         return u, s
+
+
+class PythonFriction:
+    """The formula of a friction, for one channel."""
+
+    def __init__(self, friction: Sliding, i: int):
+        self.name, self.value = type(friction).__name__, type(friction).value
+        self.numbers = jit.named(friction.names)(*(friction.parameters(i) or [0.0]))
+
+    def __call__(self, v: float, motor: float, load: float) -> list[float]:
+        """Return what resists, and the bounds of what holds."""
+        try:
+            out = self.value(v, motor, load, self.numbers)
+        except RAISES as error:
+            raise raised(f"friction {self.name}", error) from error
+        return numbers(f"friction {self.name}", out, "a force and two bounds", 3)
 
 
 class OnRequest:

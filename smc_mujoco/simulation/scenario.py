@@ -29,6 +29,7 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.perturbations import Jump, Noise
@@ -98,7 +99,7 @@ class Scenario:
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, else implicitfast.
-      friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, or several of them.
+      friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
       actuator: between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag followed by another drive, and
@@ -284,6 +285,11 @@ class Scenario:
     def jump_step(self) -> int:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
+
+    @functools.cached_property
+    def sliding(self) -> Sliding | None:
+        """The friction by a formula, which the callback evaluates; None without one."""
+        return next((part for part in self.friction if isinstance(part, Sliding)), None)
 
     @property
     def tandem(self) -> Tandem | None:
@@ -520,6 +526,8 @@ def check_mechanism(s: Resolved) -> None:
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )
+    for part in s.friction:
+        part.check(s.plant)
     for step in (0, s.samples * s.steps):
         check_parameters(s.plant, s.mechanism, frozen(s.factors(step)))
         check_contact(s.contact, s.plant, s.factors(step))

@@ -18,7 +18,7 @@ from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.rig_controllers import CONTROLLERS
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
-from smc_mujoco.mechanisms.hardware import backlash, drives, friction  # noqa: F401  # whose parts a file may name
+from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant

@@ -29,9 +29,13 @@ INSTANT = floats(("t", "seed", "channel", "stream"))
 CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 
+# A friction by a formula: speed, force of the drive and load -> what resists, and the bounds of what holds.
+RUBBING, RESISTANCE = floats(("v", "motor", "load")), floats(("f", "low", "high"))
+
 # The state of a channel between calls: the last reading that was not lost, the command after its delay, the output
-# of the first of two drives, and sums over a control period of the drive's force and of friction and contacts.
-CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction"))
+# of the first of two drives, and sums over a control period of the drive's force and of friction and contacts; whether
+# a friction by a formula sticks, where, and the speed at the step before.
+CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction", "stuck", "stuck_at", "speed"))
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
 # the drive's force, what friction and contacts exert.
@@ -69,6 +73,8 @@ SIMULATION = np.dtype(
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
         # addresses of the FUNCTIONs of the driven channels, where they differ; 0: `law` and `reference` are of all
         ("laws", "i8"), ("references", "i8"),
+        # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and damping; 0: none
+        ("frictions", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"), ("drive_drag", "f8"),
         # addresses of the nominal model's input (i, n, x, v, a, u; the last four (n,) each) and of x, v, a and u in it
@@ -79,7 +85,7 @@ SIMULATION = np.dtype(
         ("joint", "i8"), ("torques", "i8"), ("dynamics", FUNCTION), ("on_request", "i8"),
         # inputs and outputs of functions
         ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("control", CONTROL), ("sliding", SLIDING),
-        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),
+        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL), ("rubbing", RUBBING), ("resistance", RESISTANCE),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
     ],
     align=True,
@@ -91,16 +97,21 @@ simulation_at, state_at, log_at, signal_at, function_at = map(
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
-MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT = (
+(
+    MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, RUBBING_AT,
+    RESISTANCE_AT,
+) = (
     SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
-    for name in ("y", "reading", "instant", "control", "sliding", "estimate", "motion", "model")
-)
+    for name in (
+        "y", "reading", "instant", "control", "sliding", "estimate", "motion", "model", "rubbing", "resistance",
+    )
+)  # fmt: skip
 
 # Values of `failure`.
 (
     FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE, ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED,
-    DISTURBANCE_RAISED, SURFACE_RAISED, FEEDFORWARD_RAISED, INTERRUPTED,
-) = range(12)  # fmt: skip
+    DISTURBANCE_RAISED, SURFACE_RAISED, FEEDFORWARD_RAISED, FRICTION_RAISED, INTERRUPTED,
+) = range(13)  # fmt: skip
 
 
 def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:

@@ -67,6 +67,9 @@ class Part:
 class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
+    def check(self, plant: Plant) -> None:
+        """Raise ScenarioError if it does not suit the plant."""
+
 
 class Nominal(NamedTuple):
     """Force of an actuator as the law's model knows it: gain u - drag v.

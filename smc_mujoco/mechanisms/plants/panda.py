@@ -14,8 +14,8 @@ its frame:
 m is the mass of the links, which scales all their masses and inertias; payload is that of a steel ball whose centre is
 the distance lp along the flange's axis from the flange. A mismatch or a jump adds kg to the payload, which is 0 by
 default. Each channel's nominal f has the other's commands; it is MuJoCo's own. The default reference is the maker's
-ready pose, `rest`; runs start from the home pose of mujoco_menagerie. The friction of the joints is none by default:
-see `smc.Sigmoid`.
+ready pose, `rest`; runs start from the home pose of mujoco_menagerie. The joints have no friction by
+default; `friction=smc.plant("panda").friction` is that which Gaz et al. identified.
 Source: masses, centres and inertias of the links: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca,
 Dynamic identification of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
 optimization, IEEE Robotics and Automation Letters 4(4), 2019, as in mujoco_menagerie's panda_nohand (Apache-2.0), which
@@ -30,6 +30,7 @@ import mujoco
 
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.contact import box, rub
+from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
@@ -42,6 +43,12 @@ RUBBING = 0.2  # coefficient of friction between the probe and table or wall: ch
 READY = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # rad, the maker's
 RANGES = ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973))
 RANGES += ((-0.0175, 3.7525), (-2.8973, 2.8973))  # rad
+# N m, s/rad, rad/s, of each joint: Gaz et al.
+FRICTION = Sigmoid(
+    p1=(0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489),
+    p2=(5.1181, 9.0657, 10.136, 5.5903, 8.3469, 17.133, 10.336),
+    p3=(0.0395, 0.0259, -0.0461, 0.0362, 0.0262, -0.0210, 0.0036),
+)
 
 
 def build(n):
@@ -95,6 +102,7 @@ PANDA = Plant(
     added=("payload",),
     direct=True,
     tip="tip",
+    friction=FRICTION,
     smooth=False,
     limits=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
     ranges=tuple((name, low, high) for name, (low, high) in zip(JOINTS, RANGES, strict=True)),

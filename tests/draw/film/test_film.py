@@ -341,7 +341,8 @@ def stuck() -> smc.Trace:
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
-    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    start = None if smc.plant(plant).ranges else 0.5
+    scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
     model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = [geom.name for geom in assembly.spec([scenario]).geoms if geom.name not in ("", "floor")]
@@ -358,7 +359,8 @@ def stood(scenarios) -> np.ndarray:
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
 def test_machines_side_by_side_keep_apart(plant, field, name):
-    scenario = smc.Scenario(plant=plant, law="none", x0=0.5, duration=0.1, **{field: name})
+    start = None if smc.plant(plant).ranges else 0.5
+    scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
     corners = scene.fixed_boxes(assembly.model([scenario]))[..., :2]
     low, high = corners.min(axis=1), corners.max(axis=1)
     step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]

@@ -1,0 +1,158 @@
+"""Friction by a published formula of speed and load, which MuJoCo does not have: the callback evaluates it.
+
+A formula gives the force F that resists a joint which slides at the speed v, and the bounds [low, high] of what holds
+it at rest. The bounds matter where F is a smooth function with F(0) = 0, as in fits to records of moving joints: by F
+alone a joint at rest under a load creeps, at the speed at which F is the load. So a joint slides or sticks:
+
+    slides:  friction = -F(v, motor, load)
+    sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high), like a LuGre bristle that does not slip
+
+It sticks from where its speed changes sign, or falls below SLOW; x_s is its position then. It slides again once
+stiffness (x - x_s) is beyond the bounds. So friction is F to the last bit while the joint slides, and at rest it holds
+without creep, because the friction of a stuck joint depends on its position. After a load comes, the joint turns by
+load/stiffness, and its speed decays: as exp(-200 t/s) alone, slower where other joints move with it. A joint that
+slides goes on at the speed at which F is the load.
+
+What the callback computes is the control of an actuator `passive:<joint>`, held over each physics step.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joints
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
+
+SLOW = 1e-4  # rad/s or m/s, chosen: a joint that slows down below this speed sticks
+BRISTLE = 200.0  # rad/s, chosen: natural frequency of a stuck joint, which two steps of 1 ms resolve; critically damped
+MOST_EXPONENT = 700.0  # exp of more overflows
+
+PerJoint = float | Sequence[float]  # one number for all channels, or one for each
+
+
+@dataclasses.dataclass(frozen=True)
+class Sliding(Friction):
+    """Base of frictions by a formula.
+
+    A class states its numbers as fields, each one for all joints or a sequence with one for each channel.
+
+    Attributes:
+      stiffness: N m/rad (N/m) of a stuck joint. None: that of BRISTLE, with each joint's inertia at the start of the
+        run, at qpos0.
+    """
+
+    stateful = True
+    names: ClassVar[tuple[str, ...]] = ()  # of the fields that the formula reads as p
+
+    stiffness: PerJoint | None = dataclasses.field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        self.check_each("stiffness", above=0.0)
+
+    @staticmethod
+    def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
+        """Return F, low and high, N m (N).
+
+        Args:
+          v: speed of the joint, rad/s (m/s).
+          motor: force of its drive in the physics step before, N m (N).
+          load: what all else exerts on it: gravity, gyration, springs and disturbances, and the contacts and limits of
+            the step before.
+          p: the numbers of its channel, by name.
+        """
+        raise NotImplementedError
+
+    def check_each(self, *names: str, **bounds: Any) -> None:
+        """Replace fields by floats, or tuples of them. None stays if it is the field's default.
+
+        Raises:
+          ScenarioError: a field is not a number, or a sequence of numbers, within these bounds.
+        """
+        limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
+        for name in names:
+            value, called = getattr(self, name), f"{type(self).__name__}'s {name}"
+            if value is None and getattr(type(self), name, 0.0) is None:
+                continue
+            if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+                value = tuple(number(f"{called}[{i}]", one, **limits) for i, one in enumerate(value))
+            else:
+                value = number(called, value, **limits)
+            object.__setattr__(self, name, value)
+
+    def check(self, plant: Plant) -> None:
+        for name in (*self.names, "stiffness"):
+            value = getattr(self, name)
+            if isinstance(value, tuple) and len(value) != plant.n:
+                raise ScenarioError(
+                    f"{type(self).__name__}'s {name} has {len(value)} values, {shown(value)}, and {plant.name} has "
+                    f"{plant.n} channels: give one number, or {plant.n}"
+                )
+
+    def parameters(self, i: int) -> tuple[float, ...]:
+        """Return the numbers of channel i that `value` reads, NaN for None."""
+        return tuple(math.nan if (one := _of(getattr(self, name), i)) is None else one for name in self.names)
+
+    def bristle(self, i: int, inertia: float) -> tuple[float, float]:
+        """Return stiffness and damping of channel i when it sticks, critically damped, for its joint's inertia."""
+        stiffness = _of(self.stiffness, i)
+        stiffness = inertia * BRISTLE**2 if stiffness is None else stiffness
+        return stiffness, 2.0 * math.sqrt(stiffness * inertia)
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        for joint in joints(spec):
+            brake = spec.add_actuator(name=PASSIVE + joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            brake.set_to_motor()
+
+
+def _of(value: Any, i: int) -> Any:
+    """Return the value of channel i, from one for all or a tuple."""
+    return value[i] if isinstance(value, tuple) else value
+
+
+@dataclasses.dataclass(frozen=True)
+class Sigmoid(Sliding):
+    """Friction as a sigmoid of speed, as identified on robot arms.
+
+        F(v) = p1/(1 + exp(-p2 (v + p3))) - p1/(1 + exp(-p2 p3))
+
+    Source: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, Dynamic identification of the Franka
+    Emika Panda robot with retrieval of feasible parameters using penalty-based optimization, IEEE Robotics and
+    Automation Letters 4(4), 2019, eq. (11). `smc.plant("panda").friction` has its numbers.
+
+    The published F is 0 at v = 0 and cannot hold a joint at rest: under a load below its limits F(-inf) and F(inf) it
+    creeps at the speed at which F is the load, 0.2 rad/s for half of it on joint 1. How a joint holds here: see the
+    module.
+
+    Attributes:
+      p1: N m (N), F(inf) - F(-inf); 0 or more.
+      p2: s/rad (s/m), greater than 0.
+      p3: rad/s (m/s), an offset.
+      hold: N m (N), 0 or more: what holds a joint at rest, in both directions. None: the limits of F, which are what
+        dry friction tends to. 0: nothing does; friction is F alone, at rest too.
+    """
+
+    names = ("p1", "p2", "p3", "hold")
+
+    p1: PerJoint
+    p2: PerJoint
+    p3: PerJoint = 0.0
+    hold: PerJoint | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_each("p1", "hold", least=0.0)
+        self.check_each("p2", above=0.0)
+        self.check_each("p3", least=-MAX_PARAMETER)
+
+    @staticmethod
+    def value(v, motor, load, p):
+        rest = p.p1 / (1.0 + math.exp(min(-p.p2 * p.p3, MOST_EXPONENT)))
+        f = p.p1 / (1.0 + math.exp(min(-p.p2 * (v + p.p3), MOST_EXPONENT))) - rest
+        if math.isnan(p.hold):
+            return f, -rest, p.p1 - rest
+        return f, -p.hold, p.hold

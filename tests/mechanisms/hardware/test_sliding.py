@@ -1,0 +1,371 @@
+"""Frictions by a formula: exact while a joint slides, holding at rest, the same in both loops; servos under load."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.runs import assert_same
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.hardware.servos import SERVOS
+from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.simulation import reference
+
+# Gaz et al. 2019, table of the Panda's friction: N m, s/rad, rad/s
+P1 = np.array([0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489])
+P2 = np.array([5.1181, 9.0657, 10.136, 5.5903, 8.3469, 17.133, 10.336])
+P3 = np.array([0.0395, 0.0259, -0.0461, 0.0362, 0.0262, -0.0210, 0.0036])
+
+
+def sigmoid(v, p1, p2, p3):
+    """The published formula, by the identity 1/(1 + exp(-a)) = (1 + tanh(a/2))/2."""
+    return p1 / 2 * (np.tanh(p2 * (v + p3) / 2) - np.tanh(p2 * p3 / 2))
+
+
+def flywheel(mass, v0, **fields):
+    """A run of a cart of that mass, without a spring, from the speed v0."""
+    plant = smc.plant("duffing", M=mass, alpha=0.0, beta=0.0, delta=0.0)
+    return smc.run(smc.Scenario(**{"plant": plant, "law": "none", "x0": 0.0, "v0": v0, "duration": 0.05} | fields))
+
+
+def weightless(**fields):
+    """The Panda without gravity and law, from rest."""
+    common = {"plant": smc.plant("panda", grav=0.0), "law": "none", "duration": 2.0, "control_period": 2e-3}
+    return smc.Scenario(**common | fields)
+
+
+# a joint that slides
+
+
+@pytest.mark.parametrize("i", range(7))
+def test_friction_at_constant_speed_is_the_published_sigmoid(i):
+    """At 2 mrad/s to 10 rad/s, both ways: a flywheel of 1e12 kg keeps its speed to 1e-13."""
+    for v in (*np.geomspace(2e-3, 10.0, 4), *-np.geomspace(2e-3, 10.0, 4)):
+        trace = flywheel(1e12, v, friction=smc.Sigmoid(P1[i], P2[i], P3[i]))
+        assert trace.v[-1, 0] == pytest.approx(v, rel=1e-11)
+        np.testing.assert_allclose(trace.reaction[1:, 0], -sigmoid(v, P1[i], P2[i], P3[i]), rtol=0, atol=1e-9)
+
+
+def test_the_pandas_friction_is_the_published_one_in_a_thousand_states():
+    """Along five runs of 200 physics steps, at each of which the friction is logged; joints that turn do not stick."""
+    rng = np.random.default_rng(3)
+    friction = dataclasses.replace(smc.plant("panda").friction, hold=0.0)
+    steps = {"control_period": 1e-3, "physics_step": 1e-3, "duration": 0.2, "friction": friction}
+    traces = smc.run([weightless(v0=rng.uniform(-1.5, 1.5, 7), **steps) for _ in range(5)])
+    for trace in traces:
+        np.testing.assert_allclose(trace.reaction[1:], -sigmoid(trace.v[:-1], P1, P2, P3), rtol=0, atol=1e-12)
+    assert np.ptp([trace.v for trace in traces]) > 2.0
+
+
+def test_friction_takes_what_it_should_of_a_coasting_joint():
+    """v' = -F(v)/M for 1 s, against the formula's integral."""
+    from scipy.integrate import solve_ivp
+
+    trace = flywheel(1.0, 1.5, friction=smc.Sigmoid(P1[3], P2[3], P3[3]), duration=1.0)
+    exact = solve_ivp(lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10)
+    np.testing.assert_allclose(trace.v[:, 0], exact.y[0], atol=3e-4)  # of a step of 0.25 ms, of first order
+
+
+# a joint at rest
+
+
+def grows(level):
+    """A load that grows within 0.5 s, and stays."""
+    return smc.TimeSeries([0.0, 0.5, 10.0], [0.0, level, level])
+
+
+def limits(i):
+    """F(-inf) and F(inf) of joint i."""
+    return sigmoid(-1e9, P1[i], P2[i], P3[i]), sigmoid(1e9, P1[i], P2[i], P3[i])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_joints_at_rest_hold_every_load_below_their_limits_and_no_other(sign):
+    """On the arm without weight, under a load that grows to 90 % or 110 % of its joints' least limit, and stays."""
+    least = min(abs(limits(i)[int(sign > 0.0)]) for i in range(7))
+    stay, go = (
+        weightless(friction=smc.plant("panda").friction, disturbance=grows(sign * share * least))
+        for share in (0.9, 1.1)
+    )
+    held, slid = smc.run([stay, go])
+    assert np.abs(held.v[-1]).max() < 1e-6
+    assert np.abs(held.x[-1] - held.x[-250]).max() < 1e-6
+    np.testing.assert_allclose(held.reaction[-1], -sign * 0.9 * least, rtol=1e-6)
+    assert np.abs(slid.v[-1]).max() > 0.1
+
+
+def test_the_formula_alone_creeps_at_the_speed_at_which_it_is_the_load():
+    """Why joints stick here: with hold=0 half of the limit moves a joint at F^-1, about 0.2 rad/s."""
+    p, load = (P1[0], P2[0], P3[0]), 0.5 * limits(0)[1]
+    common = {"disturbance": smc.Constant(load), "duration": 5.0}
+    creep = flywheel(0.1, 0.0, friction=smc.Sigmoid(*p, hold=0.0), **common).v[-1, 0]
+    assert sigmoid(creep, *p) == pytest.approx(load, rel=1e-6)
+    assert 0.1 < creep < 0.3
+    assert abs(flywheel(0.1, 0.0, friction=smc.Sigmoid(*p), **common).v[-1, 0]) < 1e-12
+
+
+@pytest.mark.parametrize("hold", [None, 0.4])
+def test_a_joint_breaks_away_at_what_holds_it(hold):
+    """Under a load that grows by 0.2 N a second, in both directions."""
+    low, high = limits(0) if hold is None else (-hold, hold)
+    for most, slope in ((high, 0.2), (low, -0.2)):
+        part, load = smc.Sigmoid(P1[0], P2[0], P3[0], hold=hold), smc.Ramp(slope)
+        trace = flywheel(0.1, 0.0, friction=part, disturbance=load, duration=2.5)
+        start = np.argmax(np.abs(trace.v[:, 0]) > 0.01)
+        assert abs(trace.d[start, 0]) == pytest.approx(abs(most), rel=0.02)
+        assert np.abs(trace.reaction[:start]).max() <= abs(most) * (1 + 1e-9)
+
+
+def test_a_joint_that_comes_to_rest_stays_and_one_that_is_torn_loose_slides():
+    """A push of 0.1 s, then rest under a load that the limits hold; then a push after which F balances the load."""
+    push = (smc.Pulse(2.0, time=0.0, width=0.1), smc.Constant(-0.15), smc.Pulse(-2.0, time=1.5, width=0.05))
+    trace = flywheel(0.5, 0.0, friction=smc.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0)
+    v = trace.v[:, 0]
+    assert v[80] > 0.1
+    assert np.abs(v[1200:1500]).max() < 1e-6
+    assert v[1540] < -0.1
+    assert sigmoid(v[-1], P1[0], P2[0], P3[0]) == pytest.approx(-0.15, rel=1e-3)
+
+
+def test_stuck_joints_are_critically_damped_and_as_stiff_as_asked():
+    load, common = 0.1, {"duration": 0.4, "control_period": 5e-4}
+    for stiffness in (None, 500.0):
+        part = smc.Sigmoid(P1[0], P2[0], P3[0], stiffness=stiffness)
+        trace = flywheel(0.1, 0.0, friction=part, disturbance=smc.Constant(load), **common)
+        expected = load / (0.1 * 200.0**2 if stiffness is None else stiffness)
+        assert trace.x[-1, 0] == pytest.approx(expected, rel=1e-6)
+        assert trace.x.max() <= expected * (1 + 1e-9)
+
+
+def test_friction_only_takes_energy():
+    trace = flywheel(0.1, 1.0, friction=smc.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0)
+    energy = 0.05 * trace.v[:, 0] ** 2
+    bend = 0.5 * max(map(abs, limits(1))) ** 2 / (0.1 * 200.0**2)  # J, what a stuck joint can hold
+    assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + bend)
+    assert abs(trace.v[-1, 0]) < 1e-6
+
+
+# both loops, threads, numbers of a simulation's own
+
+
+@dataclasses.dataclass(frozen=True)
+class Curious(Sliding):
+    """A friction of one's own, which reads all that it may."""
+
+    names = ("a", "b")
+    a: float | tuple[float, ...] = 0.3
+    b: float | tuple[float, ...] = 0.05
+
+    @staticmethod
+    def value(v, motor, load, p):
+        dry = p.a + p.b * abs(motor - 0.5 * load)
+        return math.copysign(dry, v) + 0.1 * v, -dry, dry
+
+
+def scenarios():
+    common = {"duration": 0.1, "control_period": 2e-3, "disturbance": (smc.Sine(3.0, 40.0),)}
+    frictions = [
+        smc.plant("panda").friction,
+        smc.servo("mx106", "m6").friction,
+        Curious(a=tuple(0.1 * i for i in range(1, 8))),
+    ]
+    for friction in (*frictions, smc.Sigmoid(0.5, 9.0, hold=0.7, stiffness=300.0)):
+        yield smc.Scenario(plant="panda", law="computed_torque_sliding", friction=friction, **common)
+    yield smc.Scenario(plant="cart_pole", law="observer_free", friction=Curious(a=(0.5, 0.01)), **common)
+    servo = smc.servo("mx64", "m5", command="voltage")
+    gust = {"disturbance": smc.Gust(2.0, time=0.05, width=0.1), "duration": 0.2}
+    for start in (0.5, -1.5):
+        yield smc.Scenario(
+            plant="pendulum_network", law="classical", friction=servo.friction, actuator=servo.motor, x0=start, **gust
+        )
+    yield smc.Scenario(plant="panda", law="none", friction=frictions[0], contact="table", v0=0.5, **common)
+
+
+def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
+    several = list(scenarios())
+    for scenario, trace in zip(several, smc.run(several), strict=True):
+        assert trace.failure is None
+        assert_same(trace, reference.run(scenario))
+        assert np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2  # a joint turned back, so it stuck
+
+
+def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
+    several = list(scenarios())
+    first = smc.run(several, threads=1)
+    for threads in (2, 4):
+        for one, other in zip(first, smc.run(several, threads=threads), strict=True):
+            assert_same(one, other)
+    for one, other in zip(first, several, strict=True):
+        assert_same(one, smc.run(other))
+
+
+def test_a_trace_with_a_friction_by_a_formula_is_read_back(tmp_path):
+    trace = smc.run(next(scenarios()))
+    trace.save(tmp_path / "run.npz")
+    assert_same(smc.load(tmp_path / "run.npz"), trace)
+
+
+# servos: the published code, in numpy
+
+
+def published(model, fitted, motor, external, v):
+    """The dry friction and the damping of Rhoban/bam's Model.compute_frictions, for arrays."""
+    stribeck, loaded, directional = model in ("m2", "m4", "m5", "m6"), model not in ("m1", "m2"), model in ("m5", "m6")
+    near = np.exp(-(np.abs(v / fitted["dtheta_stribeck"]) ** fitted["alpha"])) if stribeck else 0.0 * v
+    loss = fitted["friction_base"] + 0.0 * v
+    if stribeck:
+        loss = loss + near * fitted["friction_stribeck"]
+    if loaded and directional:
+        loss = loss + np.abs(external * fitted["load_friction_external"] - motor * fitted["load_friction_motor"])
+        away = external * fitted["load_friction_external_stribeck"] - motor * fitted["load_friction_motor_stribeck"]
+        loss = loss + near * np.abs(away)
+    elif loaded:
+        loss = loss + fitted["load_friction_base"] * np.abs(external - motor)
+        if stribeck:
+            loss = loss + near * fitted["load_friction_stribeck"] * np.abs(external - motor)
+    if model == "m6":
+        against = np.sign(external) != np.sign(motor)
+        driven = (np.abs(external) < np.abs(motor)) * fitted["load_friction_external_quad"] * external**2
+        driven_back = (np.abs(external) > np.abs(motor)) * fitted["load_friction_motor_quad"] * motor**2
+        loss = loss + near * against * (driven + driven_back)
+    return loss, fitted["friction_viscous"]
+
+
+@pytest.mark.parametrize("model", ["m1", "m2", "m3", "m4", "m5", "m6"])
+@pytest.mark.parametrize("name", ["mx64", "mx106"])
+def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load(name, model):
+    fitted = SERVOS[name][model]
+    assert (len(fitted) - 3) == {"m1": 2, "m2": 5, "m3": 3, "m4": 7, "m5": 9, "m6": 11}[model]
+    friction = smc.servo(name, model).friction
+    numbers = reference.PythonFriction(friction, 0)
+    speeds, torques = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0], np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
+    for v in speeds:
+        for motor in torques:
+            for load in torques:
+                loss, damping = published(model, fitted, motor, load, v)
+                held, _ = published(model, fitted, motor, load, 0.0 * v)
+                f, _, _ = numbers(v, motor, load)
+                assert f == pytest.approx(np.sign(v) * loss + damping * v, rel=0, abs=1e-12)
+                assert numbers(0.0, motor, load)[1:] == pytest.approx([-held, held], rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["m1", "m4", "m6"])
+def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
+    """One step of a heavy pendulum: weight and disturbance are outside, the motor's torque is that of a step before."""
+    servo = smc.servo("mx106", model)
+    plant = smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
+    common = {"plant": plant, "friction": servo.friction, "feedforward": smc.Constant(1.5), "law": "none"}
+    start = {"x0": (0.9, -0.4), "v0": (0.8, 1.2), "disturbance": smc.Constant(-0.6)}
+    trace = smc.run(smc.Scenario(**common, **start, physics_step=1e-3, duration=4e-3))
+    p = plant.values({})
+    for k in range(4):
+        load = -p.m * p.grav * p.l * np.sin(trace.x[k]) - 0.6
+        motor = np.full(2, 1.5 if k else 0.0)
+        loss, damping = published(model, SERVOS["mx106"][model], motor, load, trace.v[k])
+        np.testing.assert_allclose(
+            trace.reaction[k + 1], -(np.sign(trace.v[k]) * loss + damping * trace.v[k]), atol=1e-12
+        )
+
+
+def ends(model, weight):
+    """The torques at which a servo that holds a weight of so many N m lifts it, and lets it fall."""
+    servo, plant = smc.servo("mx106", model), smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
+    p, found = plant.values({}), []
+    level = math.asin(weight / (p.m * p.grav * p.l))
+    for slope in (0.2, -0.2):
+        u = smc.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
+        common = {"plant": plant, "law": "none", "x0": level, "duration": 6.0, "control_period": 5e-3}
+        trace = smc.run(smc.Scenario(**common, feedforward=u, friction=servo.friction))
+        moved = np.argmax(np.abs(trace.v[:, 0]) > 1e-3)
+        assert moved
+        found.append(trace.u[moved, 0])
+    return found
+
+
+@pytest.mark.parametrize("model", ["m1", "m2", "m4", "m5", "m6"])
+def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model):
+    """A servo lifts its weight w at the torque m for which m - w is the friction that holds, and drops it at w - m.
+
+    Friction that does not depend on the load is the same both ways, so the two lie symmetrically about the weight. With
+    load-dependent friction they do not: drive and back-drive differ.
+    """
+    from scipy.optimize import brentq
+
+    weight, fitted = 1.0, SERVOS["mx106"][model]
+    lift, drop = ends(model, weight)
+
+    def held(m):
+        return published(model, fitted, np.array(m), np.array(-weight), np.array(0.0))[0]
+
+    up: Any = brentq(lambda m: m - weight - held(m), weight, 10.0)
+    down: Any = brentq(lambda m: weight - m - held(m), -5.0, weight)
+    assert lift == pytest.approx(up, abs=0.015)
+    assert drop == pytest.approx(down, abs=0.015)
+    driving, driven_back = lift - weight, weight - drop
+    if model in ("m1", "m2"):
+        assert driving == pytest.approx(driven_back, rel=0.05)
+    else:
+        assert driving > 1.3 * driven_back
+
+
+# bad input
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: smc.Sigmoid(-1.0, 5.0), "Sigmoid's p1 is -1: give at least 0"),
+        (lambda: smc.Sigmoid((1.0, -1.0), 5.0), "Sigmoid's p1[1] is -1: give at least 0"),
+        (lambda: smc.Sigmoid(1.0, 0.0), "Sigmoid's p2 is 0: give a number greater than 0"),
+        (lambda: smc.Sigmoid(1.0, 5.0, "much"), "Sigmoid's p3 is 'much': give a number"),
+        (lambda: smc.Sigmoid(1.0, 5.0, hold=-0.1), "Sigmoid's hold is -0.1: give at least 0"),
+        (lambda: smc.Sigmoid(1.0, 5.0, stiffness=0.0), "Sigmoid's stiffness is 0: give a number greater than 0"),
+        (lambda: smc.ServoFriction(kc=-0.1), "ServoFriction's kc is -0.1: give at least 0"),
+        (lambda: smc.servo("mx65"), "unknown servo 'mx65': did you mean 'mx64'?"),
+        (lambda: smc.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
+        (
+            lambda: smc.Scenario(plant="panda", law="none", friction=smc.Sigmoid([1.0, 2.0, 3.0], 5.0)),
+            "Sigmoid's p1 has 3 values, (1.0, 2.0, 3.0), and panda has 7 channels: give one number, or 7",
+        ),
+        (
+            lambda: smc.Scenario(
+                plant="duffing", law="none", friction=[smc.LuGre(0.1, 0.2, 0.1), smc.Sigmoid(1.0, 5.0)]
+            ),
+            "friction has LuGre and Sigmoid, which both hold a joint by bristles: give one",
+        ),
+        (
+            lambda: smc.Scenario(plant="duffing", law="none", friction=smc.Sigmoid(1.0, 5.0), integrator="RK4"),
+            "integrator RK4 does not integrate the state of Sigmoid(stiffness=None, p1=1.0, p2=5.0, p3=0.0, hold=None)"
+            ": leave the integrator out",
+        ),
+    ],
+)
+def test_bad_numbers_are_one_sentence(make, says):
+    with pytest.raises(smc.ScenarioError) as error:
+        make()
+    assert str(error.value) == says
+
+
+def test_an_environment_refuses_a_friction_by_a_formula():
+    core = pytest.importorskip("smc_mujoco.envs.core")
+    with pytest.raises(smc.ScenarioError, match="friction Sigmoid is computed by the runs of a law"):
+        core.Setting("duffing", changes={"friction": smc.Sigmoid(1.0, 5.0)})
+
+
+def test_a_formula_that_raises_ends_its_own_run_with_a_sentence():
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", v0=1.0, duration=0.1, friction=Failing()))
+    assert "friction Failing" in (trace.failure or "")
+    assert trace.diverged_at is not None
+
+
+@dataclasses.dataclass(frozen=True)
+class Failing(Sliding):
+    """A friction that raises below 0.5 m/s."""
+
+    @staticmethod
+    def value(v, motor, load, p):
+        if v < 0.99:
+            raise ValueError("too slow")
+        return 2.0, -2.0, 2.0
