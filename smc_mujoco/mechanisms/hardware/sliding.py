@@ -85,6 +85,7 @@ class Sliding(Friction):
             object.__setattr__(self, name, value)
 
     def check(self, plant: Plant) -> None:
+        """Raise ScenarioError if a sequence has not one number for each channel of the plant."""
         for name in (*self.names, "stiffness"):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != plant.n:
