@@ -1,7 +1,7 @@
-"""Translate a law's Python into C99, operation by operation, in the same order and with the same rounding.
+"""Translate the Python of a law, surface or estimator into C99, operation by operation and with the same rounding.
 
 numba turns some powers with a constant exponent into products or roots. The C does the same, so that its results in
-double precision equal those of the compiled law bit for bit.
+double precision equal those of the compiled function bit for bit.
 """
 
 import ast
@@ -20,6 +20,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 # Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
@@ -27,8 +28,9 @@ PARSING = threading.Lock()
 KINDS = ("bool", "int", "single", "real")
 WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
-# The arguments of a law. They are pointers, not numbers.
+# The arguments of a component. They are pointers, not numbers.
 ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
+READS = {"law": Measurement._fields, "surface": Measurement._fields, "estimator": Reading._fields}  # the fields of y
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
@@ -47,8 +49,13 @@ SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
 ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # integers in Python, floating-point in C
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
-# Python's min, max and abs: functions that the C file defines if it uses them.
-HELPERS = {"minimum": "b < a ? b : a", "maximum": "b > a ? b : a", "absolute": "a < 0 ? -a : a"}
+# Python's min, max, abs and % of integers: functions that the C file defines if it uses them.
+HELPERS = {
+    "minimum": "b < a ? b : a",
+    "maximum": "b > a ? b : a",
+    "absolute": "a < 0 ? -a : a",
+    "modulo": "(a % b + b) % b",
+}
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
     "power_2": "a * a",
@@ -88,8 +95,10 @@ class Value(NamedTuple):
         return self.text if self.level >= level else f"({self.text})"
 
 
-def translate(law: Component, single: bool) -> tuple[int, str]:
-    """Return the number of memory slots of a law, and the C of its function and of all functions it calls.
+def translate(component: Component, single: bool) -> tuple[int, str]:
+    """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
+
+    The function's name is smc_law, smc_surface or smc_estimator.
 
     Args:
       single: whether smc_real is float.
@@ -97,8 +106,8 @@ def translate(law: Component, single: bool) -> tuple[int, str]:
     Raises:
       Untranslatable: a piece of Python, which is quoted, has no translation.
     """
-    program = Program(law, single)
-    functions = [Function(program, law.function, list(ARGUMENTS), {}, law=True).text("smc_law")]
+    program = Program(component, single)
+    functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
     for name, text in reversed(program.functions.items()):
         if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
@@ -107,14 +116,15 @@ def translate(law: Component, single: bool) -> tuple[int, str]:
 
 
 class Program:
-    """The C file of a law: constant arrays, functions, and the names they use."""
+    """The C file of a component: constant arrays, functions, and the names they use."""
 
-    def __init__(self, law: Component, single: bool):
-        self.gains, self.single = law.gains, single
+    def __init__(self, component: Component, single: bool):
+        self.component, self.gains, self.single = component, component.gains, single
+        self.symbol = f"smc_{component.kind}"
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
         self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, kinds; None while in progress
-        self.used_names = {"smc_law", *ARGUMENTS, *RESERVED}
+        self.used_names = {self.symbol, *ARGUMENTS, *RESERVED}
         self.slots = 0  # of memory
 
     def unique_name(self, name: str) -> str:
@@ -125,7 +135,7 @@ class Program:
         return unique
 
     def helper(self, name: str, kind: str) -> str:
-        """Return the C name of minimum, maximum, absolute or a power such as power_3, for numbers of a kind."""
+        """Return the C name of a helper or a power such as power_3, for numbers of a kind."""
         function = name if name in POWERS and kind == "real" else f"{name}_{kind}"
         body, of = (HELPERS | POWERS)[name], TYPES[kind]
         second = f", {of} b" if "b" in body else ""
@@ -186,19 +196,19 @@ class Program:
 class Function:
     """One function in C.
 
-    A law writes its results to out[0] and out[1]. Another function returns a single result, or writes several to
-    pointers.
+    A component's own function writes its results to out[0] and out[1]. Another function returns a single result, or
+    writes several to pointers.
 
     Args:
       kinds: of its arguments.
       constants: arguments replaced by literal numbers.
-      law: whether it is smc_law itself.
+      entry: whether it is the component's own function.
     """
 
     def __init__(
-        self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], law: bool = False
+        self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], entry: bool = False
     ):
-        self.program, self.constants, self.law = program, constants, law
+        self.program, self.constants, self.entry = program, constants, entry
         written, self.tree = parsed(function)
         cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
         self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
@@ -242,9 +252,10 @@ class Function:
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon."""
-        types = {n: ARGUMENTS.get(kind, f"{TYPES.get(kind)} ") for n, kind in self.kinds.items()}
+        pointers = ARGUMENTS | ({"y": "const smc_reading *"} if self.program.component.kind == "estimator" else {})
+        types = {n: pointers.get(kind, f"{TYPES.get(kind)} ") for n, kind in self.kinds.items()}
         arguments = [f"{types[n]}{self.c_name(n)}" for n in self.parameters]
-        if self.law:
+        if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
         if len(self.results) == 1:
             return f"static {TYPES[self.results[0]]} {name}({', '.join(arguments) or 'void'})"
@@ -252,10 +263,10 @@ class Function:
         return f"static void {name}({', '.join(arguments)})"
 
     def c_name(self, name: str) -> str:
-        """Return a variable's name in C. A law's arguments have the names of smc_law.h."""
-        if self.law and self.kinds.get(name) in ARGUMENTS:
+        """Return a variable's name in C. A component's arguments have the names of smc_law.h."""
+        if self.entry and self.kinds.get(name) in ARGUMENTS:
             return self.kinds[name]
-        return plain(name) + "_" * (name in RESERVED or (self.law and name in ARGUMENTS))
+        return plain(name) + "_" * (name in RESERVED or (self.entry and name in ARGUMENTS))
 
     # statements
 
@@ -393,14 +404,16 @@ class Function:
         """Translate return."""
         values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
         self.results = self.results or [v.kind for v in values]
-        if len(values) != len(self.results) or (self.law and len(values) != 2):
+        if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
+            values, self.results = [*values, Value("NAN", "real", UNARY)], [*self.results, "real"][:2]
+        if len(values) != len(self.results) or (self.entry and len(values) != 2):
             raise refuse(value, "another number of results")
         self.results = [wider(one, v.kind) for one, v in zip(self.results, values, strict=True)]
         if len(values) == 1:
             yield f"return {values[0].text};"
             return
-        yield from (f"{f'out[{i}]' if self.law else f'*out_{i}'} = {v.text};" for i, v in enumerate(values))
-        yield "return 0;" if self.law else "return;"
+        yield from (f"{f'out[{i}]' if self.entry else f'*out_{i}'} = {v.text};" for i, v in enumerate(values))
+        yield "return 0;" if self.entry else "return;"
 
     # expressions
 
@@ -463,7 +476,8 @@ class Function:
         home, name = self.value(node.value), node.attr
         if home.kind == "y":
             name = OLD_FIELDS.get(name, name)
-            known(name, "measurement", Measurement._fields)
+            kind = self.program.component.kind
+            known(name, "reading" if kind == "estimator" else "measurement", READS[kind])
             return Value(f"{home.text}->{name}", "real")
         if home.kind == "gains":
             known(name, "gain", self.program.gains)
@@ -480,7 +494,9 @@ class Function:
         home = self.value(node.value)
         if home.kind != "memory":
             raise refuse(node, "an element")
-        place = self.constant(node.slice)
+        place, component = self.constant(node.slice), self.program.component
+        if place is None and component.kind == "estimator":  # a ring of readings, as long as its memory
+            place = component.memory - 1
         if place is None or place < 0:
             why = "at an index that is not constant" if place is None else "at a negative index"
             raise refuse(node, f"memory {why}")
@@ -506,6 +522,8 @@ class Function:
             if not whole:
                 raise refuse(node, "a bit operation on real numbers")
             return Value(f"{left.within(ATOM)} {BITS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
+        if isinstance(node.op, ast.Mod) and whole:
+            return Value(f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})", "int")
         if type(node.op) not in OPERATORS:
             raise refuse(node, f"the operator {type(node.op).__name__}")
         sign, level = OPERATORS[type(node.op)]

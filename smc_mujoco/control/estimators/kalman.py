@@ -13,10 +13,23 @@ Kalata, "The tracking index: a generalized parameter for alpha-beta and alpha-be
 Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index); the factorisation is worked out here.
 """
 
-import cmath
+import math
+
+from numba import njit
 
 from smc_mujoco.control.estimator import estimator_function
 from smc_mujoco.control.units import POSITION, Gain, Unit
+
+
+@njit
+def square_root(a, b):
+    """Return the real and the imaginary part of the square root of a + i b."""
+    if a == 0.0 and b == 0.0:
+        return 0.0, b
+    t = math.sqrt((abs(a) + math.hypot(a, b)) * 0.5)
+    if a >= 0.0:
+        return t, b / (2.0 * t)
+    return abs(b) / (2.0 * t), math.copysign(t, b)
 
 
 @estimator_function(
@@ -35,17 +48,23 @@ def kalman(y, gains, memory):
         p = 1.0 + c / 2.0 - (c + c * c / 4.0) ** 0.5
         # the other roots: m^2 - (c - lam / 120) m + lam / c
         half = (c - lam / 120.0) / 2.0
-        root = cmath.sqrt(half * half - lam / c)
+        root, root_i = square_root(half * half - lam / c, 0.0)  # _i: an imaginary part
         at_zero, at_one, at_minus = -p, 1.0 - p, -1.0 - p
-        total, product = complex(0.0), complex(1.0)
-        for m in (half + root, half - root):
-            spread = cmath.sqrt(m * m / 4.0 - m)
-            z = 1.0 - m / 2.0 - spread
-            if abs(z) > 1.0:
-                z = 1.0 - m / 2.0 + spread
-            total, product = total + z, product * z
-        at_zero, at_one = at_zero * product.real, at_one * (1.0 - total + product).real
-        at_minus *= (1.0 + total + product).real
+        total, product, product_i = 0.0, 1.0, 0.0
+        for i in range(2):
+            sign = 1.0 - 2.0 * i
+            m, m_i = half + sign * root, sign * root_i
+            spread, spread_i = square_root((m * m - m_i * m_i) / 4.0 - m, (m * m_i + m_i * m) / 4.0 - m_i)
+            z, z_i = 1.0 - m / 2.0 - spread, -m_i / 2.0 - spread_i
+            if math.hypot(z, z_i) > 1.0:
+                z, z_i = 1.0 - m / 2.0 + spread, -m_i / 2.0 + spread_i
+            total += z
+            product, product_i = product * z - product_i * z_i, product * z_i + product_i * z
+        at_zero, at_one, at_minus = (
+            at_zero * product,
+            at_one * (1.0 - total + product),
+            at_minus * (1.0 + total + product),
+        )
         memory[4], memory[6] = 1.0 + at_zero, at_one / 2.0
         memory[5] = (at_minus + 8.0 - 4.0 * memory[4]) / 2.0
     a = memory[3]
