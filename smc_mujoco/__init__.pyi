@@ -61,6 +61,8 @@ from smc_mujoco.mechanisms.plant import plants as plants
 from smc_mujoco.metrics.catalogue import score as score
 from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.simulation.conditions import condition as condition
+from smc_mujoco.simulation.fmu.export import export_fmu as export_fmu
+from smc_mujoco.simulation.fmu.load import law_from_fmu as law_from_fmu
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.initial_states import starts as starts
 from smc_mujoco.simulation.perturbations import Jump as Jump

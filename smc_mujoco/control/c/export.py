@@ -38,6 +38,23 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
     """
     if numbers not in BYTES:
         raise unknown("type of numbers", numbers, BYTES)
+    law = of_one_channel(law)
+    if numbers == "q15":
+        law = _in_q15(law)
+        slots, code = 0, _fixed_point(law)
+    else:
+        slots, code = translated(law, single=numbers == "float")
+    real = ["#define SMC_REAL float"] if numbers == "float" else []
+    body = "\n".join([*includes(code), "", *real, _facts(law, slots), code, ""])
+    return f"{_head(law, numbers, slots, _measured(body))}\n{body}"
+
+
+def of_one_channel(law: Component | Template | str) -> Component:
+    """Return a law that can be written in C.
+
+    Raises:
+      ScenarioError: it is no law, is in C already, or has gains by channel.
+    """
     law = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(law, Component) or law.kind != "law" or law.function is None:
         raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
@@ -45,19 +62,31 @@ def law_to_c(law: Component | Template | str, numbers: str = "double") -> str:
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
     if law.of_channel(0) is not law:
         raise ScenarioError(f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)")
-    if numbers == "q15":
-        law = _in_q15(law)
-        slots, code = 0, _fixed_point(law)
-    else:
-        try:
-            slots, code = translate(law, single=numbers == "float")
-        except Untranslatable as error:
-            raise ScenarioError(f"law {law.name!r} cannot be written in C: {error}") from None
+    return law
+
+
+def translated(component: Component, single: bool = False) -> tuple[int, str]:
+    """Return the memory slots and the C of a component, as `translate` does.
+
+    Raises:
+      ScenarioError: it uses Python without translation, which is quoted.
+    """
+    try:
+        return translate(component, single)
+    except Untranslatable as error:
+        raise ScenarioError(f"{component.kind} {component.name!r} cannot be written in C: {error}") from None
+
+
+def includes(code: str) -> list[str]:
+    """Return the lines that include the headers of C that some code needs."""
     headers = {"math.h": rf"\b(?:{'|'.join(MATH)})f?\(|\bNAN\b|\bINFINITY\b", "stdint.h": r"\bint(?:16|32)_t\b"}
-    includes = [f"#include <{name}>" for name, needs in headers.items() if re.search(needs, code)]
-    real = ["#define SMC_REAL float"] if numbers == "float" else []
-    body = "\n".join([*includes, "", *real, _facts(law, slots), code, ""])
-    return f"{_head(law, numbers, slots, _measured(body))}\n{body}"
+    return [f"#include <{name}>" for name, needs in headers.items() if re.search(needs, code)]
+
+
+def gain_names(component: Component) -> list[str]:
+    """Return the line that names the elements of gains[], or nothing for a component without gains."""
+    names = ", ".join(f"GAIN_{plain(name)}" for name in component.gains)
+    return [f"enum {{ {names} }};"] if names else []
 
 
 def _in_q15(law: Component) -> Component:
@@ -88,11 +117,10 @@ def _fixed_point(law: Component) -> str:
 
 def _facts(law: Component, slots: int) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
-    names = ", ".join(f"GAIN_{plain(name)}" for name in law.gains)
     defaults = ",".join(f"{plain(name)}={value!r}" for name, value in law.gains.items())
     lines = [
         build.HEADER.read_text(),
-        *([f"enum {{ {names} }};"] if names else []),
+        *gain_names(law),
         f'const char smc_law_gains[] = "{defaults}";',
         f"const int smc_law_memory = {slots};",
         "const int smc_law_real = sizeof(smc_real);",

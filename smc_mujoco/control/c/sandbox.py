@@ -125,10 +125,10 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
     if why:
         why = " ".join(why.split())
         raise ScenarioError(f"{file} cannot be loaded ({why}): build it for this machine, with all it needs")
-    raise ScenarioError(f"{file}: {last} {_ended(code, library.timeout)}")
+    raise ScenarioError(f"{file}: {last} {ended(code, library.timeout)}")
 
 
-def _ended(code: int | None, timeout: float) -> str:
+def ended(code: int | None, timeout: float) -> str:
     """Return in words how a process ended: by an exit code, a signal or the timeout."""
     if code is None:
         return f"did not end within {timeout:g} s: fix what it waits for, or give timeout="

@@ -1,0 +1,289 @@
+"""The controller that an FMU contains: its variables and its C.
+
+The variables are numbers in one array, in the order of their value references: time, inputs, outputs, what is computed
+on the way, parameters, the control period, and the memories of law, surface and estimator. `fmu.c` knows the array and
+nothing of the law. `controller.c` computes, like the callback,
+
+    estimator -> surface -> law -> saturation
+"""
+
+import dataclasses
+import math
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from smc_mujoco.control.c import export
+from smc_mujoco.control.c.translate import plain
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.estimator import Estimator
+from smc_mujoco.control.law import Law
+from smc_mujoco.control.surface import Surface
+from smc_mujoco.control.units import ACCELERATION, FORCE, INPUT_GAIN, POSITION, SPEED, TIME, Unit
+from smc_mujoco.simulation.controller import MAX_CONTROL
+
+UNBOUNDED = sys.float_info.max  # u_max without a bound, as not every importer reads INF
+
+# Input -> its unit and description, in the order of the variables.
+INPUTS: dict[str, tuple[Unit | None, str]] = {
+    "x": (POSITION, "measured position"),
+    "v": (SPEED, "measured velocity"),
+    "r": (POSITION, "reference"),
+    "dr": (SPEED, "first derivative of the reference"),
+    "ddr": (ACCELERATION, "second derivative of the reference"),
+    "f": (ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
+    "g": (INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
+    "q": (None, "measured position of the joint without actuator that this one moves"),
+    "dq": (None, "velocity of the joint without actuator"),
+    "fq": (None, "nominal fq of q'' = fq + gq u"),
+    "gq": (None, "nominal gq of q'' = fq + gq u"),
+}
+ALWAYS = ("x", "r", "dr")  # inputs of every FMU
+SYMBOLS = (  # names that the linker sees
+    "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
+    "smc_law_real", "smc_law_degree", "smc_law_modelled",
+)  # fmt: skip
+
+
+class Variable(NamedTuple):
+    """A variable of the FMU.
+
+    Attributes:
+      name: in modelDescription.xml.
+      kind: of smc_fmu.h, such as SMC_INPUT.
+      description: in words.
+      unit: None for a number without a unit, or of an unknown one.
+      start: its value at the start.
+      least: the smallest value that can be set; -inf for any.
+      positive: whether it must be greater than 0.
+    """
+
+    name: str
+    kind: str
+    description: str
+    unit: Unit | None = None
+    start: float = 0.0
+    least: float = -math.inf
+    positive: bool = False
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Controller:
+    """A law with all that it needs to control one joint.
+
+    Attributes:
+      law, surface, estimator: components of one channel; None for the law's own surface, or a measured velocity.
+      period: control period, s.
+      u_max: bound on |u|; may be infinite.
+      modelled: whether the law reads the nominal f and g.
+    """
+
+    law: Law
+    surface: Surface | None
+    estimator: Estimator | None
+    period: float
+    u_max: float
+    modelled: bool
+
+    @property
+    def parts(self) -> dict[str, Component]:
+        """Kind -> component, of those that there are."""
+        parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
+        return {kind: part for kind, part in parts.items() if part is not None}
+
+    def code(self) -> dict[str, tuple[int, str]]:
+        """Return kind -> memory slots and C of each component.
+
+        Raises:
+          ScenarioError: one uses Python without translation into C.
+        """
+        return {kind: export.translated(part) for kind, part in self.parts.items()}
+
+
+def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
+    """Return the variables in the order of their value references."""
+    read = {name for _, text in code.values() for name in re.findall(r"\by->(\w+)", text)}
+    wanted = [name for name in INPUTS if name in ALWAYS or name in _needed(controller, code, read)]
+    inputs = [Variable(name, "SMC_INPUT", INPUTS[name][1], INPUTS[name][0]) for name in wanted]
+    computed = [
+        Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE),
+        Variable("s", "SMC_COMPUTED", "sliding variable"),
+    ]
+    if controller.surface:
+        computed.append(Variable("v_eq", "SMC_COMPUTED", "acceleration of the error that keeps s constant"))
+    if controller.estimator:
+        computed.append(Variable("v_estimated", "SMC_COMPUTED", "estimated velocity", SPEED))
+    bound = controller.u_max if math.isfinite(controller.u_max) else UNBOUNDED
+    parameters = [Variable("u_max", "SMC_PARAMETER", "bound on the magnitude of u", FORCE, bound, 0.0, True)]
+    for kind, part in controller.parts.items():
+        parameters += _gains(kind, part)
+    period = Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period)
+    memory = [
+        Variable(f"{kind}.memory[{i + 1}]", "SMC_STATE", f"number {i + 1} of the memory of the {kind}")
+        for kind, (slots, _) in code.items()
+        for i in range(slots)
+    ]
+    time = Variable("time", "SMC_CLOCK", "time", TIME)
+    return [time, *inputs, *computed, *parameters, period, *memory]
+
+
+def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: set[str]) -> Iterator[str]:
+    """Yield the inputs that the functions read, beside those of every FMU."""
+    if controller.estimator is None or "y->v" in re.findall(r"y->\w+", code["estimator"][1]):
+        yield "v"
+    if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
+        yield "ddr"
+    if controller.modelled:
+        yield from read & {"f", "g", "fq", "gq"}
+    yield from read & {"q", "dq"}
+
+
+def _gains(kind: str, part: Component) -> Iterator[Variable]:
+    """Yield the gains of a component as parameters."""
+    template = part.template
+    for name, value in part.gains.items():
+        gain = template.gains[name] if template and name in template.gains else None
+        unit = gain.unit_at(part.gains) if gain else None
+        positive, least = (
+            bool(gain and gain.positive),
+            0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf,
+        )
+        limits = ", greater than 0" if positive else ", at least 0" if least == 0.0 else ""
+        finite = value if math.isfinite(value) else math.copysign(UNBOUNDED, value)
+        words = f"gain {name} of the {kind} {part.name}{limits}"
+        yield Variable(f"{kind}.{plain(name)}", "SMC_PARAMETER", words, unit, finite, least, positive)
+
+
+# C
+
+
+def place(variable: str) -> str:
+    """Return the name of a variable's place in the array."""
+    return "SMC_AT_" + re.sub(r"\W", "_", variable)
+
+
+def header(listed: Sequence[Variable], controller: Controller, identifier: str, token: str) -> str:
+    """Return controller.h: the sizes, and the places of the variables in their array."""
+    memory = next((i for i, one in enumerate(listed) if one.kind == "SMC_STATE"), len(listed))
+    lines = [
+        "/* controller.h: sizes of this controller, and the places of its variables. */",
+        "#ifndef SMC_CONTROLLER_H",
+        "#define SMC_CONTROLLER_H",
+        "",
+        "/* own names, so that several FMUs can be linked into one program */",
+        *(f"#define {name} {identifier}_{name}" for name in SYMBOLS),
+        "",
+        '#include "smc_fmu.h"',
+        "",
+        f'#define SMC_TOKEN "{token}"',
+        f"#define SMC_DT {controller.period!r} /* s */",
+        f"#define SMC_TIME {place('time')}",
+        "enum {",
+        *(f"    {place(one.name)}," for one in listed),
+        "    SMC_VARIABLES,",
+        f"    SMC_MEMORY = {memory} /* the first variable that outlives a sample */",
+        "};",
+        "",
+        "#endif",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def source(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> str:
+    """Return controller.c: the table of variables, and the function that runs all parts at a sample."""
+    lines = [
+        "/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */",
+        '#include "controller.h"',
+        "",
+        "#include <float.h>",
+        "#include <math.h>",
+        "#include <stddef.h>",
+        "",
+        "const smc_variable smc_variables[] = {",
+        *(
+            f'    {{"{one.name}", {one.kind}, {one.start!r}, {_c_number(one.least)}, {int(one.positive)}}},'
+            for one in listed
+        ),
+        "};",
+        "",
+        "/* Returns a gain or a bound. The largest double means that there is none. */",
+        "static double number(double x)",
+        "{",
+        "    return x >= DBL_MAX ? INFINITY : x <= -DBL_MAX ? -INFINITY : x;",
+        "}",
+        "",
+        "int smc_controller(double *value, double t)",
+        "{",
+        *(f"    {line}" for line in _body({one.name: f"value[{place(one.name)}]" for one in listed}, controller, code)),
+        "}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _body(at: Mapping[str, str], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
+    """Yield the statements of smc_controller, without indentation.
+
+    Args:
+      at: variable -> its element of the array.
+    """
+    for kind, part in controller.parts.items():
+        yield f"const double {kind}_gains[] = {{"
+        yield from (f"    number({at[f'{kind}.{plain(name)}']})," for name in part.gains)
+        yield from ("    0.0,",) if not part.gains else ()
+        yield "};"
+        memory = "&" + at[f"{kind}.memory[1]"] if code[kind][0] else "NULL"
+        yield f"double *{kind}_memory = {memory};"
+    yield "smc_measurement y = {0};"
+    if controller.estimator:
+        yield f"const smc_reading reading = {{SMC_DT, {at['x']}, {at.get('v', '0.0')}}};"
+    yield "double out[2];"
+    yield "int failure;"
+    yield f"y.t = t, y.dt = SMC_DT, y.limit = number({at['u_max']}), y.model = {float(controller.modelled)!r};"
+    yield f"y.r = {at['r']}, y.dr = {at['dr']}, y.ddr = y.a = {at.get('ddr', '0.0')};"
+    for name in ("f", "g"):
+        yield f"y.{name} = {at.get(name, 'NAN')};"
+    for name in ("q", "dq", "fq", "gq"):
+        if name in at:
+            yield f"y.{name} = {at[name]};"
+    yield f"y.x = {at['x']};"
+    if controller.estimator:
+        yield from _call("estimator", "&reading")
+        yield f"y.v = {at['v_estimated']} = out[0];"
+        yield "if (!isnan(out[1])) y.a = out[1];"
+    else:
+        yield f"y.v = {at['v']};"
+    yield "y.e = y.x - y.r, y.de = y.v - y.dr;"
+    if controller.surface:
+        yield from _call("surface", "&y")
+        yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {at['v_eq']} = out[1];"
+    yield from _call("law", "&y")
+    yield f"{at['u']} = fmin(fmax(out[0], -y.limit), y.limit);"
+    yield f"{at['s']} = out[1];"
+    yield f"return isfinite(out[0]) && isfinite(out[1]) && fabs({at['u']}) < {MAX_CONTROL!r} ? 0 : SMC_NOT_FINITE;"
+
+
+def _call(kind: str, measured: str) -> Iterator[str]:
+    """Yield the call of a component, and what follows if it fails."""
+    yield f"failure = smc_{kind}({measured}, {kind}_gains, {kind}_memory, out);"
+    yield "if (failure) return failure;"
+
+
+def _c_number(value: float) -> str:
+    """Return a number in C."""
+    return repr(value) if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"
+
+
+def component_file(component: Component, slots: int, text: str) -> str:
+    """Return the C file of a surface or an estimator."""
+    title = f"/* {component.name}: {component.kind}, with {slots} numbers of memory. */"
+    names = export.gain_names(component)
+    parts = [title, *export.includes(text), '#include "controller.h"', "", *names, "", text, ""]
+    return "\n".join(parts)
+
+
+def law_file(law: Law) -> str:
+    """Return the C file of the law: that of `export-c`."""
+    return f'#include "controller.h"\n{export.law_to_c(law)}'

@@ -1,0 +1,377 @@
+"""Controllers in FMUs as laws: `law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
+
+An FMU from Simulink, Modelica or `export_fmu` keeps its state in itself. So each channel of each run has an instance of
+its own, which is made at the first sample and freed with the run. It is called from Python, in the reference loop. The
+FMU is first tried in a separate process, which may crash or hang.
+"""
+
+import dataclasses
+import functools
+import hashlib
+import itertools
+import json
+import math
+import os
+import re
+import sys
+import weakref
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
+from smc_mujoco.common.extras import extra
+from smc_mujoco.common.jit import Uncompiled
+from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.control.c import build, sandbox
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import Measurement, law_function
+from smc_mujoco.control.units import Gain
+from smc_mujoco.simulation.fmu import slave
+from smc_mujoco.simulation.fmu.slave import REAL, Fault, Slave
+
+# Our name -> names of an FMU's variables that mean it, in any case.
+NAMES = {
+    "x": ("x", "position", "pos", "q", "phi", "theta", "angle", "y", "measurement", "feedback"),
+    "v": ("v", "velocity", "vel", "speed", "omega", "dx", "xdot", "x_dot", "dq", "qdot", "w"),
+    "r": ("r", "ref", "reference", "setpoint", "x_ref", "xref", "xd", "x_d", "desired", "u_s"),
+    "dr": ("dr", "rdot", "ref_dot", "dref", "v_ref", "vd", "v_d"),
+    "ddr": ("ddr", "rddot", "ref_ddot", "ddref", "a_ref"),
+    "e": ("e", "error", "err"),
+    "de": ("de", "edot", "error_dot", "derror"),
+    "u": ("u", "control", "command", "torque", "tau", "force", "u_c", "manipulated"),
+    "s": ("s", "sigma", "sliding", "sliding_variable"),
+}
+INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
+OUTPUTS = ("u", "s")
+CLOSE = 1e-6  # relative difference of two periods that are the same
+MAX_TIMEOUT = 86_400.0  # s
+CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
+
+_running: dict[int, "Running"] = {}  # by the number that a run keeps in its memory
+_numbers = itertools.count(1)
+
+
+class Running(NamedTuple):
+    """The instance of one channel of a run."""
+
+    slave: Slave
+    start: float  # s
+    last: list[float]  # u and s
+
+
+@dataclasses.dataclass(frozen=True)
+class FmuLaw(Uncompiled):
+    """The function of a law in an FMU. Two are equal if content and settings are.
+
+    Attributes:
+      path: of the .fmu file.
+      digest: of its bytes.
+      name: of the law.
+      inputs: our names and the FMU's, of what it measures.
+      outputs: the FMU's names of u, and of s if it has one.
+      constants: the FMU's names and values of inputs that do not change.
+      parameters: the FMU's names of its gains.
+      period: s, of its steps; None for the control period.
+    """
+
+    path: str = dataclasses.field(compare=False)
+    digest: str
+    name: str
+    inputs: tuple[tuple[str, str], ...]
+    outputs: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
+    parameters: tuple[str, ...]
+    period: float | None
+
+    why = "is an FMU, called from Python: several times slower than a law that compiles, and on one core"
+
+    @property
+    def __name__(self) -> str:
+        """The law's name."""
+        return self.name
+
+    def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
+        """Return u and s. The memory holds the number of the instance, 0 before the first sample."""
+        if memory[0] == 0.0:
+            memory[0] = self._begin(y, gains, memory)
+        running = _running[int(memory[0])]
+        every, length = steps(self.period, y.dt)
+        k = round((y.t - running.start) / y.dt)
+        if k % every == 0:
+            values = [getattr(y, ours) for ours, _ in self.inputs]
+            for i in range(round(every * y.dt / length)):
+                running.last[: len(self.outputs)] = running.slave.step(values, y.t + i * length, length)
+        return running.last[0], running.last[1]
+
+    def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
+        """Start an instance, which ends with the memory of the run. Return its number."""
+        place = next(_numbers)
+        fixed = dict(self.constants) | dict(zip(self.parameters, map(float, gains), strict=False))
+        names = [theirs for _, theirs in self.inputs]
+        made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
+        _running[place] = Running(made, y.t, [0.0, 0.0])
+        owner: Any = memory if memory.base is None else memory.base
+        weakref.finalize(owner, _end, place)
+        return place
+
+
+def steps(period: float | None, dt: float) -> tuple[int, float]:
+    """Return after how many control periods the FMU steps, and how long each of its steps is, s.
+
+    Raises:
+      ScenarioError: neither period is a multiple of the other.
+    """
+    if period is None:
+        return 1, dt
+    slower, faster = period / dt, dt / period
+    if abs(slower - round(slower)) < CLOSE * slower and round(slower) >= 1:
+        return round(slower), round(slower) * dt
+    if abs(faster - round(faster)) < CLOSE * faster:
+        return 1, dt / round(faster)
+    raise ScenarioError(
+        f"the FMU steps every {period:g} s and the law runs every {dt:g} s: give control_period={period:g}"
+    )
+
+
+def _end(place: int) -> None:
+    """End an instance. What its library does then must not end the process by an exception."""
+    try:
+        _running.pop(place).slave.close()
+    except Exception:
+        return
+
+
+def extracted(law: FmuLaw) -> Path:
+    """Return the folder of an FMU's files, the same in each call.
+
+    Raises:
+      ScenarioError: the file has changed since `law_from_fmu`, or is gone.
+    """
+    return _extracted(law.path, law.digest)
+
+
+@functools.lru_cache(maxsize=64)
+def _extracted(path: str, digest: str) -> Path:
+    try:
+        found = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        found = ""
+    if found != digest:
+        raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.law_from_fmu again")
+    folder = build.fresh("-fmu")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def law_from_fmu(
+    path: str | os.PathLike,
+    *,
+    variables: Mapping[str, str] | None = None,
+    constants: Mapping[str, float] | None = None,
+    period: float | None = None,
+    name: str | None = None,
+    isolate: bool = True,
+    timeout: float = 30.0,
+) -> Template:
+    """Load a controller in an FMU as a law, such as one that Simulink or a Modelica tool exported.
+
+    Args:
+      path: of an .fmu file: FMI 2.0 or 3.0, Co-Simulation, with a binary for this machine.
+      variables: our name -> the FMU's: {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x, v, e,
+        de, r, dr, ddr, f, g, ...), u and s. Default: by name, as position, speed, reference, torque; case is ignored.
+      constants: the FMU's input -> value, of inputs that mean none of these.
+      period: s; the FMU steps this often, and u is held in between. Default: its own, if it has a fixed one; else the
+        control period.
+      name: of the law. Default: the file's name.
+      isolate: whether to try the FMU first in a separate process, for 500 steps on a double integrator.
+      timeout: s, for the trial.
+
+    Returns:
+      A Template. Its gains are the FMU's real parameters, with _ in place of dots and brackets: law_from_fmu("c.fmu")
+      (law_lam=5.0). Called without gains it keeps the FMU's own values.
+
+    Raises:
+      MissingPackageError: FMPy is not installed: pip install 'smc-mujoco[fmu]'.
+      ScenarioError: no FMU, of another version, without Co-Simulation, for other machines, an unknown variable, an
+        input without a meaning, or a trial that fails, crashes or does not end.
+
+    u is what the FMU returns after a step from the sample's time, on the measurement of that sample. Nothing protects
+    the process while the FMU runs in it.
+    """
+    with extra("fmu", "smc.law_from_fmu"):
+        import fmpy  # noqa: F401
+    file = _file(path)
+    timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    about = _description(file, digest)
+    known = {variable.name: variable for variable in about.modelVariables}
+    inputs, outputs = _meanings(file.name, known, variables or {}, constants or {})
+    gains = _gains(known.values())
+    law = FmuLaw(
+        path=str(file.resolve()),
+        digest=digest,
+        name=errors.name("name", name if name is not None else re.sub(r"\W", "_", file.stem)),
+        inputs=tuple(inputs.items()),
+        outputs=tuple(outputs.values()),
+        constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()),
+        parameters=tuple(theirs for theirs, _ in gains.values()),
+        period=_period(about) if period is None else number("period", period, above=0.0),
+    )
+    if isolate:
+        _try(law, timeout)
+    return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
+
+
+def _file(path: str | os.PathLike) -> Path:
+    """Return the path of an existing file."""
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"cannot take a law from {shown(path)}: give the path of an .fmu file")
+    if not Path(path).is_file():
+        raise ScenarioError(f"there is no file {str(path)!r}: give the path of an .fmu file")
+    return Path(path)
+
+
+def _description(file: Path, digest: str) -> Any:
+    """Return FMPy's description of an FMU that can run here.
+
+    Raises:
+      ScenarioError: it cannot.
+    """
+    import fmpy
+
+    if not zipfile.is_zipfile(file):
+        raise ScenarioError(f"{file.name} is not an FMU, as it is no zip archive: {CURE}")
+    try:
+        folder = _extracted(str(file.resolve()), digest)
+        about = fmpy.read_model_description(str(folder), validate=False)
+    except ScenarioError:
+        raise
+    except Exception as error:  # a damaged archive or XML raises any exception there is
+        raise ScenarioError(
+            f"{file.name} is not an FMU ({type(error).__name__}: {one_line(str(error), 120)}): {CURE}"
+        ) from error
+    if str(about.fmiVersion)[:2] not in ("2.", "3."):
+        raise ScenarioError(f"{file.name} is of FMI {about.fmiVersion}: {CURE}")
+    if about.coSimulation is None:
+        kind = "Model Exchange" if about.modelExchange is not None else "Scheduled Execution"
+        raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
+    here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
+    if not list((folder / "binaries" / here).glob(f"{about.coSimulation.modelIdentifier}.*")):
+        places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []
+        cure = (
+            "compile its sources with FMPy, fmpy compile" if (folder / "sources").is_dir() else "export it for this one"
+        )
+        raise ScenarioError(
+            f"{file.name} has a binary for {', '.join(places) or 'no machine'}, and this one is {here}: {cure}"
+        )
+    return about
+
+
+def _meanings(
+    file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return our name -> the FMU's, of its inputs, and of its outputs.
+
+    Raises:
+      ScenarioError: an unknown name, an input without a meaning, no u, or a variable that is no real number.
+    """
+    for what, value in (("variables", chosen), ("constants", constants)):
+        if not isinstance(value, Mapping):
+            raise ScenarioError(f"{what} is {shown(value)}: give a dict, such as variables={{'x': 'theta'}}")
+    ins, outs = ([n for n, v in known.items() if v.causality == side] for side in ("input", "output"))
+    for ours, theirs in chosen.items():
+        if ours not in (*INPUTS, *OUTPUTS):
+            raise unknown("meaning of a variable", ours, (*INPUTS, *OUTPUTS))
+        side, theirs_known = ("output", outs) if ours in OUTPUTS else ("input", ins)
+        errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
+    for theirs in constants:
+        errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
+    taken = {*chosen.values(), *constants}
+    inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUTS}
+    inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUTS if n not in chosen])
+    for theirs in ins:
+        if theirs not in {*inputs.values(), *constants}:
+            raise ScenarioError(
+                f"input {theirs!r} of {file} means nothing that a law measures: say what it is, as in "
+                f"variables={{'x': {theirs!r}}}, or hold it, constants={{{theirs!r}: 0.0}}"
+            )
+    outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
+    outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
+    if "u" not in outputs and len(outs) != 1:
+        listed = ", ".join(outs) or "none"
+        raise ScenarioError(f"{file} has no output that is named as a command ({listed}): give variables={{'u': ...}}")
+    outputs.setdefault("u", outs[0])
+    for theirs in (*inputs.values(), *constants, *outputs.values()):
+        if known[theirs].type not in REAL or known[theirs].dimensions:
+            raise ScenarioError(f"{theirs!r} of {file} is not one real number: a law measures and returns real numbers")
+    return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
+
+
+def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
+    """Return our name -> the FMU's, of its variables whose last word is our name or one of NAMES."""
+    words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
+    found = {}
+    for name in ours:
+        word = next((word for word in (name, *NAMES.get(name, ())) if word in words), None)
+        if word is not None:
+            found[name] = words.pop(word)
+    return found
+
+
+def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
+    """Return gain -> the FMU's name, and default and range, of its real parameters."""
+    gains: dict[str, tuple[str, Gain]] = {}
+    for variable in variables:
+        if variable.causality != "parameter" or variable.type not in REAL or variable.dimensions:
+            continue
+        try:
+            start = float(variable.start)
+        except (TypeError, ValueError):
+            continue
+        ours = re.sub(r"\W+", "_", variable.name).strip("_")
+        if not ours.isidentifier() or ours.startswith("_") or ours in gains or not math.isfinite(start):
+            continue
+        least = math.nan if variable.min is None else float(variable.min)
+        gains[ours] = variable.name, Gain(start, nonnegative=least == 0.0)
+    return gains
+
+
+def _period(about: Any) -> float | None:
+    """Return the step that an FMU prescribes, s; None if it takes any."""
+    inside = about.coSimulation
+    if inside.canHandleVariableCommunicationStepSize:
+        return None
+    fixed = getattr(inside, "fixedInternalStepSize", None)
+    default = about.defaultExperiment.stepSize if about.defaultExperiment else None
+    for step in (fixed, default):
+        if step is not None and float(step) > 0.0:
+            return float(step)
+    return None
+
+
+def _try(law: FmuLaw, timeout: float) -> None:
+    """Try an FMU in a separate process.
+
+    Raises:
+      ScenarioError: it failed, crashed or did not end.
+    """
+    progress, order, file = build.fresh(".txt"), build.fresh(".json"), Path(law.path).name
+    words = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
+    order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}))
+    try:
+        code = timed([sys.executable, "-I", slave.__file__, str(order)], timeout, output=False).returncode
+    except TimedOut:
+        code = None
+    lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]
+    last, _, why = lines[-1].partition(" ")
+    if last == "passed" and code == 0:
+        return
+    if last == Fault.__name__:
+        raise ScenarioError(f"{file}: {why}: fix the FMU, or its inputs and parameters")
+    raise ScenarioError(f"{file}: {lines[-1]} {sandbox.ended(code, timeout)}")

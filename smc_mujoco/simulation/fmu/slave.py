@@ -1,0 +1,128 @@
+"""One instance of an FMU, through FMPy; and, as a script, a trial of an FMU in a process that may crash.
+
+The script must start quickly, so this file imports nothing of smc_mujoco. It writes its progress to a file. The last
+line names the step in which the process died, or the fault.
+"""
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
+STEPS, PERIOD = 500, 1e-3  # of a trial: steps, and their length if the FMU names none, s
+MAX_POSITION = 3.0  # a stop for the double integrator of a trial, because a law need not stabilise it
+
+
+class Fault(Exception):
+    """What is wrong with an FMU, in words."""
+
+
+class Slave:
+    """An instance of an FMU, initialised at time `start`.
+
+    Args:
+      folder: the extracted FMU.
+      inputs, outputs: names of its variables, in the order of the values of `step`.
+      fixed: name -> value of its parameters and of inputs that do not change.
+      start: s.
+    """
+
+    def __init__(
+        self, folder: str, inputs: Sequence[str], outputs: Sequence[str], fixed: Mapping[str, float], start: float = 0.0
+    ):
+        import fmpy
+        from fmpy.simulation import instantiate_fmu
+
+        about = fmpy.read_model_description(folder, validate=False)
+        self.known = {variable.name: variable for variable in about.modelVariables}
+        self.two, self.said = str(about.fmiVersion).startswith("2"), list[str]()
+        self.inputs, self.outputs = inputs, outputs
+        self.fmu: Any = self._called("instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log)
+        if self.two:
+            self._called("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
+        for name, value in fixed.items():
+            if self.known[name].causality != "input":
+                self._set([name], [value])
+        self._called("initialization", self.fmu.enterInitializationMode, **({} if self.two else {"startTime": start}))
+        for name, value in fixed.items():
+            if self.known[name].causality == "input":
+                self._set([name], [value])
+        self._called("initialization", self.fmu.exitInitializationMode)
+
+    def step(self, values: Sequence[float], t: float, length: float) -> list[float]:
+        """Set the inputs, make a step of some length from time t, s, and return the outputs."""
+        self._set(self.inputs, values)
+        where = {"currentCommunicationPoint": t, "communicationStepSize": length}
+        self._called(f"the step from t = {t:g} s", self.fmu.doStep, **where)
+        return [self._get(name) for name in self.outputs]
+
+    def close(self) -> None:
+        """End the instance."""
+        try:
+            self.fmu.terminate()
+        finally:
+            self.fmu.freeInstance()
+
+    def _set(self, names: Sequence[str], values: Sequence[float]) -> None:
+        for name, value in zip(names, values, strict=True):
+            variable = self.known[name]
+            setter = getattr(self.fmu, f"set{variable.type}")
+            self._called(f"setting {name} = {value:g}", setter, [variable.valueReference], [value])
+
+    def _get(self, name: str) -> float:
+        variable = self.known[name]
+        getter = getattr(self.fmu, f"get{variable.type}")
+        return float(self._called(f"reading {name}", getter, [variable.valueReference])[0])
+
+    def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
+        """Call a function of FMPy. Raise Fault with the FMU's own words if it fails."""
+        try:
+            return function(*arguments, **named)
+        except Exception as error:
+            why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
+            raise Fault(f"{what} fails ({' '.join(why.split())})") from error
+
+    def _log(self, *words: Any) -> None:
+        """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
+        text = words[-1]
+        self.said.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+
+
+def attempt(order: dict[str, Any], progress: Any) -> None:
+    """Run an FMU on a double integrator x'' = u, with a step that the order gives."""
+    print("instantiation", file=progress)
+    slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
+    length, x, v = order["step"] or PERIOD, 0.5, 0.0
+    for k in range(STEPS):
+        print(f"the step from t = {k * length:g} s", file=progress)
+        r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
+        seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}
+        seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": 6.0, "model": 1.0}
+        found = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
+        if not all(map(math.isfinite, found)):
+            raise Fault(f"{order['outputs'][0]} is {found[0]:g} after {k + 1} steps")
+        v += length * min(max(found[0], -6.0), 6.0)
+        x += length * v
+        if abs(x) > MAX_POSITION:
+            x, v = math.copysign(MAX_POSITION, x), 0.0
+    print("termination", file=progress)
+    slave.close()
+    print("passed", file=progress)
+
+
+def main(file: str) -> None:
+    """Carry out the order in a JSON file."""
+    order = json.loads(Path(file).read_text())
+    with Path(order["progress"]).open("w", buffering=1) as progress:
+        try:
+            attempt(order, progress)
+        except Exception as error:
+            kind = "Fault" if isinstance(error, Fault) else f"Fault {type(error).__name__}:"
+            print(f"{kind} {' '.join(str(error).split())}", file=progress)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
