@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, c, catalogue, live, rigs, runs, studies
+from smc_mujoco.cli.commands import analysis, c, catalogue, fmu, live, rigs, runs, studies
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
@@ -40,6 +40,8 @@ COMMANDS = {
     "live": live.live,
     "check-c": c.check_c,
     "export-c": c.export_c,
+    "check-fmu": fmu.check_fmu,
+    "export-fmu": fmu.export_fmu,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)

@@ -3,7 +3,7 @@
 import ast
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +12,7 @@ import typer
 from smc_mujoco.common.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from smc_mujoco.control.component import Component, Template
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
     from smc_mujoco.mechanisms.hardware.drives import Drive
@@ -102,17 +103,27 @@ def law(text: str) -> "str | Law":
         return load(text).law
     if "(" not in text:
         return text
-    from smc_mujoco.common.errors import ScenarioError, find, shown
     from smc_mujoco.control.law import catalogue
 
+    return component("law", text, catalogue(), "pid(kp=50, ki=1)")
+
+
+def component(kind: str, text: str, known: "Mapping[str, Template]", example: str) -> "Component":
+    """Return a component by its name, with gains in brackets or without. The text is parsed and never evaluated.
+
+    Raises:
+      ScenarioError: any other text, an unknown name or gain.
+    """
+    from smc_mujoco.common.errors import ScenarioError, find, shown
+
     try:
-        call = ast.parse(text, mode="eval").body
+        call = ast.parse(text if "(" in text else f"{text}()", mode="eval").body
         if not isinstance(call, ast.Call) or call.args:
             raise ValueError
         gains = {str(word.arg): float(ast.unparse(word.value)) for word in call.keywords}
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ScenarioError(f"law {shown(text)} cannot be read: write it as pid(kp=50, ki=1)") from None
-    return find("law", ast.unparse(call.func), catalogue())(**gains)
+        raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
+    return find(kind, ast.unparse(call.func), known)(**gains)
 
 
 def laws_of(text: str) -> "list[Law]":

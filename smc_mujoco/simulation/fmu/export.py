@@ -195,7 +195,7 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
         except (OSError, TimedOut):
             raise ScenarioError(
                 f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install one, set CC, or leave "
-                "the binary out (binary=False)"
+                "the binary out (binary=False, --no-binary)"
             ) from None
         if done.returncode or not target.exists():
             lines = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]

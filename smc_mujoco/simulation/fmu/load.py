@@ -16,7 +16,7 @@ import re
 import sys
 import weakref
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,6 +50,7 @@ INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "
 OUTPUTS = ("u", "s")
 CLOSE = 1e-6  # relative difference of two periods that are the same
 MAX_TIMEOUT = 86_400.0  # s
+LARGEST = sys.float_info.max  # a parameter that is this has no bound
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # by the number that a run keeps in its memory
@@ -111,7 +112,8 @@ class FmuLaw(Uncompiled):
     def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
         """Start an instance, which ends with the memory of the run. Return its number."""
         place = next(_numbers)
-        fixed = dict(self.constants) | dict(zip(self.parameters, map(float, gains), strict=False))
+        values = (max(-LARGEST, min(float(gain), LARGEST)) for gain in gains)
+        fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
         names = [theirs for _, theirs in self.inputs]
         made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
         _running[place] = Running(made, y.t, [0.0, 0.0])
@@ -228,6 +230,22 @@ def law_from_fmu(
     return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
 
 
+def check(path: str | os.PathLike, timeout: float, **settings: Any) -> Iterator[str]:
+    """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains.
+
+    Arguments and errors are those of `law_from_fmu`.
+    """
+    template = law_from_fmu(path, timeout=timeout, **settings)
+    law: FmuLaw = template.function  # pyright: ignore[reportAssignmentType]
+    yield "inputs   " + ", ".join(f"{theirs} is {ours}" for ours, theirs in law.inputs)
+    yield "outputs  " + ", ".join(f"{theirs} is {ours}" for ours, theirs in zip(OUTPUTS, law.outputs, strict=False))
+    if law.constants:
+        yield "held     " + ", ".join(f"{theirs} = {value:g}" for theirs, value in law.constants)
+    yield f"step     {'every control period' if law.period is None else f'{law.period:g} s'}"
+    yield "gains    " + (", ".join(f"{name} = {gain.default:g}" for name, gain in template.gains.items()) or "none")
+    yield f"{Path(path).name} passes"
+
+
 def _file(path: str | os.PathLike) -> Path:
     """Return the path of an existing file."""
     if not isinstance(path, str | os.PathLike):
@@ -335,8 +353,9 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         except (TypeError, ValueError):
             continue
         ours = re.sub(r"\W+", "_", variable.name).strip("_")
-        if not ours.isidentifier() or ours.startswith("_") or ours in gains or not math.isfinite(start):
+        if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
+        start = math.copysign(math.inf, start) if abs(start) >= LARGEST else start
         least = math.nan if variable.min is None else float(variable.min)
         gains[ours] = variable.name, Gain(start, nonnegative=least == 0.0)
     return gains

@@ -1,0 +1,93 @@
+"""smc-mujoco export-fmu, check-fmu: controllers as FMUs, for Simulink, Modelica and back."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def export_fmu(
+    law: options.LawName,
+    gains: Annotated[
+        str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
+    ] = "",
+    surface: Annotated[
+        str | None, typer.Option(metavar="NAME|TEXT", help="A surface, as linear(c=3); default the law's own.")
+    ] = None,
+    velocity: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|TEXT", help="A velocity estimator, as levant(L=4800); default v is an input."),
+    ] = None,
+    period: Annotated[float, typer.Option(help="Control period, s.")] = 1e-3,
+    u_max: Annotated[float, typer.Option("--u-max", help="Bound on |u|, N or N m.")] = math.inf,
+    model: Annotated[
+        str | None,
+        typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as the law."),
+    ] = None,
+    joint: Annotated[str, typer.Option(metavar="hinge|slide", help="Units: rad and N m, or m and N.")] = "hinge",
+    binary: Annotated[bool, typer.Option(help="Whether to compile a binary for this machine.")] = True,
+    out: Annotated[Path | None, typer.Option(help="The file; default the law's name with .fmu.")] = None,
+) -> None:
+    """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0 for Co-Simulation.
+
+    The file contains C source code, and a binary for this machine, without Python. Its inputs are x, v (unless an
+    estimator replaces it) and the reference r, dr and, if the law reads it, ddr; its outputs are u and s. All gains are
+    tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
+    it gives the bits of `smc-mujoco run`.
+
+    Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
+    """
+    with held_back():
+        from smc_mujoco.control import estimator
+        from smc_mujoco.control import surface as surfaces
+        from smc_mujoco.control.c.load import parsed_gains
+        from smc_mujoco.control.law import law as find
+        from smc_mujoco.simulation.fmu.export import export_fmu as export
+
+    chosen = find(law, **parsed_gains(gains, "--gains"))
+    of = {
+        "surface": surface and options.component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
+        "velocity": velocity
+        and options.component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
+    }
+    path = export(chosen, out, **of, control_period=period, u_max=u_max, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
+    print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
+
+
+@errors_as_sentences()
+def check_fmu(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="An .fmu file of FMI 2.0 or 3.0 for Co-Simulation.")],
+    variables: Annotated[
+        str,
+        typer.Option(metavar="OURS=THEIRS,...", help="What its variables mean, as x=theta,u=torque; default by name."),
+    ] = "",
+    constants: Annotated[str, typer.Option(metavar="THEIRS=VALUE,...", help="Inputs that are held, as enable=1.")] = "",
+    period: Annotated[float | None, typer.Option(help="Seconds between its steps; default its own.")] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds for the trial.")] = 30.0,
+) -> None:
+    """Try a controller in an FMU in a separate process, and say what it measures, commands and can be tuned by.
+
+    The trial runs it for 500 steps on a double integrator. A failure, a crash, an endless step or a command that is not
+    finite ends in one sentence and exit code 2. An FMU that passes is a law: smc.law_from_fmu(FILE). It needs FMPy, pip
+    install 'smc-mujoco[fmu]'.
+
+    Example: smc-mujoco check-fmu controller.fmu --variables x=theta,v=omega,u=torque --constants enable=1
+    """
+    with held_back():
+        from smc_mujoco.simulation.fmu.load import check
+
+    held = {}
+    for name, text in options.columns(constants or None).items():
+        try:
+            held[name] = float(text)
+        except ValueError:
+            raise ScenarioError(f"--constants: {name} is {text!r}: give a number, as {name}=0") from None
+    for line in check(file, timeout, variables=options.columns(variables or None), constants=held, period=period):
+        print(line)

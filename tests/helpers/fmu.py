@@ -1,0 +1,63 @@
+"""An importer of FMUs as small as can be, and what an FMU of FMI 2.0 is made of."""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+from fmpy.simulation import instantiate_fmu
+
+from smc_mujoco.control.c import build
+
+HERE = Path(__file__).parent
+
+
+class Importer:
+    """One instance of an FMU of FMI 3.0, past its initialization mode unless that is left to the test."""
+
+    def __init__(
+        self, path: Path, folder: Path, events: bool = False, early: bool = False, begin: bool = True, **first
+    ):
+        if not folder.exists():
+            fmpy.extract(str(path), str(folder))
+        about = fmpy.read_model_description(str(folder))
+        self.at = {variable.name: variable.valueReference for variable in about.modelVariables}
+        self.said: list[str] = []
+        self.fmu = instantiate_fmu(
+            str(folder), about, "CoSimulation", event_mode_used=events, early_return_allowed=early,
+            logger=lambda *words: self.said.append(words[-1].decode()),
+        )  # fmt: skip
+        if begin:
+            self.begin(**first)
+
+    def begin(self, start: float = 0.0, **first: float) -> None:
+        self.fmu.enterInitializationMode(startTime=start)
+        self.set(**first)
+        self.fmu.exitInitializationMode()
+
+    def set(self, **values: float) -> None:
+        """Set variables; a name's dots are written as two underscores."""
+        named = {name.replace("__", "."): value for name, value in values.items()}
+        self.fmu.setFloat64([self.at[name] for name in named], list(named.values()))
+
+    def get(self, *names: str) -> list[float]:
+        return self.fmu.getFloat64([self.at[name] for name in names])
+
+    def step(self, t: float, h: float = 1e-3, **inputs: float) -> list[float]:
+        """Set inputs, step, and return u and s."""
+        self.set(**inputs)
+        self.fmu.doStep(t, h)
+        return self.get("u", "s")
+
+
+def fmi2(folder: Path, about: str = (HERE / "fmi2.xml").read_text()) -> Path:
+    """An FMU of FMI 2.0, from fmi2.c; `about` is its description."""
+    system, headers = fmpy.platform, Path(fmpy.__file__).parent / "c-code"
+    library, path = folder / "controller.so", folder / "controller.fmu"
+    if not library.exists():
+        command = [*build.compiler(), *build.FLAGS, f"-I{headers}", str(HERE / "fmi2.c"), "-o", str(library), "-lm"]
+        subprocess.run(command, check=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", about)
+        archive.write(library, f"binaries/{system}/controller.so")
+    return path
