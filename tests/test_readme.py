@@ -62,6 +62,9 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         pytest.skip(gl.missing())
     if "import gymnasium" in block:
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+    if "law_from_fmu" in block:
+        pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'smc-mujoco[fmu]'")
+        warnings.simplefilter("ignore", smc.PlainLoopWarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
@@ -73,7 +76,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
-    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|svg|png|c))"', block))
+    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|c|fmu))"', block))
     wanted |= set(re.findall(r'study\(.*"(\w+)"', block))
     written = {path.name for path in tmp_path.iterdir()} - {"block.py", *titled(page)}
     assert wanted <= written

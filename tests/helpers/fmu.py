@@ -3,6 +3,7 @@
 import subprocess
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 from fmpy.simulation import instantiate_fmu
@@ -23,7 +24,7 @@ class Importer:
         about = fmpy.read_model_description(str(folder))
         self.at = {variable.name: variable.valueReference for variable in about.modelVariables}
         self.said: list[str] = []
-        self.fmu = instantiate_fmu(
+        self.fmu: Any = instantiate_fmu(
             str(folder), about, "CoSimulation", event_mode_used=events, early_return_allowed=early,
             logger=lambda *words: self.said.append(words[-1].decode()),
         )  # fmt: skip

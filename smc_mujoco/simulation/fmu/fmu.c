@@ -57,29 +57,35 @@ static double due(const State *state)
     return state->start + (double)state->samples * SMC_DT;
 }
 
-/* Runs the law for the sample that is due. */
-static fmi3Status sample(Instance *instance, State *state)
+/* Says why the law failed, if it did. */
+static fmi3Status reported(Instance *instance, int failure)
 {
-    const int failure = smc_controller(state->value, (double)state->samples * SMC_DT);
-    state->outdated = fmi3False;
     if (!failure) return fmi3OK;
-    if (failure == SMC_NOT_FINITE) return fail(instance, "the law gave %s that are not finite, at t = %g s", "u, s", due(state));
-    return fail(instance, "%s failed at t = %g s", "the law", due(state));
+    if (failure == SMC_NOT_FINITE)
+        return fail(instance, "the law gave %s that are not finite, at t = %g s", "u, s", due(&instance->state));
+    return fail(instance, "%s failed at t = %g s", "the law", due(&instance->state));
+}
+
+/* Runs the law for the sample that is due. Returns 0, or the reason of a failure. */
+static int sample(State *state)
+{
+    state->outdated = fmi3False;
+    return smc_controller(state->value, (double)state->samples * SMC_DT);
 }
 
 /* Computes the outputs for the present inputs, without completing the sample. */
-static fmi3Status preview(Instance *instance)
+static int preview(State *state)
 {
-    State trial = instance->state;
-    fmi3Status status = sample(instance, &trial);
-    memcpy(instance->state.value, trial.value, SMC_MEMORY * sizeof trial.value[0]); /* all but the memory */
-    instance->state.outdated = fmi3False;
-    return status;
+    State trial = *state;
+    const int failure = sample(&trial);
+    memcpy(state->value, trial.value, SMC_MEMORY * sizeof trial.value[0]); /* all but the memory */
+    state->outdated = fmi3False;
+    return failure;
 }
 
 static fmi3Status complete(Instance *instance)
 {
-    fmi3Status status = sample(instance, &instance->state);
+    const fmi3Status status = reported(instance, sample(&instance->state));
     instance->state.samples++;
     return status;
 }
@@ -156,6 +162,8 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
     Instance *instance = c;
     if (allowed(instance, 1u << INITIALIZING, "fmi3ExitInitializationMode") != fmi3OK) return fmi3Error;
+    if (instance->state.outdated) preview(&instance->state); /* outputs of the start, whatever they are */
+    instance->state.outdated = fmi3True;
     instance->state.mode = instance->events ? EVENT : STEPPING;
     return fmi3OK;
 }
@@ -211,7 +219,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[],
             /* in Event Mode only while a sample is due: otherwise the outputs are held */
             const fmi3Boolean live = mode == INITIALIZING
                 || (mode == EVENT && due(&instance->state) <= instance->state.value[SMC_TIME] + CLOSE * SMC_DT);
-            if (live && preview(instance) != fmi3OK) return fmi3Error;
+            if (live && reported(instance, preview(&instance->state)) != fmi3OK) return fmi3Error;
         }
         values[i] = instance->state.value[reference];
     }

@@ -384,7 +384,7 @@ def _try(law: FmuLaw, timeout: float) -> None:
     words = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
     order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}))
     try:
-        code = timed([sys.executable, "-I", slave.__file__, str(order)], timeout, output=False).returncode
+        code = timed([sys.executable, "-P", slave.__file__, str(order)], timeout, output=False).returncode
     except TimedOut:
         code = None
     lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]

@@ -1,5 +1,6 @@
 """Laws as FMUs: valid by FMPy, bit for bit what smc.run computes, and independent of each other in one process."""
 
+import ctypes
 import itertools
 import subprocess
 import sys
@@ -14,6 +15,7 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
+from helpers.pages import ROOT, titled  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
@@ -289,9 +291,8 @@ def test_samples_are_counted_from_the_start_time(folder, combined):
 
 def test_with_event_mode_u_follows_x_without_a_step_between(twisting):
     """At each sample it has the bits of an instance without events after its step; stays held in between."""
-    plain, events = Importer(*twisting), Importer(*twisting, begin=False, events=True)
+    plain, events = Importer(*twisting), Importer(*twisting, events=True)
     expected = [plain.step(1e-3 * k, **wave(k)) for k in range(30)]
-    events = Importer(*twisting, events=True)
     for k in range(30):
         events.set(**wave(k))
         assert events.get("u", "s") == expected[k]  # before anything is completed
@@ -330,6 +331,7 @@ def test_in_initialization_mode_u_is_that_of_the_first_sample(twisting):
     assert fmu.get("u", "s") != first
     fmu.set(**wave(0))
     fmu.fmu.exitInitializationMode()
+    assert fmu.get("u", "s") == first  # seen, although no input of the start was looked at
     assert fmu.step(0.0) == first
 
 
@@ -375,6 +377,28 @@ def test_a_token_of_another_fmu_is_refused(twisting):
     with pytest.raises(Exception, match="Failed to instantiate"):
         fmpy.simulation.instantiate_fmu(str(files), about, "CoSimulation", logger=lambda *words: said.append(words[-1]))
     assert said == [b"the instantiation token is that of another FMU"]
+
+
+# the page
+
+
+def test_the_page_s_file_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
+    law = smc.law("super_twisting", k1=5.0, k2=8.0)
+    (folder / "super_twisting.c").write_text(smc.law_to_c(law))
+    (folder / "controller.c").write_text(titled(ROOT / "docs" / "simulink.md")["controller.c"])
+    library = folder / "controller.so"
+    flags = [*build.FLAGS, "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"], check=True)
+    block = ctypes.CDLL(str(library))
+    block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
+    trace, u, s, found = smc.run(scenario(law, u_max=6.0)), ctypes.c_double(), ctypes.c_double(), []
+    for _ in range(2):
+        block.controller_start()
+        for k, t in enumerate(trace.t):
+            r, dr, _ = type(REFERENCE).value(t, REFERENCE)
+            block.controller(t, trace.x[k, 0], trace.v[k, 0], r, dr, ctypes.byref(u), ctypes.byref(s))
+            found.append((u.value, s.value))
+    np.testing.assert_array_equal(found, np.tile(np.c_[trace.u, trace.s], (2, 1)))
 
 
 # description
