@@ -1,0 +1,66 @@
+"""An arm that nobody here wrote: dm_control's Jaco, six joints with velocity servos, tracked by laws of many joints."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation import reference
+
+START = (0.0, 2.5, 2.0, 0.0, 0.5, 0.0)  # rad
+LIMITS = [30.5] * 3 + [6.8] * 3  # N m, of the large and the small joints in dm_control
+
+
+@pytest.fixture(scope="module")
+def jaco():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a display that is not there
+        kinova = pytest.importorskip("dm_control.entities.manipulators.kinova")
+    joints = {f"joint_{i}": smc.Channel(motor=True, x0=x) for i, x in enumerate(START, start=1)}
+    return smc.plant_from(kinova.JacoArm().mjcf_model, channels=joints, name="jaco")
+
+
+def moving(jaco, law, **fields):
+    """A scenario in which every joint goes 0.3 rad forth and 0.5 back."""
+    moves = [smc.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)) for x in START]
+    common = {"model": "nominal", "u_max": LIMITS, "duration": 3.0, "physics_step": 1e-3}
+    return smc.Scenario(plant=jaco, law=law, reference=moves, **common | fields)
+
+
+def test_the_arm_has_a_model_and_its_ranges(jaco):
+    assert jaco.n == jaco.driven == 6
+    assert jaco.unmodelled == ""
+    assert [each[0] for each in jaco.ranges] == [f"joint_{i}" for i in range(1, 7)]
+    assert jaco.ranges[1][1:] == pytest.approx((0.820305, 5.462881))
+    model = jaco.load()
+    assert model.nu == 6
+    assert (model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE).all()  # motors, not the servos of its file
+
+
+# law -> largest error on any joint, rad
+FOLLOW = {
+    "computed_torque_sliding": 2e-3,
+    "super_twisting_computed_torque": 2e-3,
+    "unit_vector": 2e-3,
+    "time_delay_sliding": 0.01,
+    "passivity_based": 0.1,
+}
+
+
+def test_laws_of_many_joints_track_on_every_joint(jaco):
+    for trace in smc.run([moving(jaco, law) for law in FOLLOW]):
+        error = np.abs(trace.x - trace.r).max(axis=0)
+        assert trace.failure is None
+        assert error.max() < FOLLOW[trace.scenario.law.name], error
+        assert np.ptp(trace.x, axis=0).min() > 0.4
+    assert set(FOLLOW) <= set(smc.joint_laws())
+
+
+def test_its_run_is_that_of_the_reference_loop(jaco):
+    scenario = moving(jaco, "computed_torque_sliding", duration=0.1)
+    fast, slow = smc.run(scenario), reference.run(scenario)
+    np.testing.assert_allclose(fast.x, slow.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(fast.u, slow.u, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(fast.x, smc.run([scenario] * 3, threads=2)[2].x)
