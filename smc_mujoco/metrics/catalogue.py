@@ -7,8 +7,8 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 
 from __future__ import annotations
 
+import functools
 import math
-import weakref
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
-_CYCLES: weakref.WeakKeyDictionary[Trace, tuple[float, float]] = weakref.WeakKeyDictionary()
 
 
 def metrics() -> tuple[Metric, ...]:
@@ -245,15 +244,11 @@ def chattering_frequency(trace: Trace) -> float:
     return _cycle(trace)[1]
 
 
+@functools.lru_cache(maxsize=1)  # two metrics ask for it, one after the other
 def _cycle(trace: Trace) -> tuple[float, float]:
-    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one.
-
-    The result is kept as long as the trace is, because two metrics ask for it.
-    """
-    if trace not in _CYCLES:
-        found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
-        _CYCLES[trace] = max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
-    return _CYCLES[trace]
+    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
+    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
+    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
 
 
 @metric("s", realistic=True)

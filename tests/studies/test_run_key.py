@@ -16,6 +16,7 @@ from helpers import runs
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
+from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.papers.gaber import scenarios
@@ -253,3 +254,11 @@ def test_a_nominal_model_in_place_of_a_plants_own_tells_runs_apart():
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
     other = dataclasses.replace(own, plant=dataclasses.replace(own.plant, nominal=nominal))
     assert key(own) != key(other)
+
+
+def test_metrics_are_the_same_after_a_score():
+    """A cache of results that they reach would change the hash of their code, and so discard stored studies."""
+    formulas = tuple(metric.formula for metric in metrics())
+    before = fingerprint.now(formulas)
+    smc.score(smc.run(scenario(smc.law("classical"))))
+    assert fingerprint.now(formulas) == before
