@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test quick attack check docs report live gains gallery bench lock setup
+.PHONY: help demo test quick attack check docs build report live gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -38,6 +38,9 @@ docs: ## the documentation as a site, site/index.html
 	@./setup.sh requirements-docs.lock
 	@# this variable leaves out the theme's notice that it is maintained until May 2027; --quiet would hide warnings from --strict
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
+
+build: setup ## the wheel and the source archive, in dist/
+	$(BIN)/python -m hatchling build
 
 report: setup ## the study: which law, where, how sure; which of the paper's claims hold (20 minutes)
 	$(BIN)/smc-mujoco report

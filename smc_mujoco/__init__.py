@@ -19,7 +19,7 @@ from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
 
-_STUB = Path(__file__).with_suffix(".pyi").read_text()
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
 _MODULES = {  # public modules; three of them need an extra
     "boards": "smc_mujoco.studies.boards",

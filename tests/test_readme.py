@@ -34,7 +34,9 @@ def commands(text: str) -> list[str]:
 
 CODE = [(page, i, block) for page in PAGES for i, block in enumerate(blocks(page.read_text(), "python"))]
 LINES = [(page, line) for page in PAGES for line in commands(page.read_text())]
+ON_HOST = "../../actions/"  # pages of the repository's host, beside its files: badges
 LINKS = [(page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())]
+RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].startswith(ON_HOST)]
 
 
 def named(value: object) -> str:
@@ -134,7 +136,7 @@ def test_files_that_command_lines_name_exist():
     assert [name for name in named - told if not (ROOT / name).is_file()] == []
 
 
-@pytest.mark.parametrize(("page", "link"), [pair for pair in LINKS if "://" not in pair[1]], ids=named)
+@pytest.mark.parametrize(("page", "link"), RELATIVE, ids=named)
 def test_a_relative_link_or_picture_leads_somewhere(page, link):
     path = page.parent / link.partition("#")[0]
     assert path.is_file()

@@ -11,6 +11,16 @@ class TimedOut(Exception):
     """A command was stopped because its time was up."""
 
 
+def _kill(process: subprocess.Popen[str]) -> None:
+    """Kill a process that began a session, and every process in it; on Windows every process that it started."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        subprocess.run(["taskkill", "/F", "/T", "/PID", str(process.pid)], capture_output=True, check=False)
+        process.kill()
+
+
 def timed(command: Sequence[str], timeout: float, output: bool = True) -> subprocess.CompletedProcess[str]:
     """Run a command, and stop it and every process that it started when its time is up.
 
@@ -39,7 +49,6 @@ def timed(command: Sequence[str], timeout: float, output: bool = True) -> subpro
         raise TimedOut from None
     finally:
         if process.poll() is None or (process.stdout and not process.stdout.closed):  # it, or what it left behind
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            _kill(process)
             process.communicate()
     return subprocess.CompletedProcess(command, process.returncode, *printed)

@@ -185,7 +185,7 @@ def conditions(known: Sequence[str], own: Sequence[str] | None) -> "list[named.C
 
     chosen = [find_condition(name) for name in known]
     for text in own or ():
-        if ":" not in text and (os.sep in text or Path(text).suffix) and not os.path.exists(text):
+        if ":" not in text and (Path(text).name != text or Path(text).suffix) and not os.path.exists(text):
             raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
         chosen += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
     return chosen

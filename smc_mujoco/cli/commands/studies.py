@@ -308,7 +308,7 @@ def claims(
     text = document(found)
     if out:
         with replacing(out) as file:
-            file.write_text(text + "\n")
+            file.write_text(text + "\n", encoding="utf-8")
         written.append(out)
     if json:
         print(text)

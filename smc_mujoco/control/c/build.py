@@ -105,7 +105,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
 def _old_names(source: Path) -> list[str]:
     """Return flags for a file that reads the measurement by names of version 0.1, with a DeprecationWarning."""
     try:
-        used = sorted(set(OLD_FIELD.findall(source.read_text(errors="replace"))))
+        used = sorted(set(OLD_FIELD.findall(source.read_text(encoding="utf-8", errors="replace"))))
     except OSError:  # the compiler reports it
         used = []
     for old in used:

@@ -111,7 +111,7 @@ def _fixed_point(law: Component) -> str:
         "LAM": word(gains["lam"], gains["u_range"]),
         "TABLE": rows([str(n) for n in q15.TABLE]),
     }
-    text = (build.HERE / "q15.c").read_text().rstrip()
+    text = (build.HERE / "q15.c").read_text(encoding="utf-8").rstrip()
     return re.sub(r"@(\w+)@", lambda found: str(words[found[1]]), text)
 
 
@@ -119,7 +119,7 @@ def _facts(law: Component, slots: int) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
     defaults = ",".join(f"{plain(name)}={value!r}" for name, value in law.gains.items())
     lines = [
-        build.HEADER.read_text(),
+        build.HEADER.read_text(encoding="utf-8"),
         *gain_names(law),
         f'const char smc_law_gains[] = "{defaults}";',
         f"const int smc_law_memory = {slots};",
@@ -162,7 +162,7 @@ def _tools(command: tuple[str, ...]) -> tuple[str, str]:
 def _measured(code: str) -> str:
     """Return the bytes of code and of constants in words, or why they are not measured."""
     source, target, command = build.fresh(".c"), build.fresh(".o"), build.compiler()
-    source.write_text(code)
+    source.write_text(code, encoding="utf-8")
     try:
         done = timed([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
         version, tool = _tools(tuple(command))

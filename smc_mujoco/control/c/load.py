@@ -13,6 +13,7 @@ import hashlib
 import math
 import re
 import shutil
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -198,6 +199,10 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
     """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
     if not isinstance(source, str | Path):
         raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
+    if sys.platform == "win32":
+        raise ScenarioError(
+            f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
+        )
     path = Path(source)
     timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):

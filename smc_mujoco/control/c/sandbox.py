@@ -107,13 +107,13 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
 
     progress, order = build.fresh(".txt"), build.fresh(".json")
     words = {"library": str(library.file), "symbol": library.symbol, "progress": str(progress), "trial": trial}
-    order.write_text(json.dumps(words))
+    order.write_text(json.dumps(words), encoding="utf-8")
     command = [sys.executable, "-I", "-S", __file__, str(order)]
     try:
         code = timed(command, library.timeout, output=False).returncode
     except TimedOut:
         code = None
-    lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]
+    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
     if lines[-1] == "unloading" and code == 0:
         return json.loads(lines[-2])
     file, last = library.path.name, lines[-1].replace(str(library.file), library.path.name)
@@ -392,8 +392,8 @@ def attempt(order, progress) -> None:
 
 def main(file: str) -> None:
     """Carry out the order in a JSON file."""
-    order = json.loads(Path(file).read_text())
-    with Path(order["progress"]).open("w", buffering=1) as progress:
+    order = json.loads(Path(file).read_text(encoding="utf-8"))
+    with Path(order["progress"]).open("w", buffering=1, encoding="utf-8") as progress:
         try:
             attempt(order, progress)
         except (Fault, OSError, AttributeError) as error:

@@ -231,13 +231,13 @@ def tried(source: Source, timeout: float) -> None:
     with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as temporary:
         folder, copies = Path(temporary), {}
         text, report, order = folder / "text", folder / "report", folder / "order"
-        text.write_text(source.text, errors="surrogatepass")
+        text.write_text(source.text, encoding="utf-8", errors="surrogatepass")
         for i, (name, content) in enumerate(source.assets):
             copies[name] = str(folder / str(i))
             Path(copies[name]).write_bytes(content)
         files = {"path": source.path, "text": str(text), "assets": copies, "report": str(report), "memory": MEMORY}
         plugins = [*map(str, libmujoco.plugins())]
-        order.write_text(json.dumps(files | {"library": str(libmujoco.path()), "plugins": plugins}))
+        order.write_text(json.dumps(files | {"library": str(libmujoco.path()), "plugins": plugins}), encoding="utf-8")
         command = [sys.executable, "-I", "-S", mjcf_trial.__file__, str(order)]
         try:
             code = process.timed(command, timeout, output=False).returncode
@@ -245,7 +245,9 @@ def tried(source: Source, timeout: float) -> None:
             code = None
         except OSError:  # this process may not start others
             return
-        last = (report.read_text(errors="replace") if report.exists() else "").splitlines() or ["loading"]
+        last = (report.read_text(encoding="utf-8", errors="replace") if report.exists() else "").splitlines() or [
+            "loading"
+        ]
     if last[-1].startswith("error") and "plugin" in last[-1]:  # the user may have loaded this plugin here
         return
     if last[-1] not in ("fine", "loading"):  # "loading": MuJoCo did not load, which is not the model's fault

@@ -89,9 +89,9 @@ class Trial:
 
 def main(place: str) -> None:
     """Try the model that a JSON file describes: libraries, plugins, path or text with assets, memory, report file."""
-    order = json.loads(Path(place).read_text())
+    order = json.loads(Path(place).read_text(encoding="utf-8"))
     limit(order["memory"])
-    with Path(order["report"]).open("w") as report:
+    with Path(order["report"]).open("w", encoding="utf-8") as report:
         Trial(order, report).run(order)
         os._exit(0)  # without freeing what it has built
 

@@ -159,14 +159,14 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     for kind, (slots, text) in code.items():
         if kind != "law":
             files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
-    files = {"fmu.c": (HERE / "fmu.c").read_text(), **files}
+    files = {"fmu.c": (HERE / "fmu.c").read_text(encoding="utf-8"), **files}
     content = "\0".join([*files.values(), inside.header(listed, controller, identifier, ""), joint])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
     files["controller.h"] = inside.header(listed, controller, identifier, token)
-    files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text()
-    files["smc_law.h"] = build.HEADER.read_text()
-    files |= {name: (HERE / "headers" / name).read_text() for name in HEADERS}
+    files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text(encoding="utf-8")
+    files["smc_law.h"] = build.HEADER.read_text(encoding="utf-8")
+    files |= {name: (HERE / "headers" / name).read_text(encoding="utf-8") for name in HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
         "documentation/index.html": description.page(listed, controller, joint),
@@ -188,7 +188,7 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as folder:
         sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, Path(folder, "out")
         for name, text in sources.items():
-            Path(folder, name).write_text(text)
+            Path(folder, name).write_text(text, encoding="utf-8")
         compiled = [str(Path(folder, name)) for name in sources if name.endswith(".c")]
         try:
             done = timed([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)

@@ -382,12 +382,12 @@ def _try(law: FmuLaw, timeout: float) -> None:
     """
     progress, order, file = build.fresh(".txt"), build.fresh(".json"), Path(law.path).name
     words = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
-    order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}))
+    order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}), encoding="utf-8")
     try:
         code = timed([sys.executable, "-P", slave.__file__, str(order)], timeout, output=False).returncode
     except TimedOut:
         code = None
-    lines = (progress.read_text() if progress.exists() else "").splitlines() or ["loading"]
+    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
     last, _, why = lines[-1].partition(" ")
     if last == "passed" and code == 0:
         return

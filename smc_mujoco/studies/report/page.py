@@ -87,8 +87,8 @@ def page(findings: Findings) -> str:
         "plants": plants(),
     }
     return made.get_template("page.jinja").render(
-        css=Markup((TEMPLATES / "style.css").read_text()),
-        js=Markup((TEMPLATES / "page.js").read_text()),
+        css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
         plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
         sections=SECTIONS,
         # tables: what identifies a row -> column -> cell

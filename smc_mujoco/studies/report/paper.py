@@ -71,8 +71,8 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
         environment()
         .get_template("paper.jinja")
         .render(
-            css=Markup((TEMPLATES / "style.css").read_text()),
-            js=Markup((TEMPLATES / "page.js").read_text()),
+            css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+            js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
             paper=done.paper,
             claims=done.claims,
             counts={verdict: found[verdict] for verdict in VERDICTS if found[verdict]},

@@ -1,0 +1,124 @@
+"""What assumes Linux has a way without: files, locks, processes, processors, pictures, C."""
+
+import ast
+import builtins
+import os
+import subprocess
+import sys
+import threading
+import types
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl, process
+from smc_mujoco.mechanisms.custom import mjcf_trial
+from smc_mujoco.simulation import run
+from smc_mujoco.testing import golden
+
+PACKAGE = Path(smc.__file__).parent
+POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
+
+
+def without_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the import of a module fail, as where Python has none."""
+    real = builtins.__import__
+
+    def fails(wanted: str, *args: object, **kwargs: object) -> object:
+        if wanted == name:
+            raise ImportError(name)
+        return real(wanted, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", fails)
+
+
+def test_every_text_file_is_read_and_written_as_utf_8():
+    """Windows would take its own encoding, in which a text from Linux is another."""
+    bare = []
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in POSITION:
+                stated = len(node.args) > POSITION[node.func.attr] or "encoding" in {word.arg for word in node.keywords}
+                bare += [] if stated else [f"{path.relative_to(PACKAGE)}:{node.lineno}"]
+    assert bare == []
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="it is about systems that have it")
+def test_without_process_groups_a_command_that_is_late_is_killed_with_its_children(monkeypatch):
+    asked, real = [], subprocess.run
+
+    def taskkill(command: list[str], **options: object) -> object:
+        if command[0] != "taskkill":
+            return real(command, **options)
+        asked.append(command)
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.delattr(os, "killpg")
+    monkeypatch.setattr(subprocess, "run", taskkill)
+    with pytest.raises(process.TimedOut):
+        process.timed([sys.executable, "-c", "import time; time.sleep(60)"], 0.2)
+    ((*command, number),) = asked
+    assert command == ["taskkill", "/F", "/T", "/PID"]
+    with pytest.raises(ProcessLookupError):  # it has ended, and was waited for
+        os.kill(int(number), 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it is about systems with fcntl")
+def test_without_fcntl_one_at_a_time_is_in_a_locked_folder(tmp_path, monkeypatch):
+    import fcntl
+
+    def locking(handle: int, mode: int, count: int) -> None:
+        assert count == 1
+        fcntl.flock(handle, mode)  # which raises OSError where another has it
+
+    windows = types.SimpleNamespace(locking=locking, LK_NBLCK=fcntl.LOCK_EX | fcntl.LOCK_NB, LK_UNLCK=fcntl.LOCK_UN)
+    monkeypatch.setitem(sys.modules, "msvcrt", windows)
+    monkeypatch.setattr(golden.tempfile, "gettempdir", lambda: str(tmp_path))
+    without_module("fcntl", monkeypatch)
+    inside, most, free = [], [], threading.Event()
+
+    def enter(first: bool) -> None:
+        with golden.locked(tmp_path):
+            inside.append(1)
+            most.append(len(inside))
+            if first:
+                free.wait(0.3)
+            inside.pop()
+
+    workers = [threading.Thread(target=enter, args=(k == 0,)) for k in range(3)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(10.0)
+    assert most == [1, 1, 1]
+
+
+@pytest.mark.parametrize("platform", ["darwin", "win32"])
+def test_other_systems_than_linux_keep_mujoco_s_own_choice_of_opengl(platform, monkeypatch):
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    assert gl.choice.__wrapped__() == gl.Choice(wish="", backend="")
+    gl.choice.cache_clear()
+    try:
+        assert gl.choose_gl() == ""
+    finally:
+        gl.choice.cache_clear()
+    assert "MUJOCO_GL" not in os.environ
+
+
+def test_without_an_affinity_all_processors_count(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert run.cores() == 7
+
+
+def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):
+    without_module("resource", monkeypatch)
+    mjcf_trial.limit(1)
+
+
+def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(smc.ScenarioError, match=r"law\.c' on Windows: run smc_mujoco on Linux, or in WSL"):
+        smc.law_from_c("law.c")

@@ -1,0 +1,68 @@
+"""The workflows run what the Makefile and the pages say, and nothing else, so that neither can go stale alone."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+PAGES = ("docs/install.md", "CONTRIBUTING.md")
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+SHARED = re.compile(r"sudo | --yes")  # what a machine needs that nobody sits at
+
+
+def commands(page: str) -> set[str]:
+    """The commands in a page's blocks of sh, and in its text."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
+    lines = [line.partition("   #")[0].partition("  #")[0].strip() for line in blocks.splitlines()]
+    return {*lines, *re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))}
+
+
+KNOWN = set().union(*map(commands, PAGES))
+
+
+def jobs(workflow: Path) -> dict:
+    return yaml.safe_load(workflow.read_text(encoding="utf-8"))["jobs"]
+
+
+STEPS = [(file.name, step) for file in WORKFLOWS for job in jobs(file).values() for step in job["steps"]]
+RUN = [(name, step["run"]) for name, step in STEPS if "run" in step]
+
+
+def written_out(command: str, workflow: str) -> list[str]:
+    """A command for each package of the matrix that it names."""
+    if "${{" not in command:
+        return [command]
+    found = [job["strategy"]["matrix"]["package"] for job in jobs(ROOT / ".github/workflows" / workflow).values()]
+    return [command.replace("${{ matrix.package }}", one) for packages in found for one in packages]
+
+
+@pytest.mark.parametrize(("workflow", "command"), RUN)
+def test_a_workflow_s_command_is_one_of_the_makefile_or_of_a_page(workflow, command):
+    if command.startswith("make "):
+        assert command.split()[1] in TARGETS
+        return
+    for one in written_out(command, workflow):
+        assert SHARED.sub("", one) in KNOWN
+
+
+def test_workflows_have_the_pythons_of_the_package():
+    about = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    classified = re.findall(r"Python :: (3\.\d+)", about)
+    assert jobs(ROOT / ".github/workflows/tests.yml")["linux"]["strategy"]["matrix"]["python"] == classified
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_a_workflow_may_read_and_no_more_and_pins_what_it_uses(workflow):
+    data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
+    assert data["permissions"] == {"contents": "read"}
+    for job in data["jobs"].values():
+        assert {*job.get("permissions", {})} <= {"pages", "id-token"}
+        for used in [step["uses"] for step in job["steps"] if "uses" in step]:
+            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|release/v1)", used)
+        for step in job["steps"]:
+            if step.get("uses", "").startswith("actions/checkout"):
+                assert step["with"] == {"persist-credentials": False}
