@@ -39,7 +39,10 @@ def runs(
       ScenarioError: a rig without an ensemble or, if none are given, without laws; arguments that `smc.grid` refuses.
     """
     if not rig.ensemble:
-        raise ScenarioError(f"{rig.name} has one set of parameters: choose a rig with an ensemble, such as qube_servo")
+        raise ScenarioError(
+            f"{rig.name} has one set of parameters, and no source states its errors: choose a rig with an ensemble, "
+            "such as qube_servo, or identify it from records and draw one with Identified.drawn"
+        )
     if not (chosen := list(rig.laws if laws is None else laws)):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
     found, around = [], starts or Starts(x0=rig.x0)

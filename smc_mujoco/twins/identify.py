@@ -6,6 +6,10 @@ their cost is smooth; then as a whole, with the loop closed where the controller
 batch. The search is scipy's trust region. `mujoco.sysid` is not used: it replays recorded controls in an open loop,
 without controllers, encoders and delays, and needs ten more packages.
 
+The velocity at the start of a record is that of a cubic through its first samples, which is wrong where the command
+jumps there. So it is found along with the quantities, and in an open loop the position too, unless the residuals begin
+when the start is long forgotten.
+
 Standard errors allow for residuals that depend on their neighbours: they are those of a jackknife that leaves out one
 block of time after the other, at first order. A closed loop feeds the noise of its measurement back, and where one
 short transient decides a quantity, the other blocks cannot tell what that does. So closed loops are also repeated in
@@ -30,7 +34,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.twins import records as files
 from smc_mujoco.twins.records import Columns, Record
-from smc_mujoco.twins.rig import Quantity, Rig
+from smc_mujoco.twins.rig import Quantity, Rig, Source
 from smc_mujoco.twins.rig import rig as find_rig
 
 STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry friction makes shorter ones rough
@@ -39,6 +43,7 @@ MAX_CORRELATION = 0.98  # correlation from which records cannot tell two quantit
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
 POOR = 80.0  # percent, of a fit below which the search may have ended in the wrong place; chosen
 BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
+STATE_SCALE = 0.05  # unit of a state at the start, of the standard deviation of its column or rate; chosen
 SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
 WORST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
 
@@ -52,7 +57,7 @@ class Identified:
       before: the rig before.
       values, errors: quantity -> value found, and its standard error.
       correlations: of the errors, (p, p), in the order of `values`.
-      fits, fits_before: percentages of each record, see `Rig.fit`.
+      fits, fits_before: percentages of each record, see `Rig.fit`; `fits` start from the states found.
       predictions: of each record, the predicted columns, the measured ones and their times.
       evaluations: how many sets of values were simulated.
     """
@@ -132,9 +137,6 @@ class Identified:
         return residual_figure(self.rig.label, t, measured, {"twin": predicted}, {"twin": self.fits[record]}, path)
 
 
-Source = Mapping[str, Any] | Trace
-
-
 def identify(
     of: Rig | Plant | str,
     records: Source | Sequence[Source],
@@ -180,18 +182,22 @@ def identify(
         z = search.best_start(stages[0], starts, seed)
         if stages[0] == "pieces":
             z = search.better("whole", z, search.refine("pieces", z, most))
-        z = search.refine("whole", z, most)
+        z = search.refine_from_rest(z, most)
         values, errors, correlations = search.statistics(z)
-    found = twin.with_values(values, "identified from records")
+    found, states = twin.with_values(values, "identified from records"), search.states(z)
     return Identified(
         rig=found, before=twin, values=values, errors=errors, correlations=correlations,
-        fits=tuple(found.fits(data)), fits_before=fits_before, predictions=tuple(found.predictions(data)),
-        evaluations=search.evaluations,
+        fits=tuple(found.fits(data, states=states)), fits_before=fits_before,
+        predictions=tuple(found.predictions(data, states=states)), evaluations=search.evaluations,
     )  # fmt: skip
 
 
 class Search:
-    """Least squares over some quantities of a rig, in units of their scales."""
+    """Least squares over some quantities of a rig, and over the states at the starts of its records.
+
+    A point of the search, (p + records * s,), has the quantities first, then of each record how far those s numbers of
+    the state at its start that are free are from the measured ones; all in units of their scales.
+    """
 
     def __init__(
         self,
@@ -204,18 +210,60 @@ class Search:
         self.twin, self.names, self.data, self.checked, self.report = twin, names, data, checked, report
         known = [twin.quantities[name] for name in names]
         self.scales = np.array([_scale(quantity) for quantity in known])
-        self.low = np.array([quantity.least for quantity in known]) / self.scales
-        self.high = np.array([quantity.most for quantity in known]) / self.scales
+        n, own = len(twin.columns.x), bool(twin.columns.state) or twin.dynamics is not None
+        forgotten = own or twin.score_from > twin.start
+        self.free = np.zeros(0, int) if forgotten else np.arange(2 * n)[n if twin.controller else 0 :]
+        self.measured = [] if own else [self._measured_state(i) for i in range(len(data))]
+        self.state_scales = [self._state_scales(i)[self.free] for i in range(len(data))] if len(self.free) else []
+        unbounded = np.full(len(self.free) * len(data), np.inf)
+        self.low = np.append([quantity.least for quantity in known] / self.scales, -unbounded)
+        self.high = np.append([quantity.most for quantity in known] / self.scales, unbounded)
         self.evaluations = 0
 
     def rig(self, z: np.ndarray) -> Rig:
-        """Return the rig at a point of the search, (p,)."""
+        """Return the rig at a point of the search."""
         return self.twin.with_values(self.values(z))
+
+    def states(self, z: np.ndarray) -> list[np.ndarray | None]:
+        """Return positions and velocities at the start of each record at a point, (2n,); None: those measured."""
+        if not len(self.free):
+            return [None] * len(self.data)
+        found = []
+        for i, moved in enumerate(z[len(self.names) :].reshape(len(self.data), -1)):
+            state = self.measured[i].copy()
+            state[self.free] += moved * self.state_scales[i]
+            found.append(state)
+        return found
+
+    def at_rest(self, z: np.ndarray) -> np.ndarray:
+        """Return the point with velocity 0 at the start of each record, if it is free."""
+        rest = z.copy()
+        if len(self.free):
+            n = len(self.twin.columns.x)
+            moved = rest[len(self.names) :].reshape(len(self.data), -1)
+            moved[:, -n:] = [-self.measured[i][n:] / self.state_scales[i][-n:] for i in range(len(self.data))]
+        return rest
+
+    def _measured_state(self, i: int) -> np.ndarray:
+        """Return positions and velocities at the start of a record as they are measured, (2n,)."""
+        period = self._period(i)
+        return np.concatenate(files.state(self.checked[i], self.twin.columns, period, round(self.twin.start / period)))
+
+    def _state_scales(self, i: int) -> np.ndarray:
+        """Return the units of positions and velocities at the start of a record, (2n,)."""
+        columns = [self.checked[i][name] for name in self.twin.columns.x]
+        varied = [each.std() for each in (*columns, *(files.rate(each, self._period(i)) for each in columns))]
+        return STATE_SCALE * np.array([each or 1.0 for each in varied])
+
+    def _period(self, i: int) -> float:
+        return self.twin.period or files.step_of(self.checked[i], self.twin.columns)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
         """Return the quantities at a point of the search, within their ranges to the last bit."""
         known = [self.twin.quantities[name] for name in self.names]
-        found = np.clip(z * self.scales, [each.least for each in known], [each.most for each in known])
+        found = np.clip(
+            z[: len(self.names)] * self.scales, [each.least for each in known], [each.most for each in known]
+        )
         return dict(zip(self.names, found.tolist(), strict=True))
 
     def residuals(self, points: Sequence[np.ndarray], stage: str) -> list[np.ndarray]:
@@ -232,8 +280,13 @@ class Search:
         else:
             plan = [(i, at) for i in range(len(self.data)) for at in self._pieces(i, stage)]
             scenarios = [
-                rig.replay(self.data[i], *at, rounded=False, closed=stage == "whole") for rig in rigs for i, at in plan
-            ]
+                rig.replay(
+                    self.data[i], *at, rounded=False, closed=stage == "whole",
+                    state=states[i] if at[0] == rig.start else None,
+                )
+                for rig, states in zip(rigs, map(self.states, points), strict=True)
+                for i, at in plan
+            ]  # fmt: skip
             traces = run(scenarios)
             size = len(plan)
             found = [
@@ -277,12 +330,14 @@ class Search:
 
     def best_start(self, stage: str, starts: int, seed: int) -> np.ndarray:
         """Return the point of least cost among the present values and random ones about them."""
-        rng = np.random.default_rng(seed)
-        here = np.array([self.twin.values[name] for name in self.names]) / self.scales
-        points = [here] + [
-            np.clip(here * np.exp(SPREAD * rng.standard_normal(len(here))), self.low, self.high)
-            for _ in range(starts - 1)
-        ]
+        rng, p = np.random.default_rng(seed), len(self.names)
+        here = np.zeros(len(self.low))
+        here[:p] = np.array([self.twin.values[name] for name in self.names]) / self.scales
+        points = [here]
+        for _ in range(starts - 1):
+            other = here.copy()
+            other[:p] *= np.exp(SPREAD * rng.standard_normal(p))
+            points.append(np.clip(other, self.low, self.high))
         return self.better(stage, *points)
 
     def better(self, stage: str, *points: np.ndarray) -> np.ndarray:
@@ -299,6 +354,15 @@ class Search:
         )  # fmt: skip
         return found.x
 
+    def refine_from_rest(self, z: np.ndarray, most: int) -> np.ndarray:
+        """Return the point of least squares of the whole records near z, or near z with the machine at rest at first.
+
+        Dry friction makes a kink in the cost at rest, where a search from another velocity ends early.
+        """
+        z = self.refine("whole", self.better("whole", z, self.at_rest(z)), most)
+        rest = self.better("whole", z, self.at_rest(z))
+        return z if rest is z else self.refine("whole", rest, most)
+
     def jacobian(self, z: np.ndarray, stage: str) -> np.ndarray:
         """Return the slopes of the residuals, (N, p), by differences that stay in range."""
         ahead = [np.clip(z + STEP * e, self.low, self.high) for e in np.eye(len(z))]
@@ -312,11 +376,13 @@ class Search:
         Raises:
           ScenarioError: records that cannot tell the quantities apart.
         """
-        J, r = self.jacobian(z, "whole"), self.residuals([z], "whole")[0]
+        slopes, r = self.jacobian(z, "whole"), self.residuals([z], "whole")[0]
+        J, by_states = np.split(slopes, [len(self.names)], axis=1)
         sizes = np.linalg.norm(J, axis=0)
         for name, size in zip(self.names, sizes, strict=True):
             if size == 0.0:
                 raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
+        J = J - by_states @ np.linalg.lstsq(by_states, J, rcond=None)[0]  # what no state at a start can do
         _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
         if singular[-1] < SAME * singular[0]:
             alike = [self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]]
@@ -331,7 +397,20 @@ class Search:
         deviation = np.maximum(deviation, self._fed_back(J, z))
         values = self.values(z)
         errors = dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
+        self._refuse_alike(values, errors, correlations)
         return values, errors, correlations
+
+    def _refuse_alike(self, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
+        """Raise ScenarioError for two quantities of which only a sum is known: neither is above its standard error."""
+        unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
+        pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
+        i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
+        if pairs[i, j] > MAX_CORRELATION:
+            found = [f"{self.names[k]} ({values[self.names[k]]:.3g} ± {errors[self.names[k]]:.2g})" for k in (i, j)]
+            raise ScenarioError(
+                f"the records of {self.twin.name} cannot tell {' and '.join(found)} apart: leave one out, or give a "
+                "longer record or one of a richer motion"
+            )
 
     def _jackknife(self, J: np.ndarray, r: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""
@@ -342,7 +421,7 @@ class Search:
             blocks += [count + np.arange(len(values)) * parts // len(values) for values in predicted.values()]
             count += parts
         which, A = np.concatenate(blocks), J.T @ J
-        moves = np.zeros((count, len(z)))
+        moves = np.zeros((count, J.shape[1]))
         for b in range(count):
             mine, errors = J[which == b], r[which == b]
             moves[b] = np.linalg.lstsq(A - mine.T @ mine, mine.T @ errors, rcond=None)[0]
@@ -355,18 +434,21 @@ class Search:
         at first order; 0 in an open loop.
         """
         if self.twin.controller is None:
-            return np.zeros(len(z))
+            return np.zeros(J.shape[1])
         rig, several = self.rig(z), range(len(self.data))
-        calm = [rig.replay(record, rounded=False) for record in self.data]
+        known = list(zip(self.data, self.states(z), strict=True))
+        calm = [rig.replay(record, rounded=False, state=state) for record, state in known]
         noisy = [
-            dataclasses.replace(rig.replay(record), noise=Noise(files.noise(self.checked[i], rig.columns)), seed=repeat)
+            dataclasses.replace(
+                rig.replay(record, state=state), noise=Noise(files.noise(self.checked[i], rig.columns)), seed=repeat
+            )
             for repeat in range(REPEATS)
-            for i, record in enumerate(self.data)
+            for i, (record, state) in enumerate(known)
         ]
         traces = run(calm + noisy)
         at = rig.start, None
         expected = [self._compared(rig, i, at, traces[i])[0] for i in several]
-        moved = np.zeros((REPEATS, len(z)))
+        moved = np.zeros((REPEATS, J.shape[1]))
         for repeat in range(REPEATS):
             ran = traces[len(calm) * (1 + repeat) :]
             change = [self._relative(self._compared(rig, i, at, ran[i])[0], expected[i], i) for i in several]
@@ -390,17 +472,7 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
         of = _of_plant(of, traces[0].scenario if traces else None)
     if not isinstance(of, Rig):
         raise ScenarioError(f"cannot identify {shown(of)}: give a rig, the name of one, or a smc.Plant")
-    if not traces:
-        return of, [one for one in many if not isinstance(one, Trace)]
-    if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
-        raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
-    law = traces[0].scenario.law
-    state = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in of.columns.x)
-    of = dataclasses.replace(
-        of, controller=None if law.name == "none" else law, commands=None, dynamics=None, start=0.0, score_from=0.0,
-        columns=dataclasses.replace(of.columns, state=state, torque=()),
-    )  # fmt: skip
-    return of, [files.of_trace(trace, of.columns) for trace in traces]
+    return of.reading(many)
 
 
 def _of_plant(plant: Plant, base: Scenario | None) -> Rig:

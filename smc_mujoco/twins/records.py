@@ -241,7 +241,8 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)
     cubics = [np.polyfit(times, data[name][first:last], 3) for name in columns.x]
-    return np.array([cubic[3] for cubic in cubics]), np.array([cubic[2] for cubic in cubics])
+    x = np.array([cubic[3] for cubic in cubics] if at else [data[name][0] for name in columns.x])
+    return x, np.array([cubic[2] for cubic in cubics])
 
 
 def rate(values: np.ndarray, period: float) -> np.ndarray:

@@ -10,7 +10,7 @@ them. Identification changes quantities; everything else is scenarios, runs and 
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,6 +30,7 @@ from smc_mujoco.twins import inverse, records
 from smc_mujoco.twins.records import Columns, Record
 
 Values = SimpleNamespace  # quantities by name
+Source = Mapping[str, Any] | Trace  # a record: columns by name, or a run of which what was measured counts
 FAR_BETTER = 50.0  # percent that a fit must gain, and reach, to take a record's angles for degrees; chosen
 UNSCORED = -1e3  # percent, of a replay that fails or leaves the machine's range
 
@@ -176,6 +177,7 @@ class Rig:
         duration: float | None = None,
         rounded: bool = True,
         closed: bool = True,
+        state: np.ndarray | None = None,
     ) -> Scenario:
         """Return the scenario that repeats a record from its measured state on.
 
@@ -189,6 +191,7 @@ class Rig:
           rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be
             predicted, so `fit` leaves rounding out by default.
           closed: whether to close the loop where the controller is known; else the recorded command is replayed.
+          state: positions and velocities at the start as the record has them, (2n,); None: those measured.
         """
         if self.dynamics is not None:
             raise ScenarioError(f"records of {self.name} are not repeated, as their torques are predicted: use fit")
@@ -207,7 +210,7 @@ class Rig:
         sensor = fields.get("sensor")
         if sensor is not None and not rounded:
             fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
-        x, v = records.state(data, self.columns, period, first)
+        x, v = records.state(data, self.columns, period, first) if state is None else np.split(state, 2)
         times = period * np.arange(last + 1 - first)
 
         def signal(values: np.ndarray) -> TimeSeries:
@@ -267,13 +270,38 @@ class Rig:
         """The control period of closed-loop records, s; None for records of an open loop, which have their own."""
         return None if self.controller is None else self.scenario().control_period
 
-    def fit(self, record: Mapping[str, Any], rounded: bool = False) -> dict[str, float]:
+    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
+        """Return the records as columns, and the rig that repeats them: of traces with their law, from their start.
+
+        Raises:
+          ScenarioError: traces of several laws or of another plant, or traces and columns.
+        """
+        traces = [one for one in many if isinstance(one, Trace)]
+        if not traces:
+            return self, [one for one in many if not isinstance(one, Trace)]
+        if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
+            raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
+        plant = self.machine(Values(**self.values))["plant"].name
+        if other := next((trace.scenario.plant.name for trace in traces if trace.scenario.plant.name != plant), None):
+            raise ScenarioError(
+                f"the trace is one of {other} and the plant of {self.name} is {plant}: give one of its own"
+            )
+        law = traces[0].scenario.law
+        state = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in self.columns.x)
+        rig = dataclasses.replace(
+            self, controller=None if law.name == "none" else law, commands=None, dynamics=None, start=0.0,
+            score_from=0.0, columns=dataclasses.replace(self.columns, state=state, torque=()),
+        )  # fmt: skip
+        return rig, [records.of_trace(trace, rig.columns) for trace in traces]
+
+    def fit(self, record: Source, rounded: bool = False) -> dict[str, float]:
         """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
 
         The norms are over all samples from `score_from` on; 100 is perfect, 0 is as good as the mean.
 
         Args:
-          record: column -> values, (K,), such as a loaded npz file; see `columns`.
+          record: column -> values, (K,), such as a loaded npz file, see `columns`; or a trace, which counts from its
+            start on.
           rounded: whether the prediction is rounded to counts of the encoder.
 
         Returns:
@@ -283,8 +311,9 @@ class Rig:
           ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
             angles in degrees.
         """
-        found = self.fits([record], rounded)[0]
-        self.refuse_degrees(record, found)
+        rig, data = self.reading([record])
+        found = rig.fits(data, rounded)[0]
+        rig.refuse_degrees(data[0], found)
         return found
 
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
@@ -310,13 +339,19 @@ class Rig:
                 "give radians"
             )
 
-    def fits(self, many: list[Mapping[str, Any]], rounded: bool = False) -> list[dict[str, float]]:
-        """Return `fit` of several records, without the check for degrees; they are simulated at once."""
-        found = [percentages(*each[:2]) for each in self.predictions(many, rounded)]
+    def fits(
+        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
+    ) -> list[dict[str, float]]:
+        """Return `fit` of several records, without the check for degrees; they are simulated at once.
+
+        Args:
+          states: at the starts, as in `replay`; None: those measured.
+        """
+        found = [percentages(*each[:2]) for each in self.predictions(many, rounded, states)]
         return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
 
     def predictions(
-        self, many: list[Mapping[str, Any]], rounded: bool = False
+        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
     ) -> list[tuple[Record, Record, np.ndarray]]:
         """Return, of each record, the predicted columns, the measured ones and their times, from `score_from` on."""
         data, time = [self.checked(record) for record in many], self.columns.time
@@ -325,8 +360,10 @@ class Rig:
                 (self.torques(one), self.measured_torques(one), inverse.times(each, self.columns))
                 for one, each in zip(many, data, strict=True)
             ]
+        pairs = zip(many, states or [None] * len(many), strict=True)
+        traces = run([self.replay(one, rounded=rounded, state=state) for one, state in pairs])
         found = []
-        for each, trace in zip(data, run([self.replay(one, rounded=rounded) for one in many]), strict=True):
+        for each, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
             first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
             if len(trace.t) < after + records.MIN_SAMPLES:

@@ -44,7 +44,11 @@ def machines():
 
 @pytest.mark.parametrize(("row", "version"), ROWS)
 def test_published_criteria_give_their_published_score(row, version):
-    """Within what the rounding of the published criteria leaves open, and half a digit of the score."""
+    """Within what the rounding of the published criteria leaves open, and half a digit of the score.
+
+    That is up to 0.004, most of it by the smoothness: 0.0005 of 0.1 N m. Two rows of 29 are off by 0.0022, where 0.0037
+    and 0.0033 are open; all others by less than 0.002.
+    """
     names = VERSIONS[version]
     low, high = (
         boards.score(
@@ -53,7 +57,9 @@ def test_published_criteria_give_their_published_score(row, version):
         for side in (1.0, -1.0)
     )
     assert low - 5e-4 <= row.score <= high + 5e-4
-    assert boards.score(row, version) == pytest.approx(row.score, abs=0.0025)
+    assert high - low < 0.007
+    if (row.name, row.swing_up_time) not in (("History SAC", 1.00), ("TVLQR", 4.05)):
+        assert boards.score(row, version) == pytest.approx(row.score, abs=0.002)
 
 
 def test_unrounded_criteria_give_their_unrounded_score():

@@ -39,7 +39,9 @@ def test_the_verdict_says_where_one_law_wins(boards):
 
 
 def test_a_rig_of_one_set_is_refused():
-    with pytest.raises(smc.ScenarioError, match="emps has one set of parameters: choose a rig with an ensemble"):
+    with pytest.raises(
+        smc.ScenarioError, match="emps has one set of parameters, and no source states its errors: choose a rig with"
+    ):
         ensemble.runs(smc.rig("emps"), LAWS)
 
 

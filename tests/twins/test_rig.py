@@ -37,10 +37,12 @@ def record():
     return recorded(smc.run(moving))
 
 
-def test_every_number_has_a_unit_and_a_source():
+def test_every_number_has_a_source_and_its_licence():
     for name in smc.rigs():
         for quantity, known in smc.rig(name).quantities.items():
             assert len(known.source) > 5, (name, quantity)
+            if not known.source.startswith(("identified here", "chosen", "part of")):
+                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", known.source), (name, quantity)
             assert known.least <= known.value <= known.most, (name, quantity)
 
 
@@ -81,6 +83,16 @@ def test_the_twin_repeats_its_own_record(record):
     fit = QUBE.fit(record)
     assert list(fit) == ["theta", "alpha", "u"]
     assert min(fit.values()) > 99.0
+
+
+def test_a_trace_is_a_record_too():
+    run = smc.run(smc.rig("emps").scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0))
+    fit = smc.rig("emps").fit(run)
+    assert min(fit.values()) > 99.0
+    assert fit.keys() == {"x", "u"}
+    assert smc.rig("emps", mass=80.0).fit(run)["u"] < 95.0
+    with pytest.raises(smc.ScenarioError, match="is one of servo_axis and the plant of qube_servo is furuta"):
+        QUBE.fit(run)
 
 
 def test_a_record_of_another_machine_fits_less(record):

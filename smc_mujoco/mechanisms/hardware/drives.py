@@ -37,7 +37,9 @@ COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and p
 class Drive(Actuator):
     """Base of drives."""
 
-    stateful = True
+    @property
+    def stateful(self) -> bool:
+        return True
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,8 +129,7 @@ class DCMotor(Drive):
     slide gear is in rad/m: a pinion of 82 mm. The gearbox has no losses: add a friction. A scenario warns of a motor
     whose torque at rest, `stall`, is less than a joint needs to stay at its initial position.
 
-    Limits: implicitfast or Euler; under RK4 a step must be shorter than 2.8 L/R. inductance 0 is compiled into
-    another model.
+    Limits: implicitfast or Euler; with inductance 0, which is compiled into another model, RK4 too.
 
     Attributes:
       resistance: ohm, 1e-9 or more.
@@ -166,6 +167,10 @@ class DCMotor(Drive):
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
                 f"resistance of {self.resistance:g} ohm: give a stronger motor"
             )
+
+    @property
+    def stateful(self) -> bool:
+        return self.delay > 0.0
 
     @property
     def constant(self) -> float:

@@ -88,13 +88,15 @@ class LuGre(Friction):
         0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
     """
 
-    stateful = True
-
     coulomb: float
     static: float
     stribeck: float
     stiffness: float = 1e3
     damping: float | None = None
+
+    @property
+    def stateful(self) -> bool:
+        return True
 
     def __post_init__(self) -> None:
         self.check_numbers("coulomb", "static", "stribeck", "stiffness", above=0.0)

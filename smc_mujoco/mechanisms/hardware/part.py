@@ -32,7 +32,10 @@ START = "smc:start"  # keyframe with the initial positions of joints without a c
 class Part:
     """Base of all parts."""
 
-    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
+    @property
+    def stateful(self) -> bool:
+        """Whether it has a state that MuJoCo integrates, inaccurately under RK4."""
+        return False
 
     def check_numbers(self, *names: str, **bounds: Any) -> None:
         """Replace fields by floats. None stays if it is the field's default.

@@ -11,10 +11,10 @@ from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.twins.rig import Quantity, Rig
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
-QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual"
-IP02 = "Quanser, IP02 linear servo, user manual"
-LONG = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN"
-SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals"
+QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
+IP02 = "Quanser, IP02 linear servo, user manual (no licence stated)"
+LONG = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
+SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stated)"
 
 
 def motor(q):

@@ -132,7 +132,7 @@ QUBE_SERVO = Rig(
         | {
             "arm_inertia": 4e-6 + 0.095 * 0.085**2 / 3,
             "source": "arm's inertia m r^2/3 as in "
-            "Quanser's qube3_rotpen_param.m: the rig's own controller lets it fall",
+            "Quanser's qube3_rotpen_param.m (no licence stated): the rig's own controller lets it fall",
         },
     },
     ensemble=(  # identified in the same way with delays of 0, 0.5 and 1.5 ms

@@ -381,6 +381,18 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
             assert data.qacc[i] == pytest.approx(f + g * u, rel=1e-9, abs=1e-9)
 
 
+def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
+    """A carriage on a constant voltage, in closed form: implicitfast leads by half a step times its speed."""
+    motor = DCMotor(0.5, 0.0, 0.05, 20.0, 0.0, voltage=10.0, command="voltage")
+    mass, drag = 2.0, motor.constant**2 / motor.resistance
+    fields = {"actuator": motor, "feedforward": smc.Constant(5.0), "duration": 1.0, "control_period": 1e-3, "x0": 0.0}
+    axis = smc.plant("servo_axis", M=mass, b=0.0, cf=0.0, offset=0.0)
+    trace = smc.run(smc.Scenario(plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields))
+    speed, lag = 5.0 * motor.constant / motor.resistance / drag, mass / drag
+    exact = speed * (trace.t - lag * (1.0 - np.exp(-trace.t / lag)))
+    np.testing.assert_allclose(trace.x[:, 0], exact, atol=1e-8)
+
+
 def test_a_voltage_is_bounded_by_the_supply_whatever_u_max_is():
     s = smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, feedforward=smc.Constant(50.0), duration=0.01)
     assert (s.resolved.u_max, s.limits, s.efforts) == (10.0, (10.0,), ("V", "V"))
