@@ -39,6 +39,7 @@ class Drive(Actuator):
 
     @property
     def stateful(self) -> bool:
+        """Whether it has a state that MuJoCo integrates, inaccurately under RK4."""
         return True
 
 
@@ -170,6 +171,7 @@ class DCMotor(Drive):
 
     @property
     def stateful(self) -> bool:
+        """Whether it has a state that MuJoCo integrates, inaccurately under RK4: the winding's current."""
         return self.delay > 0.0
 
     @property

@@ -96,6 +96,7 @@ class LuGre(Friction):
 
     @property
     def stateful(self) -> bool:
+        """Whether it has a state that MuJoCo integrates, inaccurately under RK4: the bend of the bristles."""
         return True
 
     def __post_init__(self) -> None:
