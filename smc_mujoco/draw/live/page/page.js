@@ -234,7 +234,8 @@ function named() {
   SIDES.forEach((side) => {
     const i = running.findIndex((each) => each.side === side);
     const badge = $(`name-${side}`);
-    badge.textContent = i < 0 ? "" : facts.laws[chosen[side].law].label;
+    const twice = i > 0 && chosen.a.law === chosen.b.law;
+    badge.textContent = i < 0 ? "" : facts.laws[chosen[side].law].label + (twice ? ", second" : "");
     $(`law-${side}`).style.setProperty("--law", i < 0 ? "" : running[i].colour);
     if (i < 0) return;
     badge.style.setProperty("--law", running[i].colour);
@@ -417,9 +418,10 @@ function listen() {
     });
   }
   canvas.addEventListener("touchstart", (event) => stage.held && event.preventDefault(), { passive: false });
-  const typing = ({ target }) => target.closest("input, select, button, a");
+  // whether a key belongs to what has the focus: all keys to a field, the space bar to a button, too
+  const taken = ({ target, key }) => target.closest("input, select") || (key === " " && target.closest("button, a"));
   document.addEventListener("keydown", (event) => {
-    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (taken(event) || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === " ") toggle();
     else if (event.key === "r" || event.key === "R") reset();
     else if (event.key === "ArrowLeft") pressed = -1;
