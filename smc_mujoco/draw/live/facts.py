@@ -167,7 +167,7 @@ def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
     rows = [
         ("start", begins, unit, -far, far, s.x0[started], 0.01),
         ("reference", "Reference r", plant.units[0], -reach, reach, 0.0, 0.01),
-        ("bound", "Bound on u", effort, bound / 20, 3.0 * bound, bound, None),
+        ("bound", "Bound on u", effort, bound / 20, bound if plant.limits else 3.0 * bound, bound, None),
         ("mass", "Mass of the plant", "×", 0.5, 3.0, 1.0, 0.05),
         ("friction", "Dry friction in each joint", effort, 0.0, 0.2 * bound, 0.0, bound / 200),
         ("delay", "Delay of u", "ms", 0.0, 50.0, 0.0, 1.0),
