@@ -161,7 +161,7 @@ def identify(
     Raises:
       ScenarioError: an unknown quantity, not a record, or records that cannot tell the quantities apart.
     """
-    many = list(records) if isinstance(records, Sequence) else [records]
+    many: list[Any] = list(records) if isinstance(records, (list, tuple)) else [records]
     if not many:
         raise ScenarioError("there are no records: give at least one")
     twin, data = _twin(of, many)

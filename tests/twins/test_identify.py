@@ -157,6 +157,7 @@ def test_a_plants_own_parameters_are_found_from_a_run():
     ("make", "sentence"),
     [
         (lambda run: smc.identify("emps", []), "there are no records: give at least one"),
+        (lambda run: smc.identify("emps", "run.csv"), "record is 'run.csv': give a mapping of columns, such as"),
         (lambda run: smc.identify("emps", run, ["weight"]), "unknown quantity of emps 'weight': "),
         (lambda run: smc.identify("emps", run, []), "emps has no quantities to find: name some, of mass"),
         (lambda run: smc.identify("ip02", {"t": [0]}), "ip02 has no quantities to find: name some, of resistance"),
