@@ -35,13 +35,14 @@ MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
 SAME = 0.02  # relative: two cycles nearer than that are one
 WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
 NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
+GROWS = 3.0  # by which a gain is larger at a thousandth of an amplitude, if the law switches
 NEAR, SLOWER = 1e-4, 0.93  # relative: how close the slowest and fastest cycle are found, and steps on the way there
 DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in this many steps
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Chattering:
-    """A predicted limit cycle of one channel; all numbers are NaN where none is predicted.
+    """A predicted limit cycle of one channel; all numbers are NaN where none is predicted, or all but the ranges.
 
     Attributes:
       amplitude: of the sliding variable s, half its range, in its unit.
@@ -55,7 +56,8 @@ class Chattering:
       samples: control samples in a period.
       amplitude_range, frequency_range: the least and the most that amplitude and frequency may be, if the cycle keeps
         its place among the samples, and with the higher harmonics that the law sees: see `Loop.phases`. What one count
-        of an encoder moves s by is added to the largest amplitude.
+        of an encoder moves s by is added to the largest amplitude. Known also for a law that switches, and for which no
+        wave balances.
       coupling: largest amplitude of another driven channel under this one's command, over amplitude_x; 0 for a single
         channel. The prediction is for one channel alone: where this is not small, they oscillate together.
       gain: N, complex; response: L, complex, at the cycle.
@@ -81,7 +83,12 @@ class Chattering:
 
     @property
     def uncertainty(self) -> float:
-        """How far the amplitude or the frequency may be off, relative to the predicted one: the larger of the two."""
+        """How far the amplitude or the frequency may be off, relative to the predicted one: the larger of the two.
+
+        It is inf if no limit cycle is predicted and one is possible, and NaN for a law that is calm.
+        """
+        if not self:
+            return math.nan if math.isnan(self.amplitude_range[1]) else math.inf
         pairs = ((self.amplitude_range, self.amplitude), (self.frequency_range, self.frequency))
         return max(abs(end / value - 1.0) for ends, value in pairs for end in ends)
 
@@ -119,8 +126,34 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     found = _stable(loop, cycles(loop))
     said = tuple(_assumptions(loop))
     if not found:
-        return Chattering(assumptions=said)
+        return _locked(scenario, channel, said) if switches(loop) else Chattering(assumptions=said)
     return _described(loop, max(found, key=lambda wave: wave.omega), said, ranges)
+
+
+def switches(loop: Loop) -> bool:
+    """Return whether the gain of a law grows without bound towards small amplitudes, so that it is never calm."""
+    omega = 0.1 * math.pi / loop.scenario.control_period
+    small, smaller = (abs(loop.gain(amplitude, omega, COARSE)) for amplitude in (1e3 * MIN_AMPLITUDE, MIN_AMPLITUDE))
+    return smaller > GROWS * small
+
+
+def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chattering:
+    """Return what is known of the cycle of a law that switches where no wave balances: it keeps its place in samples.
+
+    The law switches half a control period later than in the mean at most. The cycle is no larger, and no slower, than
+    the one with that delay.
+    """
+    loop = Loop(scenario, channel, 0.5 * scenario.control_period)
+    found = _stable(loop, cycles(loop))
+    if not found:
+        return Chattering(assumptions=said)
+    wave = max(found, key=lambda wave: wave.omega)
+    said += ("no wave balances, but the law switches: a cycle that keeps its place among the samples is possible",)
+    return Chattering(
+        amplitude_range=(0.0, wave.s + loop.count),
+        frequency_range=(wave.omega / math.tau, 0.5 / scenario.control_period),
+        assumptions=said,
+    )
 
 
 def cycles(loop: Loop) -> list[Wave]:

@@ -76,10 +76,10 @@ class Wave:
 
 
 class Loop:
-    """The law and the linearised mechanism of one driven channel of a scenario."""
+    """The law and the linearised mechanism of one driven channel of a scenario; `late`: one more delay of u, s."""
 
-    def __init__(self, scenario: Scenario, channel: int = 0):
-        self.scenario, self.channel, s = scenario, channel, scenario.resolved
+    def __init__(self, scenario: Scenario, channel: int = 0, late: float = 0.0):
+        self.scenario, self.channel, self.late, s = scenario, channel, late, scenario.resolved
         plant = s.plant
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
@@ -129,7 +129,7 @@ class Loop:
 
     def response(self, omega: complex) -> complex:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
-        return complex(self._answer(omega)[self.rows[self.channel]])
+        return complex(self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.late))
 
     def coupling(self, omega: float) -> float:
         """Return the largest amplitude of another driven channel under this one's u, over that of its own x."""

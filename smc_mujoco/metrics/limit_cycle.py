@@ -90,11 +90,13 @@ def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, perio
 
 
 def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
-    """Return the share of a cycle's harmonics in a spectrum, over what they have in one without lines: 0 to 1."""
+    """Return the share of a cycle's harmonics in a spectrum, over what they have in one without lines: at most 1."""
     width = min(3, int(periods - 2) // 2)  # bins to each side of a line
     bins = np.arange(len(spectrum))
     lines = np.abs(bins - periods * np.maximum(np.round(bins / periods), 1.0)) <= width + 0.5
     covered = lines[first:].mean()
+    if covered == 1.0:
+        return 0.0  # so few bins are left that any spectrum looks like this
     return float((spectrum[first:][lines[first:]].sum() / spectrum[first:].sum() - covered) / (1.0 - covered))
 
 

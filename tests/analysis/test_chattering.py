@@ -266,6 +266,10 @@ def test_a_physics_step_as_long_as_the_control_period_hides_the_limit_cycle_and_
     assert any(
         "steps of 0.1 ms advance by half a step, which takes 100 %" in one for one in chattering(coarse).assumptions
     )
+    trace, possible = smc.run(coarse), chattering(coarse)
+    assert math.isinf(possible.uncertainty)
+    assert 0.0 < np.ptp(trace.s[trace.t > 3.0, 0]) / 2 < possible.amplitude_range[1] < 1e-3
+    assert possible.frequency_range == pytest.approx((math.sqrt(2.0 / (1e-2 * 1e-4)) / math.tau, 5000.0), rel=0.03)
     fine = dataclasses.replace(coarse, physics_step=1e-5, duration=2.0, x0=0.02)
     cycle, (amplitude, frequency) = chattering(fine), measured(smc.run(fine))
     assert (cycle.amplitude, cycle.frequency) == pytest.approx((amplitude, frequency), rel=0.25)
@@ -287,6 +291,7 @@ def test_a_smooth_law_is_predicted_to_be_calm_below_its_critical_delay_and_to_os
     calm, above = (chattering(law, plant=plant, input_delay=round(q * critical, 3)) for q in (0.9, 1.15))
     assert not calm
     assert math.isnan(calm.frequency)
+    assert math.isnan(calm.uncertainty)
     scenario = smc.Scenario(plant=plant, law=law, input_delay=round(1.15 * critical, 3), x0=0.1, duration=40.0)
     assert above
     assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)

@@ -128,10 +128,14 @@ class Objective:
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
     def excess(self, case: Scenario) -> float:
-        """Return what predicted chattering above the bound costs, s^2, in proportion to it; 0 below it."""
+        """Return what predicted chattering above the bound costs, s^2, in proportion to it; 0 below it.
+
+        Where no limit cycle is predicted and one is possible, the most that it may be counts.
+        """
         if self.chattering is None:
             return 0.0
-        amplitude = predict(case, ranges=False).amplitude
+        cycle = predict(case, ranges=False)
+        amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]
         return 2.0 * FAILED * len(self.conditions) * amplitude / self.chattering if amplitude > self.chattering else 0.0
 
 

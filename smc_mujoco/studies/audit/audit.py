@@ -10,7 +10,7 @@ Thresholds are fixed in the paper's file before any run, and are not moved. How 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -200,19 +200,21 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
     except (Exception, SystemExit) as error:  # whatever a user's function raises
         raise failed(runs.paper, entry, error) from error
     try:
-        return list(_evidence(entry, found))
+        return list(_evidence(entry, found, runs.asked))
     except ScenarioError as error:
         raise failed(runs.paper, entry, error) from None
 
 
-def _evidence(entry: Entry, found: Any) -> Iterator[Check | Beside]:
-    """Yield the checks of what a claim's function returned."""
+def _evidence(entry: Entry, found: Any, met: Collection[str]) -> Iterator[Check | Beside]:
+    """Yield the checks of what a claim's function returned; `met` are measures whose thresholds it has asked for."""
     if not isinstance(found, Mapping):
         checks = isinstance(found, Sequence) and all(isinstance(one, Check | Beside) for one in found)
         if not checks:
             raise ScenarioError(f"it returns {shown(found)}: {CURE}")
-        if entry.thresholds:
-            raise ScenarioError("it returns checks, and holds_if has thresholds too: return numbers")
+        for threshold in entry.thresholds:
+            if threshold.measure not in met:
+                cure = "return numbers, or checks from runs.check"
+                raise ScenarioError(f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}")
         yield from found
         return
     if not entry.thresholds:

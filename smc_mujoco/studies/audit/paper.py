@@ -52,6 +52,7 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first five a
     "where": (str, "a text"),
     "function": (str, "the name of a function"),
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
+    "words": (str, "a text: holds_if in words"),
     "measured": (str, "a text"),
     "note": (str, "a text"),
     "quantifier": (str, "universal, existential or named"),
@@ -74,7 +75,7 @@ class Entry(Statement):
 
     Attributes:
       evidence: function from runs under one set of gains to numbers, or to checks and the numbers beside them.
-      thresholds: what the numbers must be; empty if the function returns checks.
+      thresholds: what the numbers must be; empty if the function returns checks with limits of its own.
       quick: what a quick audit measures instead, if that is less.
       late: whether it looks at the runs of all other claims, and so comes after them.
       varies: why its numbers differ from audit to audit, as a timing; they are not sealed.
@@ -370,7 +371,7 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
     texts: dict[str, Any] = {"measured": _text((inspect.getdoc(function) or "").partition("\n\n")[0]).rstrip(".")}
     fields = _fields("runs", values.pop("runs", ""))
     quantifier = find("quantifier", values.pop("quantifier", "named"), QUANTIFIERS)
-    words = asked if isinstance(asked, str) else ", ".join(map(str, thresholds))
+    words = values.pop("words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds)))
     entry = Entry(
         **texts | values | names,
         holds_if=words,

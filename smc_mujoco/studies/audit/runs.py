@@ -26,6 +26,8 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.studies.audit.paper import Entry, Paper, duration_of
+from smc_mujoco.studies.audit.threshold import Threshold
+from smc_mujoco.studies.audit.verdict import Check, check
 from smc_mujoco.studies.executors import outcome
 from smc_mujoco.studies.run_key import key
 
@@ -69,6 +71,7 @@ class Runs:
       quick: whether a claim is to look at less: coarser grids, shorter runs.
       threads: simulations at once.
       used: key -> run that the claim has used.
+      asked: measures whose thresholds the claim's function has asked for, see `check`.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class Runs:
     ):
         self.paper, self.gains, self.quick, self.threads = paper, gains, quick, threads
         self.used: dict[str, Used] = {}
+        self.asked: set[str] = set()
         self._entry: Entry | None = None
         self._substitute = substitute or {}
         self._table = table or {}
@@ -92,7 +96,7 @@ class Runs:
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         own = copy.copy(self)
-        own._entry, own.used = entry, {}
+        own._entry, own.used, own.asked = entry, {}, set()
         return own
 
     @property
@@ -116,9 +120,29 @@ class Runs:
         return (self._entry.conditions if self._entry else ()) or ("nominal",)
 
     @property
+    def thresholds(self) -> dict[str, Threshold]:
+        """The claim's thresholds, by measure."""
+        return {one.measure: one for one in (self._entry.thresholds if self._entry else ())}
+
+    @property
     def values(self) -> Mapping[str, Any]:
         """The claim's numbers, such as the levels of a sweep."""
         return self._entry.values if self._entry else {}
+
+    def check(self, measure: str, what: str, value: float, times: float = 1.0, sentence: str = "") -> Check:
+        """Return the check of a number against the threshold of a measure, `holds_if` in the paper's file.
+
+        A function returns checks instead of numbers if a limit depends on runs, or if it has a name for each number.
+
+        Args:
+          measure: of `holds_if`.
+          what: was measured.
+          times: what the limit is a multiple of: "<= 1.1" and a rival's time mean at most 1.1 times that time.
+          sentence: of the claim that it is about; default: that of the threshold.
+        """
+        threshold = find("threshold", measure, self.thresholds)
+        self.asked.add(measure)
+        return check(what, value, threshold.relation, threshold.limit * times, sentence or threshold.sentence)
 
     def law(self, plant: str, name: str, **gains: float) -> Component:
         """Return a law, or its mutant in this audit, with the set's gains for a plant and some of them changed."""

@@ -62,6 +62,16 @@ class Threshold(NamedTuple):
         """Return the measure and what is asked of it."""
         return f"{self.measure} {self.text}" if self.low is None else f"{self.measure} is {self.text}"
 
+    def distance(self, value: float) -> float:
+        """Return how far a number is from the range; NaN for NaN.
+
+        Raises:
+          ScenarioError: the threshold has no range.
+        """
+        if self.low is None or self.high is None:
+            raise ScenarioError(f"the threshold of {self.measure!r} is {self.text!r}, which has no range: {FORMS}")
+        return math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)
+
     def evidence(self, values: Mapping[str, float]) -> Iterator[Check | Beside]:
         """Yield a check for each number, by the name of its case; "" for a number without a case.
 
@@ -72,7 +82,6 @@ class Threshold(NamedTuple):
             if self.low is None or self.high is None:
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
-            away = math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)
             of = f"{self.low:g}" if self.low == self.high else f"{self.low:g} to {self.high:g}"
-            yield check(f"{what}, distance from {of}", away, self.relation, self.limit, self.sentence)
+            yield check(f"{what}, distance from {of}", self.distance(value), self.relation, self.limit, self.sentence)
             yield Beside(what, value)

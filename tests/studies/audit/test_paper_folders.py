@@ -207,8 +207,22 @@ def test_a_text_as_threshold_needs_checks(folder):
         "from smc_mujoco.studies.audit.verdict import check\ndef small(runs):\n    return [check('size', 3, '<', 2)]\n"
     )
     assert claims(paper=folder(data, code))[0].verdict == REFUTED
-    with pytest.raises(ScenarioError, match="it returns checks, and holds_if has thresholds too"):
+    with pytest.raises(ScenarioError, match="it returns checks, and none for 'size' of holds_if: return numbers, or"):
         claims(paper=folder(code=code))
+
+
+def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(folder):
+    data = MINIMAL.replace(
+        '{ size = "< 2" }', '{ size = { asked = "< 2", sentence = "small" } }\nwords = "small, or so"'
+    )
+    code = "def small(runs):\n    return [runs.check('size', 'it', 5, times=3.0), runs.check('size', 'other', 3)]\n"
+    (one,) = claims(paper=folder(data, code))
+    assert one.holds_if == "small, or so"
+    assert (one.numbers["default"]["it"]["limit"], one.numbers["default"]["other"]["limit"]) == (6.0, 2.0)
+    assert {check.sentence for check in one.checks("default")} == {"small"}
+    assert [check.holds for check in one.checks("default")] == [True, False]
+    with pytest.raises(ScenarioError, match="unknown threshold 'sise'"):
+        claims(paper=folder(data, code.replace("'size',", "'sise',")))
 
 
 def test_an_edited_folder_is_read_anew(folder):

@@ -7,7 +7,7 @@ import numpy as np
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.studies.audit.runs import Runs
-from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.audit.verdict import Beside, Check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, comes_to_rest
 
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
@@ -26,7 +26,12 @@ def observer_free(runs: Runs) -> list[Check]:
     )
     times = np.reshape([each["settling_time"] for each in scores], (len(runs.plants), -1))
     return [  # NaN if neither settles: noise may keep both out of the band
-        check(f"{plant}, {name}: |settling time / with true xdot - 1|", abs(ratio(time, true) - 1.0), "<=", 0.25, name)
+        runs.check(
+            "settling time",
+            f"{plant}, {name}: |settling time / with true xdot - 1|",
+            abs(ratio(time, true) - 1.0),
+            sentence=name,
+        )
         for plant, (true, *filtered) in zip(runs.plants, times.tolist(), strict=True)
         for name, time in zip(FILTERS, filtered, strict=True)
     ]
@@ -35,7 +40,7 @@ def observer_free(runs: Runs) -> list[Check]:
 def reduces_chattering(runs: Runs) -> list[Check]:
     """Claim 3: reduces chattering."""
     rates = {plant: [runs.score(plant, law)["tv_rate"] for law in (OURS, "classical")] for plant in runs.plants}
-    return [check(f"{plant}: TV rate / classical's", ratio(*rates[plant]), "<", 0.01) for plant in runs.plants]
+    return [runs.check("TV rate", f"{plant}: TV rate / classical's", ratio(*rates[plant])) for plant in runs.plants]
 
 
 def bounded(runs: Runs) -> list[Check | Beside]:
@@ -47,8 +52,8 @@ def bounded(runs: Runs) -> list[Check | Beside]:
     largest = max(ratio(each["max_u"], run.law.gains["lam"]) for run, each in zip(grid, scores, strict=True))
     every = [ratio(run.scores["max_u"], run.gains["lam"]) for run in runs.results() if run.law == OURS]
     return [
-        check("max |u| / lambda, five plants in the ideal conditions, and without a bound", largest, "<=", 1.0),
-        check("max |u| / lambda, every run of this law", max(every, default=largest), "<=", 1.0),
+        runs.check("max |u|", "max |u| / lambda, five plants in the ideal conditions, and without a bound", largest),
+        runs.check("max |u|", "max |u| / lambda, every run of this law", max(every, default=largest)),
         Beside("runs of this law", float(len(every))),
     ]
 
@@ -69,7 +74,7 @@ def scalable(runs: Runs) -> list[Check]:
         grid = [runs.scenario(plant, OURS, plant=one, duration=SHORT, integrator="implicitfast") for one in networks]
         least, *times = (scores["settling_time"] for scores in runs.scores(grid))
         checks += [
-            check(f"{plant}, N = {n}: settling time / that of N = 2", ratio(time, least), "<=", 2.0)
+            runs.check("settling time", f"{plant}, N = {n}: settling time / that of N = 2", ratio(time, least))
             for n, time in zip(sizes[1:], times, strict=True)
         ]
     return checks

@@ -5,7 +5,7 @@ from smc_mujoco.control.law import law as find_law
 from smc_mujoco.control.variants import squeezed
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.studies.audit.runs import Runs
-from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.audit.verdict import Beside, Check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import (
     CONDITIONED,
     OURS,
@@ -29,7 +29,7 @@ def compensates(runs: Runs) -> list[Check]:
     for plant in runs.plants:
         law = runs.law(plant, OURS)
         own, bent = runs.traces([runs.scenario(plant, OURS, law=one) for one in (law, squeezed(law))])
-        checks.append(check(f"{plant}: max |x - x'| / |x0|", deviation(own, bent), "<", 0.05))
+        checks.append(runs.check("deviation", f"{plant}: max |x - x'| / |x0|", deviation(own, bent)))
     return checks
 
 
@@ -52,7 +52,7 @@ def never_chatters(runs: Runs) -> list[Check | Beside]:
         gains = runs.law(plant, OURS).gains
         limit = critical_delay(find_plant(plant), gains["lam"], gains["k1"], control_period=1e-3)
         evidence += [
-            check(f"{plant}: largest TV rate / min(lambda, u_max), 1/s", rate, "<", 1e-3),
+            runs.check("TV rate", f"{plant}: largest TV rate / min(lambda, u_max), 1/s", rate),
             Beside(f"{plant}: that is at a control period of, ms", float(period)),
             Beside(f"{plant}: and a delay of, ms", float(delay)),
             Beside(f"{plant}: delay from which the loop is unstable at 1 ms, linear theory, ms", 1e3 * limit),
@@ -68,7 +68,7 @@ def better(runs: Runs) -> list[Check | Beside]:
             values = {law: runs.score(plant, law, condition)[metric] for law in (OURS, *RIVALS, CONDITIONED, UNCLAMPED)}
             for law in RIVALS:
                 what = f"{plant}: {name} against 1.1 times that of {law}"
-                checks.append(check(what, values[OURS], "<=", 1.1 * values[law], sentence))
+                checks.append(runs.check(sentence, what, values[OURS], values[law], sentence))
             beside += [Beside(f"{plant}: {name} of {law}", values[law]) for law in (CONDITIONED, UNCLAMPED)]
     return checks + beside
 
@@ -80,8 +80,10 @@ def synchronises(runs: Runs) -> list[Check]:
         scores = runs.scores(runs.scenario(plant, OURS, condition) for condition in runs.conditions)
         joined, alone = (each["spread_settling_time"] for each in scores)
         checks += [
-            check(f"{plant}: settling time of the spread, s", joined, "<", 1.0, "synchronises"),
-            check(f"{plant}: the same without coupling, s, against that with it", alone, ">", joined, "by coupling"),
+            runs.check("settling time, s", f"{plant}: settling time of the spread, s", joined),
+            runs.check(
+                "without coupling", f"{plant}: the same without coupling, s, against that with it", alone, joined
+            ),
         ]
     return checks
 
@@ -91,4 +93,4 @@ def simple(runs: Runs) -> list[Check | Beside]:
     spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL)}, quick=runs.quick)
     others = {name: ratio(spent[OURS], spent[name]) for name in GENERAL}
     beside = [Beside(f"time per sample / that of {name}", value) for name, value in others.items()]
-    return [check("time per sample / that of the fastest other law", max(others.values()), "<=", 1.0), *beside]
+    return [runs.check("time", "time per sample / that of the fastest other law", max(others.values())), *beside]

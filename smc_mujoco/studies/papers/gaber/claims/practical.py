@@ -16,7 +16,7 @@ from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import settling_time
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.audit.runs import Runs
-from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.audit.verdict import Beside, Check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, deviation, scale
 from smc_mujoco.studies.papers.gaber.claims.searches import critical_delay, largest_delays
 from smc_mujoco.studies.papers.gaber.scenarios import LAWS
@@ -54,8 +54,10 @@ def cheap_tanh(runs: Runs) -> list[Check | Beside]:
         for name, trace in zip(CHEAP, traces, strict=True):
             time = math.inf if trace.failure else settling_time(trace)
             both = [
-                check(f"{plant}, {name}: deviation, over |x0|", deviation(trace, reference), "<", 0.01, name),
-                check(f"{plant}, {name}: settling time, s", time, "<", nominal.duration, name),
+                runs.check(
+                    "deviation", f"{plant}, {name}: deviation, over |x0|", deviation(trace, reference), sentence=name
+                ),
+                runs.check("settling time", f"{plant}, {name}: settling time, s", time, nominal.duration, name),
             ]
             evidence += [Beside(one.what, one.value) for one in both] if name == FIXED else both
     return evidence
@@ -77,7 +79,7 @@ def saturation_avoided(runs: Runs) -> list[Check]:
         half = max(abs(runs.law(plant, OURS).gains["lam"]) / 2.0, MIN_BOUND)
         traces = runs.traces([runs.scenario(plant, OURS, u_max=limit) for limit in (half, math.inf)])
         what = f"{plant}: deviation at u_max = lambda / 2, over |x0|"
-        checks.append(check(what, deviation(*traces), "<", 0.01))
+        checks.append(runs.check("deviation", what, deviation(*traces)))
     return checks
 
 
@@ -90,7 +92,7 @@ def exponential(runs: Runs) -> list[Check]:
         near, *rates = map(decay_rate, runs.traces(away))
         for times, rate in zip(FAR, rates, strict=True):
             what = f"{plant}: decay rate from {times:g} x0 apart from that near 0, share of that"
-            checks.append(check(what, abs(ratio(rate, near) - 1.0), "<=", 0.2))
+            checks.append(runs.check("decay rate", what, abs(ratio(rate, near) - 1.0)))
     return checks
 
 
@@ -121,7 +123,7 @@ def jumps(runs: Runs) -> list[Check | Beside]:
                 float(np.nan_to_num(np.abs(trace.x[part]).max(), nan=math.inf)) / scale(trace.scenario)
                 for part in (trace.t >= jump.time, conventions.last(trace))
             )
-            checks.append(check(f"{plant}: largest |x| after a {kind} jump, over |x0|", peak, "<=", 1.0))
+            checks.append(runs.check("largest |x|", f"{plant}: largest |x| after a {kind} jump, over |x0|", peak))
             bounds.append(bound)
     return [*checks, Beside("largest ultimate bound after a jump, over |x0|", max(bounds))]
 
@@ -136,7 +138,9 @@ def delay_tolerant(runs: Runs) -> list[Check | Beside]:
         ours, theory = longest[plant, OURS], critical_delay(runs, plant)
         evidence += [
             *(
-                check(f"{plant}: largest delay against that of {law}, s", ours, ">", longest[plant, law])
+                runs.check(
+                    "largest delay", f"{plant}: largest delay against that of {law}, s", ours, longest[plant, law]
+                )
                 for law in RIVALS
             ),
             *(

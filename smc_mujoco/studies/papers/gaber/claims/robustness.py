@@ -8,7 +8,7 @@ import numpy as np
 from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.audit.runs import Runs
-from smc_mujoco.studies.audit.verdict import Beside, Check, check, ratio
+from smc_mujoco.studies.audit.verdict import Beside, Check, ratio
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, command_bound, deviation, scale
 
 PLANT = "van_der_pol"
@@ -17,7 +17,7 @@ PLANT = "van_der_pol"
 def small_fluctuations(runs: Runs) -> list[Check]:
     """Claim 45: Van der Pol with noise: stable, small fluctuations."""
     bound = runs.score(runs.plant, OURS, "noise")["ultimate_bound"] / scale(runs.scenario(runs.plant, OURS))
-    return [check(f"{runs.plant}: ultimate bound with noise, over |x0|", bound, "<", 0.05)]
+    return [runs.check("ultimate bound", f"{runs.plant}: ultimate bound with noise, over |x0|", bound)]
 
 
 def nearly_identical(runs: Runs) -> list[Check | Beside]:
@@ -26,15 +26,11 @@ def nearly_identical(runs: Runs) -> list[Check | Beside]:
     residual = {law: runs.score(runs.plant, law, "sine")["ultimate_bound"] for law in (OURS, *RIVALS, UNCLAMPED)}
     what = f"{runs.plant}: residual under d of"
     return [
-        check(
-            f"{runs.plant}: deviation from nominal under d, over |x0|",
-            deviation(disturbed, nominal),
-            "<",
-            0.05,
-            "nearly identical",
+        runs.check(
+            "deviation", f"{runs.plant}: deviation from nominal under d, over |x0|", deviation(disturbed, nominal)
         ),
         *(
-            check(f"{what} {OURS} against that of {law}, m", residual[OURS], "<=", residual[law], "strong rejection")
+            runs.check("residual", f"{what} {OURS} against that of {law}, m", residual[OURS], residual[law])
             for law in RIVALS
         ),
         Beside(f"{what} {UNCLAMPED}, m", residual[UNCLAMPED]),
@@ -49,15 +45,9 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
     most, over = command_bound(runs, runs.plant), "over min(lambda, u_max)"
     whole = runs.score(plant, OURS, "noise")["hf_share"]
     return [
-        check(
-            f"{plant}: standard deviation of u with noise, {over}",
-            ratio(std, most),
-            "<",
-            0.1,
-            "small fluctuations",
-        ),
-        check(f"{plant}: largest step of u with noise, {over}", ratio(step, most), "<", 0.1, "smooth"),
-        check(f"{plant}: share of u above {HIGH_PASS:g} Hz with noise", share, "<", 0.5, "smooth"),
+        runs.check("standard deviation", f"{plant}: standard deviation of u with noise, {over}", ratio(std, most)),
+        runs.check("step", f"{plant}: largest step of u with noise, {over}", ratio(step, most)),
+        runs.check("share", f"{plant}: share of u above {HIGH_PASS:g} Hz with noise", share),
         Beside(f"{plant}: share of u above {HIGH_PASS:g} Hz with noise, over the whole run", whole),
     ]
 
@@ -65,7 +55,7 @@ def smooth_under_noise(runs: Runs) -> list[Check | Beside]:
 def continuous(runs: Runs) -> list[Check]:
     """Claim 49: u under d: continuous, bounded."""
     step = ratio(runs.score(runs.plant, OURS, "sine")["max_step"], command_bound(runs, runs.plant))
-    return [check(f"{runs.plant}: largest step of u under d, over min(lambda, u_max)", step, "<", 0.02)]
+    return [runs.check("step", f"{runs.plant}: largest step of u under d, over min(lambda, u_max)", step)]
 
 
 def fluctuation(trace: Trace) -> tuple[float, float, float]:

@@ -6,13 +6,12 @@ from smc_mujoco.analysis.linear_theory import smallest_lam
 from smc_mujoco.control.variants import reversed_gain
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.studies.audit.runs import Runs
-from smc_mujoco.studies.audit.verdict import Beside, Check, check
+from smc_mujoco.studies.audit.verdict import Beside, Check
 from smc_mujoco.studies.papers.gaber.claims import lyapunov
 from smc_mujoco.studies.papers.gaber.claims.common import OURS, comes_to_rest, long_run
 
 NEAR = 1e-6  # |s| at and below which the claim says nothing
 RISE = 1e-12  # of the run's largest V: less is rounding
-CONVERGED = 0.05  # of |x0|
 
 
 def decreases(runs: Runs) -> list[Check | Beside]:
@@ -25,7 +24,7 @@ def decreases(runs: Runs) -> list[Check | Beside]:
         rate = np.where(np.abs(lyapunov.surface(*states)) > NEAR, lyapunov.vdot(*states), -np.inf)
         worst = np.unravel_index(np.argmax(rate), rate.shape)
         evidence += [
-            check(f"{name}: share of the plane with Vdot > 0", float(np.mean(rate > 0.0)), "<=", 0.0),
+            runs.check("share", f"{name}: share of the plane with Vdot > 0", float(np.mean(rate > 0.0))),
             Beside(f"{name}: largest Vdot", rate[worst]),
             Beside(f"{name}: largest Vdot, at x", x[worst]),
             Beside(f"{name}: largest Vdot, at v", v[worst]),
@@ -41,7 +40,7 @@ def monotonic(runs: Runs) -> list[Check]:
         s = trace.v + gains["k1"] * trace.x - trace.u / lyapunov.input_gain(plant)  # alpha - u / g, u of the actuator
         height = s**2 / 2.0
         rises = np.diff(height, axis=0) > RISE * height.max()
-        checks.append(check(f"{plant.name}: fraction of samples where V rises", float(np.mean(rises)), "<=", 0.0))
+        checks.append(runs.check("share", f"{plant.name}: fraction of samples where V rises", float(np.mean(rises))))
     return checks
 
 
@@ -56,7 +55,7 @@ def global_(runs: Runs) -> list[Check | Beside]:
     shares = iter(converging(runs, [*lams, *own], starts))
     return [
         *(
-            check(f"{name}: share that converges at {share:g} of the smallest lambda", next(shares), ">=", 1.0)
+            runs.check("share", f"{name}: share that converges at {share:g} of the smallest lambda", next(shares))
             for name, share in cells
         ),
         *(Beside(f"{name}: smallest lambda", lam) for name, lam in least.items()),
@@ -65,10 +64,10 @@ def global_(runs: Runs) -> list[Check | Beside]:
 
 
 def converging(runs: Runs, lams: list[tuple[str, float]], starts: list[tuple[float, float]]) -> list[float]:
-    """Return the share of runs that end within CONVERGED of the plant's |x0|, for each plant and lambda."""
+    """Return the share of runs that converge, of those of each plant and lambda."""
     grid = [long_run(runs, name, lam, position, rate) for name, lam in lams for position, rate in starts]
     near = [
-        scores["ultimate_bound"] <= CONVERGED * max(map(abs, scenario.plant.x0))
+        scores["ultimate_bound"] <= runs.values["within"] * max(map(abs, scenario.plant.x0))
         for scenario, scores in zip(grid, runs.scores(grid), strict=True)
     ]
     return np.reshape(near, (len(lams), len(starts))).mean(axis=1).tolist()
