@@ -20,7 +20,6 @@ from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
-from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
@@ -157,7 +156,7 @@ def _cell(metric: Metric, trace: Trace | None) -> Text | str:
     """Return a metric of a run as text; "" if there is no run, or the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    return FAILED if trace.diverged_at is not None else number(metric.of(conventions.parts(trace)))
+    return FAILED if trace.diverged_at is not None else number(metric.of(trace))
 
 
 def _by_label(title: str, heads: Iterable[Text], width: int = 16) -> Table:

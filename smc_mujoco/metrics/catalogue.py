@@ -51,7 +51,7 @@ def score(trace: Trace) -> dict[str, float]:
     """
     refuse(trace)
     parts = conventions.parts(trace)
-    return {m.name: m.of(parts) for m in metrics() if not m.refusal(trace.scenario.plant)}
+    return {m.name: m.worst(parts) for m in metrics() if not m.refusal(trace.scenario.plant)}
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:

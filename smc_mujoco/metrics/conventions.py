@@ -94,8 +94,12 @@ class Metric:
         """Whether free joints count in its single value: it is computed from the motion, and does not have x's unit."""
         return not self.command and "{" not in self.unit
 
-    def of(self, parts: Mapping[Group, Trace]) -> float:
-        """Return the single value, that of the worst group, for the `parts` of a trace that `refusal` accepts."""
+    def of(self, trace: Trace) -> float:
+        """Return the single value of a trace that `refuse` and `refusal` accept: that of the worst group."""
+        return self.worst(parts(trace))
+
+    def worst(self, parts: Mapping[Group, Trace]) -> float:
+        """Return what `of` does, from the `parts` of the trace."""
         counted = [part for group, part in parts.items() if self.fits(group) and (group.driven or self.shared)]
         return max(float(self.formula(part)) for part in counted)
 
@@ -130,7 +134,7 @@ def metric(
             refuse(trace)
             if why := entry.refusal(trace.scenario.plant):
                 raise ScenarioError(why)
-            return entry.of(parts(trace))
+            return entry.of(trace)
 
         return checked
 
