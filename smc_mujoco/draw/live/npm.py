@@ -1,4 +1,4 @@
-"""The packages of the live page from npm: MuJoCo for browsers and three.js.
+"""The packages of the live page from npm: MuJoCo for browsers, its developers' own build, and three.js.
 
 packages/package-lock.json pins their versions and hashes. npm fetches them once from the registry that the environment
 configures, into a cache outside of the repository.
@@ -26,7 +26,10 @@ NEEDED = {
     "three/build/three.core.js": "three.core.js",
 }
 LICENCES = "licences.txt"
-FLAGS = ("--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
+FLAGS = (
+    "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error",
+    "--fetch-retries=2", "--fetch-retry-mintimeout=1000", "--fetch-retry-maxtimeout=5000",  # ms
+)  # fmt: skip
 TIMEOUT = 600.0  # s
 
 
@@ -90,8 +93,10 @@ def _install(command: list[str], folder: Path) -> None:
     except subprocess.TimeoutExpired:
         raise ScenarioError("npm did not fetch the live page's packages within 10 minutes: try again later") from None
     if done.returncode:
-        said = [line.removeprefix("npm error ") for line in done.stderr.splitlines() if line.startswith("npm error ")]
-        why = next((line for line in said if not line.startswith(("code ", "errno ", "syscall "))), "it says nothing")
+        lines = done.stderr.strip().splitlines()
+        said = [line.removeprefix("npm error ") for line in lines if line.startswith("npm error ")]
+        facts = [line for line in said if not line.startswith(("code ", "errno ", "syscall "))]
+        why = next(iter(facts or lines[-1:]), "it says nothing")
         raise ScenarioError(f"npm could not fetch the live page's packages ({why}): check the network, then try again")
 
 
