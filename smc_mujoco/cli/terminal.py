@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,11 +37,18 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures the time of the command."""
+    """The console of a command, which also measures the time of the command.
 
-    def __init__(self):
-        super().__init__()
+    Attributes:
+      printed: a file in a temporary folder, which is printed when it has been written, or None. Then all else goes to
+        stderr.
+    """
+
+    def __init__(self, prints: str = ""):
+        super().__init__(stderr=bool(prints))
         self.start = time.perf_counter()
+        self._folder = tempfile.TemporaryDirectory() if prints else None
+        self.printed = Path(self._folder.name) / prints if self._folder else None
 
     @property
     def seconds(self) -> float:
@@ -52,9 +60,13 @@ class Terminal(Console):
         self.print(text, style=style, soft_wrap=not wrap, highlight=False, markup=False)
 
     def wrote(self, *files: Path) -> None:
-        """Print which files were written."""
+        """Print which files were written, and the text of the one that is to be printed."""
         for file in files:
-            self.note(f"wrote {printable(str(file))}")
+            if self._folder and file == self.printed:
+                print(file.read_text(encoding="utf-8"), end="")
+                self._folder.cleanup()
+            else:
+                self.note(f"wrote {printable(str(file))}")
 
 
 class Clock:

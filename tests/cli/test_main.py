@@ -15,6 +15,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import main, tables
 from smc_mujoco.cli import scene as show
+from smc_mujoco.cli.commands import options
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import film
@@ -738,6 +739,27 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
     assert err == "smc-mujoco: stopped; files already written are complete\n"
     assert "Traceback" not in out
     assert list((tmp_path / "videos" / "long").iterdir()) == []
+
+
+# results as JSON
+
+
+def test_json_to_a_dash_is_printed_and_all_else_goes_to_stderr(capsys):
+    path, terminal = options.json_file(Path("-"))
+    assert path
+    path.write_text("[1]\n")
+    terminal.print("a table")
+    terminal.wrote(path, Path("figure.svg"))
+    out, err = capsys.readouterr()
+    assert out == "[1]\n"
+    assert err.split("\n") == ["a table", "wrote figure.svg", ""]
+
+
+def test_json_to_a_file_leaves_tables_where_they_are(capsys):
+    path, terminal = options.json_file(Path("margins.json"))
+    assert path == Path("margins.json")
+    terminal.wrote(path)
+    assert capsys.readouterr().out == "wrote margins.json\n"
 
 
 # chatter

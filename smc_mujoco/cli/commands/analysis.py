@@ -127,7 +127,7 @@ def margins(
         from smc_mujoco.control import gain_sets
         from smc_mujoco.studies.papers.gaber import scenarios
 
-    terminal = Terminal()
+    json, terminal = options.json_file(json)
     if out:
         writable(ended(out, ".csv"))
     if json:
@@ -175,7 +175,7 @@ def basin(
         from smc_mujoco.common.progress import bar
         from smc_mujoco.draw import region
 
-    terminal = Terminal()
+    json, terminal = options.json_file(json)
     if out:
         region.checked(out)
         writable(out)
@@ -260,7 +260,7 @@ def chatter(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    terminal = Terminal()
+    json, terminal = options.json_file(json)
     if json:
         writable(ended(json, ".json"))
     if out:

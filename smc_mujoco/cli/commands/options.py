@@ -12,6 +12,7 @@ import typer
 from smc_mujoco.common.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from smc_mujoco.cli.terminal import Terminal
     from smc_mujoco.control.component import Component, Template
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -42,7 +43,12 @@ Condition = Annotated[
     ),
 ]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
-Json = Annotated[Path | None, typer.Option(help="Also write the result to a .json file.")]
+Json = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.json|-", help="Also write the result to a .json file; - prints it, tables go to stderr."
+    ),
+]
 LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law from the table of `smc-mujoco laws`.")]
 PlantName = Annotated[
     str,
@@ -71,6 +77,16 @@ def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
     if not found:
         raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
     return found
+
+
+def json_file(json: Path | None) -> "tuple[Path | None, Terminal]":
+    """Return where the option --json has a result written, and the console; "-" has it printed."""
+    from smc_mujoco.cli.terminal import Terminal
+
+    if str(json) != "-":
+        return json, Terminal()
+    terminal = Terminal(prints="result.json")
+    return terminal.printed, terminal
 
 
 def columns(text: str | None) -> dict[str, str]:

@@ -47,10 +47,11 @@ def identify(
         from smc_mujoco.twins.records import load
         from smc_mujoco.twins.rig import rigs
 
+    json, terminal = options.json_file(json)
     for file in (figure, json):
         if file:
             writable(file)
-    terminal, named = Terminal(), options.columns(columns)
+    named = options.columns(columns)
     found = find(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml:" in rig) else rig,
         [load(file, named) for file in files],

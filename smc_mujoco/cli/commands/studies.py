@@ -249,7 +249,9 @@ def claims(
     table: Annotated[
         Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON document instead of tables, as --json - of other commands.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
     evidence: Annotated[
         Path | None,
