@@ -60,6 +60,8 @@ from smc_mujoco.mechanisms.plant import plant as plant
 from smc_mujoco.mechanisms.plant import plants as plants
 from smc_mujoco.metrics.catalogue import score as score
 from smc_mujoco.metrics.catalogue import scores as scores
+from smc_mujoco.metrics.tip import joint_scores as joint_scores
+from smc_mujoco.metrics.tip import tip_scores as tip_scores
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.fmu.export import export_fmu as export_fmu
 from smc_mujoco.simulation.fmu.load import law_from_fmu as law_from_fmu

@@ -43,7 +43,7 @@ def perform(
         raise ScenarioError(f"cannot make the folder {out} ({error.strerror}): choose another with --out") from error
     traces = simulate(scene, threads, clock)
     for condition, runs in traces.items():
-        for table in tables.scores(_title(scene, condition), runs):
+        for table in [*tables.scores(_title(scene, condition), runs), *tables.tips(_title(scene, condition), runs)]:
             terminal.print(table)
         for label, trace in runs.items():
             if trace.failure:
@@ -110,10 +110,13 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
 
         amplitudes(traces, out / "chattering", title=scene.title)
         return files(out / "chattering")
+    from smc_mujoco.draw.joints import joints
+
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        figure(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
+        drawn = joints if scene.figure == "joints" else figure
+        drawn(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
         written += files(path)
     return written
 

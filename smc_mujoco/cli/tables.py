@@ -24,6 +24,7 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.advice import Advice
@@ -107,6 +108,35 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     return tables
+
+
+TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
+    "largest\nerror": ("max_error", "mm", 1e3),
+    "rms\nerror": ("rms_error", "mm", 1e3),
+    "error at\nthe end": ("last_error", "mm", 1e3),
+    "mean\nforce": ("mean_force", "N", 1.0),
+    "off the\nwanted": ("force_error", "%", 1.0),
+    "touching": ("touching", "%", 1.0),
+    "deepest": ("depth", "mm", 1e3),
+}
+
+
+def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
+    """Return a table of what the tips of arms do, with the joint that works hardest; none for other plants."""
+    if not next(iter(traces.values())).scenario.plant.tip:
+        return []
+    values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
+    shown = {head: one for head, one in TIP.items() if any(one[0] in each for each in values.values())}
+    heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
+    table = _by_label(f"{title}, tip", [*heads, Text("most work\n").append("J", "dim")])
+    for label, trace in traces.items():
+        if label not in values:
+            table.add_row(_label(label, trace), FAILED)
+            continue
+        cells = [number(factor * values[label].get(name, math.nan)) for name, _, factor in shown.values()]
+        joint, work = worst_joint(trace, "work")
+        table.add_row(_label(label, trace), *cells, f"{number(work)} ({joint})")
+    return [table]
 
 
 def headings(scenario: Scenario) -> dict[Group, str]:

@@ -75,6 +75,12 @@ class Caption:
         self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
         self.sheet = functools.lru_cache(maxsize=16)(self._sheet)
 
+    def make_room(self, height: float) -> float:
+        """Leave room of a height, px of a full-size film, above the machines. Return where it begins, px."""
+        top = self.room.top - 36 * self.scale
+        self.room = self.room._replace(top=top + height * self.scale)
+        return top
+
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """Return the labels, with the time of failure of machines that have failed; default: of all that will fail."""
         failed = [True] * len(self.traces) if failed is None else failed

@@ -18,7 +18,7 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
-from smc_mujoco.draw.film import arrows, pace, scene
+from smc_mujoco.draw.film import arm, arrows, pace, scene
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
@@ -172,10 +172,15 @@ def frames(
     timelines = [states.timeline(trace, times, hold) for trace in traces]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row)
+    bars = None
+    if all(map(arm.has_bars, traces)):
+        bars = arm.Bars(traces, edges, colours, caption.make_room(arm.ROOM), scale)
     charts = Charts(traces, names, colours, (size[0], below), scale)
     motions = [motion(trace, times) for trace in traces]
     with Stage(traces, colours, above, caption.room, chosen, motions) as stage:
         caption.place(stage.boxes)
+        if bars:
+            bars.place(stage.boxes, size[0])
         places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
@@ -189,9 +194,10 @@ def frames(
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
                 for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
-            picture = stage.render(drawn)
+            picture = stage.render(drawn, time)
             words = tuple(each[frame] for each in timelines)
             over = caption.over(picture, time, failed, words, float(shown.speeds[frame]))
+            over = bars.over(over, frame) if bars else over
             yield np.concatenate([over, charts.at(time)])
 
 

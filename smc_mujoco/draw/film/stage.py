@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arrows, camera, scene
+from smc_mujoco.draw.film import arm, arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Motion, Puppet, places
 from smc_mujoco.mechanisms.hardware.part import joints
@@ -82,6 +82,11 @@ class Stage:
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
         scene.forward(self.model, self.data)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
+        self.paths = [
+            arm.Path(trace, there, colour)
+            for trace, there, colour in zip(traces, where, colours, strict=True)
+            if trace.scenario.plant.tip
+        ]
         self.canvas = Canvas(self.model, self.data, size)
 
     def __enter__(self) -> "Stage":
@@ -136,14 +141,19 @@ class Stage:
         self.rest[k] = None if motion is None else motion.at(time)
         self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, self.rest[k])
 
-    def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only."""
+    def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = (), time: float = 0.0) -> np.ndarray:
+        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only.
+
+        The paths of tips are shown until a time, s.
+        """
         scene.forward(self.model, self.data)
         scene.forward(self.model, self.goal)
 
         def add(shown: mujoco.MjvScene) -> None:
             for k in np.flatnonzero(self.aimed):
                 self.ghost(shown, self.links[k])
+            for k, path in enumerate(self.paths):
+                path.draw(shown, time, self.data.site(f"m{k}/{self.puppets[k].scenario.plant.tip}").xpos)
             for k, i, arrow in drawn:
                 arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
 

@@ -1,0 +1,143 @@
+"""Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
+
+The tip is the plant's site of that name, `plant.tip`. Its path follows from the joints' positions. Forces of contact
+are MuJoCo's at the logged state under the logged command: those of the sample, not means over a control period. So they
+are known only where a drive has no state that a trace lacks, such as a motor's current. The state of a friction does
+not matter: a sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids, joint_names
+from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.channel_groups import cut, groups
+from smc_mujoco.simulation import model as assembly
+
+if TYPE_CHECKING:
+    from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.trace import Trace
+
+SETTLED = (
+    0.2  # of a run, after which forces of contact are scored: chosen; the tip has touched, and the force has risen
+)
+
+
+class Contacts(NamedTuple):
+    """Contacts of a run at its samples.
+
+    Attributes:
+      force: sum of the normal forces, (K + 1,) N; 0 without contact.
+      depth: of the deepest, (K + 1,) m; 0 without contact.
+    """
+
+    force: np.ndarray
+    depth: np.ndarray
+
+
+def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
+    """Return where the tip is, (K, 3) m, at positions of the channels x, (K, n).
+
+    Raises:
+      ScenarioError: the plant has no tip.
+    """
+    if not plant.tip:
+        raise ScenarioError(f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')")
+    model = plant.load()
+    data, site = mujoco.MjData(model), model.site(plant.tip).id
+    places, found = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
+    for k, each in enumerate(x):
+        data.qpos[places] = each
+        mujoco.mj_kinematics(model, data)
+        found[k] = data.site_xpos[site]
+    return found
+
+
+def contacts(trace: Trace) -> Contacts:
+    """Return the normal forces and depths of a run's contacts.
+
+    Raises:
+      ScenarioError: the scenario has no contact, or a drive with a state that a trace lacks.
+    """
+    scenario = trace.scenario.resolved
+    if scenario.contact.kind == "none":
+        raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
+    if stateful := [part for part in scenario.actuator if part.stateful]:
+        raise ScenarioError(f"the state of {type(stateful[0]).__name__} is not in a trace, so its contacts are unknown")
+    compiled = assembly.model([scenario])
+    model = assembly.with_values(compiled, scenario)
+    data, joints = mujoco.MjData(model), joint_ids(model)
+    positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
+    found, wrench = Contacts(*np.zeros((2, len(trace.t)))), np.zeros(6)
+    for k in range(len(trace.t)):
+        if k * scenario.steps == scenario.jump_step:
+            assembly.put_values(model, compiled, scenario, scenario.jump_step)
+            mujoco.mj_setConst(model, mujoco.MjData(model))
+        data.qpos[positions], data.qvel[rates], data.ctrl[drives] = trace.x[k], trace.v[k], trace.applied[k, :n]
+        if scenario.plant.direct:
+            data.qfrc_applied[rates] = trace.d[k]
+        mujoco.mj_forward(model, data)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, wrench)
+            found.force[k] += wrench[0]
+            found.depth[k] = max(found.depth[k], -data.contact.dist[i])
+    return found
+
+
+def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
+    """Return scores of an arm's tip, by name.
+
+    Args:
+      force: with which it should press, N; None: the gain `force` of its law, if there is one.
+
+    Returns:
+      max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact,
+      over the last 80 % of the run: mean_force, N; force_error, of this mean, % of the wanted one; force_ripple, the
+      standard deviation, N; touching, the share of the time in contact, %; and over the whole run depth, m.
+
+    Raises:
+      ScenarioError: the plant has no tip, or the run failed.
+    """
+    conventions.refuse(trace)
+    plant = trace.scenario.plant
+    error = np.linalg.norm(tip_path(plant, trace.x) - tip_path(plant, trace.r), axis=1)
+    found = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
+    if trace.scenario.contact.kind != "none":
+        wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
+        pressed = contacts(trace)
+        late = pressed.force[trace.t >= trace.t[0] + SETTLED * np.ptp(trace.t)]
+        found |= {"mean_force": late.mean()}
+        found |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
+        found |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}
+    return {name: float(value) for name, value in found.items()}
+
+
+def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
+    """Return the metrics of each joint by itself, {"joint1": {"settling_time": ...}, ...}, in the channels' order.
+
+    Beside the catalogue's there are peak_power, the largest |force of the drive times velocity|, W, and work, the
+    integral of this, J. Raises like `smc.score`.
+    """
+    conventions.refuse(trace)
+    found, names = {}, joint_names(trace.scenario.plant)
+    for group in groups(trace.scenario):
+        for i in group.channels:
+            one = dataclasses.replace(group, channels=(i,))
+            part, power = cut(trace, one), np.abs(trace.force[:, i] * trace.v[:, i])
+            found[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(one)}
+            found[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
+    return {name: found[name] for name in names}
+
+
+def worst_joint(trace: Trace, metric: str) -> tuple[str, float]:
+    """Return the joint with the largest value of a metric of `joint_scores`, and this value."""
+    values = {name: scores[metric] for name, scores in joint_scores(trace).items()}
+    return max(values.items(), key=lambda pair: pair[1])
