@@ -390,6 +390,7 @@ def check(s: Resolved) -> None:
 def check_new(s: Resolved) -> None:
     """Raise ScenarioError, or warn, for what recorded runs may have and new ones should not."""
     check_ranges(s.plant.name, s.plant.ranges, s.x0)
+    check_joints(s)
     check_inertia(s)
     check_names(s)
     warn_of_degrees(s)
@@ -498,6 +499,15 @@ def check_channels(s: Resolved) -> None:
         )
     if s.surface is not None:
         raise ScenarioError(f"law {s.law.name!r} is of many joints and has its own surface: leave the surface out")
+
+
+def check_joints(s: Resolved) -> None:
+    """Check that a law of many joints has more than one."""
+    if s.law.joint and s.plant.n == 1:
+        raise ScenarioError(
+            f"law {s.law.name!r} is of many joints, and {s.plant.name} has one: give a law of one channel, such as "
+            "'computed_torque'"
+        )
 
 
 def check_inertia(s: Resolved) -> None:

@@ -7,7 +7,7 @@ of payload and noise of seeds that no figure uses. GAINS holds what it found.
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -26,6 +26,7 @@ NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, of an encoder
 SWAY, BEAT = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5), 0.6  # rad and s: chosen, up to a rad/s in each joint
 DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # of a search, kg
 ROUGH = 1000.0  # N m/s: a variation of u that counts as much as the error; chosen before any search
+BEHIND = 0.004  # m, chosen
 SPREAD = 0.05  # rad, of starts about the task's own; chosen
 PRESS, REACH = 20.0, (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # N; rad, from where the wall's path is found
 
@@ -40,7 +41,14 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
 }
 BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # times the limit of the joint's motor
 BY_INERTIA = {"time_delay_sliding": ("m",)}  # times the joint's own inertia in the ready pose
-GAINS: Mapping[str, Mapping[str, float]] = {}
+GAINS: Mapping[str, Mapping[str, float]] = {  # as `search` found them
+    "computed_torque_sliding": {"c": 36.0, "k": 67.0, "width": 0.4},
+    "super_twisting_computed_torque": {"c": 16.0, "k1": 28.0, "k2": 340.0},
+    "unit_vector": {"c": 20.0, "rho": 280.0, "eps": 1.8},
+    "passivity_based": {"c": 34.0, "K": 0.25, "k": 0.0056, "width": 0.1},
+    "time_delay_sliding": {"c": 36.0, "k": 67.0, "width": 0.4, "m": 0.14},
+    "observer_free_joint": {"k1": 39.0, "lam": 0.78},
+}
 
 
 def arm() -> Plant:
@@ -66,6 +74,19 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
     return law(name, **found)
 
 
+def hybrid(friction: bool = False) -> Law:
+    """Return the law that presses on the wall, with the gains of computed_torque_sliding.
+
+    Args:
+      friction: whether it knows the joints' friction.
+    """
+    gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
+    if friction:
+        known = arm().friction
+        gains |= {"f1": known.p1, "f2": known.p2, "f3": known.p3}
+    return law("hybrid_sliding", **gains)  # pyright: ignore[reportArgumentType]
+
+
 @functools.cache
 def sway() -> tuple[Waypoints, ...]:
     """Return references that swing every joint to and fro, with least jerk, from the ready pose and back."""
@@ -81,34 +102,50 @@ def pick_and_place() -> tuple[Waypoints, ...]:
 
 
 @functools.cache
-def wall_path() -> tuple[Waypoints, ...]:
-    """Return references on which the tip slides along the wall: across, and up."""
+def wall_path(behind: float = 0.0) -> tuple[Waypoints, ...]:
+    """Return references on which the tip slides along the wall, across and up, at rest until 0.4 s.
+
+    Args:
+      behind: how far the path goes behind the wall's face on the way, m; it begins before it.
+    """
     from smc_mujoco.mechanisms.plants.panda import WALL
 
     x = WALL - 0.0125  # half a millimetre before the probe touches
-    points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
-    return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
+    if not behind:
+        points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
+        return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
+    there = WALL - 0.012 + behind
+    points = [(x, -0.2, 0.40), (there, -0.2, 0.40), (there, 0.2, 0.40), (there, 0.2, 0.55)]
+    return tuple(cartesian_path(arm(), [0.0, 0.4, 2.4, 3.4], points, site="tip", x0=REACH))
 
 
 def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenario:
     """Return the scenario of a task under a law.
 
     Args:
-      task: "sway", "payload" (picked up at 1 s), "wall" (pressed on while the tip slides) or "blow" (at 1 s, in a sway).
+      task: "sway"; "payload", picked up at 1 s; "wall", pressed on while the tip slides; "behind", the same path 4 mm
+        behind the wall's face; or "blow", at 1 s of a sway.
       seed: of the noise, and of the start, which is within 0.05 rad of the task's; 0: at the task's.
       payload: kg that the arm carries from the start, unknown to the law.
     """
     one = arm()
-    references = {"sway": sway, "blow": sway, "payload": pick_and_place, "wall": wall_path}
+    references: dict[str, Callable[[], tuple[Waypoints, ...]]] = {
+        "sway": sway,
+        "blow": sway,
+        "payload": pick_and_place,
+        "wall": wall_path,
+    }
+    references["behind"] = lambda: wall_path(BEHIND)
     wanted = find("task of the arm", task, references)()
     start = np.array([signal.values[0] for signal in wanted])
-    if seed and task != "wall":
+    if seed and task not in ("wall", "behind"):
         start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, one.n)
     fields = {
         "sway": {"duration": 3.5},
         "blow": {"duration": 3.5, "disturbance": Push("link5", y=400.0, time=1.0, width=0.02)},
         "payload": {"duration": 4.2, "jump": Jump(1.0, {"payload": 2.0})},
         "wall": {"duration": 3.8, "contact": "wall"},
+        "behind": {"duration": 3.8, "contact": "wall"},
     }[task]
     mismatch = {"payload": payload} if payload else {}
     common = {"plant": one, "law": law, "reference": wanted, "x0": tuple(start), "seed": seed, "noise": NOISE}

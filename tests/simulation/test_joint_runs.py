@@ -51,9 +51,10 @@ def cases(arm):
     yield smc.Scenario(plant=arm, law=curious, disturbance=pushes, **common)
     yield smc.Scenario(plant=arm, law=curious, model="none", **common)
     yield smc.Scenario(plant="pendulum_network", law=curious, control_period=2e-3, **common)
-    yield smc.Scenario(plant="servo_axis", law=curious, **common)
+    swinging = smc.plant("inverted_pendulum_network", n=3)
+    yield smc.Scenario(plant=swinging, law=curious, **common)
     volts = smc.DCMotor(command="voltage", gear=50.0, voltage=1e3)  # of which u takes a third
-    yield smc.Scenario(plant="servo_axis", law=curious, actuator=volts, **common)
+    yield smc.Scenario(plant=swinging, law=curious, actuator=volts, **common)
 
 
 def test_callback_equals_plain_loop_under_laws_of_many_joints(arm):
@@ -248,6 +249,10 @@ REFUSED = {
     "free joint": (
         lambda: smc.Scenario(plant="cart_pole", law=TORQUE),
         "commands them all, and cart_pole has 1 without an actuator",
+    ),
+    "one joint": (
+        lambda: smc.Scenario(plant="duffing", law=TORQUE),
+        "law 'computed_torque_sliding' is of many joints, and duffing has one: give a law of one channel",
     ),
     "surface": (
         lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),

@@ -1,0 +1,48 @@
+"""Can an arm press on a wall with 20 N while its tip slides along it, without a force sensor?
+
+Hybrid control: a sliding mode moves the joints in all directions but one, in which the tip presses open-loop, by the
+torques J' F. Once the law knows the identified friction of the joints, once not. The third law only follows the path,
+wanted 4 mm behind the wall's face: it presses with what the joints' errors happen to give.
+
+Look for: the force in the last panel, a loss of contact as a bar below it, and how deep the tip is in the wall.
+"""
+
+import smc_mujoco as smc
+from smc_mujoco.studies import arms
+
+
+def off(trace):
+    return abs(smc.tip_scores(trace, force=arms.PRESS)["force_error"])
+
+
+def stays(trace):
+    return smc.tip_scores(trace)["touching"] == 100.0
+
+
+def shallow(trace):
+    return smc.tip_scores(trace)["depth"] <= 1e-3
+
+
+def answer(runs):
+    return (
+        f"mean force off the wanted 20 N: least {runs.least(off, unit='%')}, most {runs.most(off, unit='%')}; "
+        f"{runs.who('never loses the wall', 'never lose the wall', stays)}, and "
+        f"{runs.who('stays within 1 mm of its face', 'stay within 1 mm of its face', shallow)}"
+    )
+
+
+scene = smc.Scene(
+    title="Pressing on a wall with 20 N",
+    conditions={
+        "wall": {
+            "hybrid": arms.scenario("wall", arms.hybrid()),
+            "hybrid, friction known": arms.scenario("wall", arms.hybrid(friction=True).named("hybrid_with_friction")),
+            "path behind the wall": arms.scenario("behind", arms.gained("computed_torque_sliding")),
+        }
+    },
+    figure="joints",
+    answer=answer,
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
