@@ -4,7 +4,8 @@ Hybrid control: a sliding mode moves the joints in all directions but one, in wh
 torques J' F. Once the law knows the identified friction of the joints, once not. The third law only follows the path,
 wanted 4 mm behind the wall's face: it presses with what the joints' errors happen to give.
 
-Look for: the force in the last panel, a loss of contact as a bar below it, and how deep the tip is in the wall.
+Look for: the force in the last panel, which a path behind the wall only meets in the mean; a loss of contact as a bar
+below it; and how deep the tip is in the wall.
 """
 
 import smc_mujoco as smc
@@ -13,6 +14,10 @@ from smc_mujoco.studies import arms
 
 def off(trace):
     return abs(smc.tip_scores(trace, force=arms.PRESS)["force_error"])
+
+
+def varies(trace):
+    return smc.tip_scores(trace)["force_ripple"]
 
 
 def stays(trace):
@@ -25,7 +30,8 @@ def shallow(trace):
 
 def answer(runs):
     return (
-        f"mean force off the wanted 20 N: least {runs.least(off, unit='%')}, most {runs.most(off, unit='%')}; "
+        f"in the mean the force is within {runs.most(off, unit='%')} of 20 N; it varies least with "
+        f"{runs.least(varies, unit='N')} and most with {runs.most(varies, unit='N')}; "
         f"{runs.who('never loses the wall', 'never lose the wall', stays)}, and "
         f"{runs.who('stays within 1 mm of its face', 'stay within 1 mm of its face', shallow)}"
     )

@@ -110,12 +110,13 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     return tables
 
 
+MAX_TIP_COLUMNS = 5  # so that the joint's name fits into 80 columns
 TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
-    "rms\nerror": ("rms_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
     "mean\nforce": ("mean_force", "N", 1.0),
     "off the\nwanted": ("force_error", "%", 1.0),
+    "force\nvaries by": ("force_ripple", "N", 1.0),
     "touching": ("touching", "%", 1.0),
     "deepest": ("depth", "mm", 1e3),
 }
@@ -128,14 +129,15 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
     shown = {head: one for head, one in TIP.items() if any(one[0] in each for each in values.values())}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
-    table = _by_label(f"{title}, tip", [*heads, Text("most work\n").append("J", "dim")])
+    room = len(shown) < MAX_TIP_COLUMNS
+    table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)])
     for label, trace in traces.items():
         if label not in values:
             table.add_row(_label(label, trace), FAILED)
             continue
         cells = [number(factor * values[label].get(name, math.nan)) for name, _, factor in shown.values()]
         joint, work = worst_joint(trace, "work")
-        table.add_row(_label(label, trace), *cells, f"{number(work)} ({joint})")
+        table.add_row(_label(label, trace), *cells, *([f"{number(work)} ({joint})"] * room))
     return [table]
 
 

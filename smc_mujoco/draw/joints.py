@@ -20,6 +20,7 @@ from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
 COLUMNS, ROW = 3, 1.75  # panels in a row; inches on a full page
+ALONE = 8.0  # times the errors of all other runs: a run so far off leaves the panel instead of flattening them; chosen
 
 
 def joints(
@@ -65,13 +66,16 @@ def joints(
         page = pages.blank(width, height or style.points(ROW * rows + 0.9), fig)
         grid = page.subplots(rows, COLUMNS, sharex=True, squeeze=False)
         for ax, (label, quantity) in zip(grid.flat, panels, strict=False):
+            sizes = []
             for k, (trace, colour) in enumerate(zip(traces, colours, strict=True)):
                 values = quantity(trace)
+                sizes.append((float(np.abs(values).max()), values.min(), values.max()))
                 ax.plot(trace.t, values, color=colour, lw=style.points(1.5), zorder=3 - 0.1 * k)
                 if label.startswith("contact"):
                     mark_losses(ax, trace.t, values, colour, k)
             ax.set_title(label, fontsize=style.points(10.0))
             ax.margins(0.0, 0.08)
+            keep_within(ax, sizes)
         for ax in grid.flat[len(panels) :]:
             ax.set_visible(False)
         last = [grid[max(row for row in range(rows) if row * COLUMNS + j < len(panels)), j] for j in range(COLUMNS)]
@@ -85,6 +89,18 @@ def joints(
         pages.set_head(page, width, title or style.plant_name(plant), handles)
         pages.write(page, paths)
     return page
+
+
+def keep_within(ax: Axes, sizes: list[tuple[float, float, float]]) -> None:
+    """Let one run that is far off leave the panel, and say so; sizes are the largest |y|, least and largest y of each."""
+    *others, largest = sorted(sizes)
+    if others and largest[0] > ALONE * others[-1][0] > 0.0:
+        low, high = min(one[1] for one in others), max(one[2] for one in others)
+        room = 0.3 * (high - low)
+        ax.set_ylim(low - room, high + room)
+        place = {"xytext": (-3, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
+        text = f"one run: up to {style.short(largest[0])}"
+        ax.annotate(text, (1.0, 1.0), xycoords="axes fraction", fontsize=style.points(8.0), color=style.MUTED, **place)
 
 
 def _distance(trace: Trace) -> np.ndarray:
