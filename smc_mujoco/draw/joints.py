@@ -92,7 +92,7 @@ def joints(
 
 
 def keep_within(ax: Axes, sizes: list[tuple[float, float, float]]) -> None:
-    """Let one run that is far off leave the panel, and say so; sizes are the largest |y|, least and largest y of each."""
+    """Let one run that is far off leave the panel, and say so. Sizes: largest |y|, least and largest y of each run."""
     *others, largest = sorted(sizes)
     if others and largest[0] > ALONE * others[-1][0] > 0.0:
         low, high = min(one[1] for one in others), max(one[2] for one in others)

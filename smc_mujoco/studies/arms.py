@@ -151,7 +151,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     common = {"plant": one, "law": law, "reference": wanted, "x0": tuple(start), "seed": seed, "noise": NOISE}
     gravity = {"model": "nominal"}  # observer_free_joint compensates gravity of the unloaded arm
     return Scenario(
-        **common | gravity | fields, mismatch=mismatch, friction=getattr(one, "friction", None), control_period=1e-3
+        **common | gravity | fields, mismatch=mismatch, friction=one.friction, control_period=1e-3
     )
 
 
