@@ -150,9 +150,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     mismatch = {"payload": payload} if payload else {}
     common = {"plant": one, "law": law, "reference": wanted, "x0": tuple(start), "seed": seed, "noise": NOISE}
     gravity = {"model": "nominal"}  # observer_free_joint compensates gravity of the unloaded arm
-    return Scenario(
-        **common | gravity | fields, mismatch=mismatch, friction=one.friction, control_period=1e-3
-    )
+    return Scenario(**common | gravity | fields, mismatch=mismatch, friction=one.friction, control_period=1e-3)
 
 
 def cost(trace) -> float:
