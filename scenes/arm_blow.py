@@ -7,28 +7,17 @@ Look for: the bars that turn red, where a motor gives all it has; the laws of M 
 joint's blow is not passed on to the others.
 """
 
-import numpy as np
-
 import smc_mujoco as smc
-from smc_mujoco.metrics.tip import tip_path
-from smc_mujoco.studies import arms
 
 LAWS = ("computed_torque_sliding", "unit_vector", "passivity_based", "observer_free_joint")
-BLOW, CLOSE = 1.0, 2e-3  # s, and m from the path: back
-
-
-def away(trace):
-    plant = trace.scenario.plant
-    return np.linalg.norm(tip_path(plant, trace.x) - tip_path(plant, trace.r), axis=1)
 
 
 def thrown(trace):
-    return 1e3 * away(trace)[trace.t >= BLOW].max()
+    return 1e3 * smc.arms.off_path(trace, after=smc.arms.BLOW).max()
 
 
 def back(trace):
-    late = trace.t[(trace.t >= BLOW) & (away(trace) > CLOSE)]
-    return late[-1] - BLOW if len(late) else 0.0
+    return smc.arms.back_within(trace, 2e-3, after=smc.arms.BLOW)
 
 
 def answer(runs):
@@ -40,7 +29,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A blow on the forearm",
-    conditions={"blow": {name: arms.scenario("blow", arms.gained(name)) for name in LAWS}},
+    conditions={"blow": {name: smc.arms.scenario("blow", smc.arms.gained(name)) for name in LAWS}},
     figure="joints",
     answer=answer,
 )

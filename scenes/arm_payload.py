@@ -8,7 +8,6 @@ not.
 """
 
 import smc_mujoco as smc
-from smc_mujoco.studies import arms
 
 LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_based", "time_delay_sliding")
 
@@ -30,7 +29,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A payload of 2 kg is picked up",
-    conditions={"pick and place": {name: arms.scenario("payload", arms.gained(name)) for name in LAWS}},
+    conditions={"pick and place": {name: smc.arms.scenario("payload", smc.arms.gained(name)) for name in LAWS}},
     figure="joints",
     answer=answer,
 )

@@ -7,7 +7,6 @@ Look for: the bars, which show how much of each motor the swing takes; and who n
 """
 
 import smc_mujoco as smc
-from smc_mujoco.studies import arms
 
 LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "time_delay_sliding", "observer_free_joint")
 
@@ -24,7 +23,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A seven-joint arm with 2 kg unknown to the laws",
-    conditions={"sway": {name: arms.scenario("sway", arms.gained(name), payload=2.0) for name in LAWS}},
+    conditions={"sway": {name: smc.arms.scenario("sway", smc.arms.gained(name), payload=2.0) for name in LAWS}},
     figure="joints",
     answer=answer,
 )

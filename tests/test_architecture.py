@@ -167,7 +167,7 @@ def brand_new(y, gains, memory):
     "joint_laws": """
 from smc_mujoco.control.law import law_function
 @law_function(joint=True, gains={"k": 2.0})
-def brand_new(y, gains, memory):
+def brand_new_joint(y, gains, memory):
     return -gains.k * y.e, y.e
 """,
     "estimators": """
@@ -191,7 +191,7 @@ BRAND_NEW = dataclasses.replace(DUFFING, name="brand_new")
 RUN = {
     "surfaces": "smc.Scenario(plant='duffing', law='classical', surface='brand_new', duration=0.01)",
     "laws": "smc.Scenario(plant='duffing', law='brand_new', duration=0.01)",
-    "joint_laws": "smc.Scenario(plant='double_pendulum', law='brand_new', duration=0.01)",
+    "joint_laws": "smc.Scenario(plant='double_pendulum', law='brand_new_joint', duration=0.01)",
     "estimators": "smc.Scenario(plant='duffing', law='classical', velocity='brand_new', duration=0.01)",
     "plants": "smc.Scenario(plant='brand_new', law='classical', duration=0.01)",
 }
@@ -207,7 +207,7 @@ def test_a_new_file_is_found_and_runs(tmp_path):
     code += "import smc_mujoco as smc\n"
     for catalogue, run in RUN.items():
         code += f"""
-assert "brand_new" in smc.{catalogue}()
+assert "brand_new{"_joint" * (catalogue == "joint_laws")}" in smc.{catalogue}()
 trace = smc.run({run})
 assert trace.diverged_at is None
 again = smc.load(trace.save("{catalogue}.npz"))

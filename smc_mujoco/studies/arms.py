@@ -15,11 +15,12 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.catalogue import score
-from smc_mujoco.metrics.tip import tip_scores
+from smc_mujoco.metrics.tip import tip_path, tip_scores
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
+from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.waypoints import Waypoints, cartesian_path
 
 NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, of an encoder and a filtered difference
@@ -28,6 +29,7 @@ DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # of a search, kg
 ROUGH = 1000.0  # N m/s: a variation of u that counts as much as the error; chosen before any search
 BEHIND = 0.004  # m, chosen
 SPREAD = 0.05  # rad, of starts about the task's own; chosen
+BLOW = 1.0  # s, of the blow in its task
 PRESS, REACH = 20.0, (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # N; rad, from where the wall's path is found
 
 # Law -> gain -> range of the search. Where a joint's own number enters, the gain is the factor on it: see `gains`.
@@ -84,7 +86,8 @@ def hybrid(friction: bool = False) -> Law:
     if friction:
         known = arm().friction
         gains |= {"f1": known.p1, "f2": known.p2, "f3": known.p3}
-    return law("hybrid_sliding", **gains)  # pyright: ignore[reportArgumentType]
+    made = law("hybrid_sliding", **gains)  # pyright: ignore[reportArgumentType]
+    return made.named("hybrid_with_friction") if friction else made
 
 
 @functools.cache
@@ -142,7 +145,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, one.n)
     fields = {
         "sway": {"duration": 3.5},
-        "blow": {"duration": 3.5, "disturbance": Push("link5", y=400.0, time=1.0, width=0.02)},
+        "blow": {"duration": 3.5, "disturbance": Push("link5", y=400.0, time=BLOW, width=0.02)},
         "payload": {"duration": 4.2, "jump": Jump(1.0, {"payload": 2.0})},
         "wall": {"duration": 3.8, "contact": "wall"},
         "behind": {"duration": 3.8, "contact": "wall"},
@@ -153,7 +156,22 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     return Scenario(**common | gravity | fields, mismatch=mismatch, friction=one.friction, control_period=1e-3)
 
 
-def cost(trace) -> float:
+def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
+    """Return how far the tip is from where the references want it at the samples from a time in s on, m."""
+    late, one = trace.t >= after, trace.scenario.plant
+    return np.linalg.norm(tip_path(one, trace.x[late]) - tip_path(one, trace.r[late]), axis=1)
+
+
+def back_within(trace: Trace, distance: float, after: float) -> float:
+    """Return how long after a time in s the tip is within a distance of its path for good, s; inf if it never is."""
+    t = trace.t[trace.t >= after]
+    out = np.flatnonzero(off_path(trace, after) > distance)
+    if not len(out):
+        return 0.0
+    return math.inf if out[-1] == len(t) - 1 else float(t[out[-1] + 1]) - after
+
+
+def cost(trace: Trace) -> float:
     """Return the objective of the search: the tip's rms error, mm, more by the roughness of u."""
     if trace.failure is not None:
         return math.inf
