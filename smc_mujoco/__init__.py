@@ -22,13 +22,14 @@ from smc_mujoco.envs import registration
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
 _MODULES = {  # public modules; three of them need an extra
+    "arms": "smc_mujoco.studies.arms",
     "boards": "smc_mujoco.studies.boards",
     "gym": "smc_mujoco.envs.gymnasium_env",
     "paper": "smc_mujoco.studies.papers.gaber.scenarios",
     "suite": "smc_mujoco.envs.dm_control_env",
     "vector": "smc_mujoco.envs.vector_env",
 }
-__all__ = [*_HOMES, "boards", "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = [*_HOMES, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
 
 __path__.append(str(Path(__file__).parent / "moved"))  # old names of modules, for one release
 

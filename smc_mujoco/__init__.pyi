@@ -1,3 +1,4 @@
+import smc_mujoco.studies.arms
 import smc_mujoco.studies.boards
 from smc_mujoco.analysis.chattering import Chattering as Chattering
 from smc_mujoco.analysis.chattering import chattering as chattering
@@ -90,7 +91,6 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
 from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
-from smc_mujoco.studies import arms as arms
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.audit.audit import Audit as Audit
@@ -111,6 +111,7 @@ from smc_mujoco.twins.rig import rig as rig
 from smc_mujoco.twins.rig import rigs as rigs
 
 __version__: str
+arms = smc_mujoco.studies.arms
 boards = smc_mujoco.studies.boards
 gym = gymnasium_env
 paper = scenarios

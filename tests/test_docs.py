@@ -33,11 +33,13 @@ def test_the_contents_name_every_page_once():
 
 def test_the_reference_names_every_public_name_where_it_is_defined():
     named = re.findall(r"^::: smc_mujoco\.(\S+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
-    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {smc._MODULES["paper"], smc._MODULES["boards"]}
+    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {
+        smc._MODULES[one] for one in ("arms", "boards", "paper")
+    }
     homes = {home.removeprefix("smc_mujoco.") for home in homes}
     assert homes <= set(named)
     assert len(named) == len(set(named))
-    of_modules = ("pytest_plugin.", "testing.", "studies.boards.")
+    of_modules = ("pytest_plugin.", "testing.", "studies.arms.", "studies.boards.")
     assert {name for name in set(named) - homes if not name.startswith(of_modules)} == set()
 
 

@@ -27,7 +27,7 @@ NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, of an encoder
 SWAY, BEAT = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5), 0.6  # rad and s: chosen, up to a rad/s in each joint
 DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # of a search, kg
 ROUGH = 1000.0  # N m/s: a variation of u that counts as much as the error; chosen before any search
-BEHIND = 0.004  # m, chosen
+BEHIND, PROBE = 0.004, 0.012  # m: chosen; the radius of the probe
 SPREAD = 0.05  # rad, of starts about the task's own; chosen
 BLOW = 1.0  # s, of the blow in its task
 PRESS, REACH = 20.0, (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # N; rad, from where the wall's path is found
@@ -105,21 +105,17 @@ def pick_and_place() -> tuple[Waypoints, ...]:
 
 
 @functools.cache
-def wall_path(behind: float = 0.0) -> tuple[Waypoints, ...]:
+def wall_path(behind: float | None = None) -> tuple[Waypoints, ...]:
     """Return references on which the tip slides along the wall, across and up, at rest until 0.4 s.
 
     Args:
-      behind: how far the path goes behind the wall's face on the way, m; it begins before it.
+      behind: how far the path is behind the wall's face, m; None: half a millimetre before it.
     """
     from smc_mujoco.mechanisms.plants.panda import WALL
 
-    x = WALL - 0.0125  # half a millimetre before the probe touches
-    if not behind:
-        points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
-        return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
-    there = WALL - 0.012 + behind
-    points = [(x, -0.2, 0.40), (there, -0.2, 0.40), (there, 0.2, 0.40), (there, 0.2, 0.55)]
-    return tuple(cartesian_path(arm(), [0.0, 0.4, 2.4, 3.4], points, site="tip", x0=REACH))
+    x = WALL - PROBE + (-5e-4 if behind is None else behind)
+    points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
+    return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
 
 
 def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenario:
@@ -140,7 +136,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     }
     references["behind"] = lambda: wall_path(BEHIND)
     wanted = find("task of the arm", task, references)()
-    start = np.array([signal.values[0] for signal in wanted])
+    start = np.array([signal.values[0] for signal in (wall_path() if task == "behind" else wanted)])
     if seed and task not in ("wall", "behind"):
         start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, one.n)
     fields = {
