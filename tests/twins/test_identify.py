@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
+from smc_mujoco.simulation import philox
 from smc_mujoco.twins import records
 from smc_mujoco.twins.identify import Search
 
@@ -113,16 +114,18 @@ def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
 def test_a_transient_of_a_closed_loop_gives_a_quantity_within_three_standard_errors():
     """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
 
-    Not seed 4, whose second sample, which decides, has a noise of 4.2 deviations.
+    The noise of the second sample, which the controller takes for a velocity, decides most of the error. Where it is
+    itself beyond 3 deviations, as the 4.2 of seed 4, the error may be as far off.
     """
     runs = [
         AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=seed, noise=smc.Noise(2e-7))
-        for seed in (8, 10)
+        for seed in (4, 8, 10)
     ]
     for trace in smc.run(runs):
+        second = philox.normals(trace.scenario.seed, 0, philox.MEASUREMENT, 1)[0]
         result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
         for name, value in result.values.items():
-            assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
+            assert abs(value - AXIS.values[name]) < max(3.0, abs(second)) * result.errors[name]
             assert result.errors[name] < 0.01 * AXIS.values[name]
 
 
