@@ -14,7 +14,7 @@ from smc_mujoco.metrics.conventions import CATALOGUE
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Step
+from smc_mujoco.simulation.signals import Constant, Step
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
@@ -160,7 +160,7 @@ def respond(
     condition: str | Condition = "nominal",
     fields: Mapping[str, object] | None = None,
 ) -> StepResponse:
-    """Run a law from rest at 0 to a step of the reference at t = 0.
+    """Run a law from rest at 0, or at the plant's own rest, to a step of the reference at t = 0.
 
     Args:
       plant, law: as in a Scenario.
@@ -185,6 +185,9 @@ def respond(
     chosen = find_condition(condition)
     plant = as_plant(plant)
     conditions = chosen.on(plant, number("duration", given.get("duration", scenarios.DURATION)))
-    whole: dict = {"plant": plant, "law": law, "x0": 0.0, "reference": Step(height)} | conditions | given
+    start = {"x0": 0.0, "reference": Step(height)}
+    if plant.rest:
+        start = {"x0": plant.rest, "reference": [Constant(x + height) for x in plant.rest[: plant.driven]]}
+    whole: dict = {"plant": plant, "law": law} | start | conditions | given
     words = [chosen.name] * (chosen.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
     return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(words))

@@ -1,5 +1,6 @@
 """Step responses of the laws of the study, tested with the pytest plugin as a user tests a law of their own."""
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -53,3 +54,13 @@ def test_in_friction_the_boundary_layer_answers_as_it_always_has(step_response, 
     narrow = smc.law("boundary_layer", k=6.0, c=6.0, phi=0.3)
     r = step_response(plant, narrow, STEP, friction=smc.Coulomb(0.05), duration=4.0)
     golden(r, settling_time=0.002, rise_time=0.002, overshoot=0.05, steady_error=1e-5, max_u=1e-3)
+
+
+def test_an_arm_steps_from_its_rest_on_every_joint(step_response):
+    law = smc.law("computed_torque_sliding", k=60.0, c=10.0, width=0.5)
+    r = step_response("panda", law, step=0.1, duration=1.0, friction=None)
+    trace, rest = r.trace, np.array(smc.plant("panda").rest)
+    np.testing.assert_array_equal(trace.x[0], rest)
+    np.testing.assert_allclose(trace.r - rest, 0.1)
+    assert r.settling_time < 0.8
+    assert np.abs(trace.x[-1] - rest - 0.1).max() < 1e-3
