@@ -5,8 +5,9 @@
     cycle.amplitude, cycle.frequency          # of s, in its unit, and Hz; NaN where no limit cycle is predicted
 
 A limit cycle e = a sin(omega t) is where N(a, omega) L(j omega) = 1: N is the first harmonic of what the law returns,
-L the answer of the linearised mechanism (`harmonics`). That is exact if the mechanism filters all other harmonics out;
-`third_harmonic` says how far it does. Cycles that are not stable are left out, by Loeb's criterion.
+L the answer of the linearised mechanism (`harmonics`). That is exact if the mechanism filters all other harmonics out,
+and if the cycle is not locked to the control samples; `uncertainty` says how much these two may change. Cycles that are
+not stable are left out, by Loeb's criterion.
 Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
 Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
@@ -54,10 +55,10 @@ class Chattering:
       third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
         large the law does not see a sine, and the prediction is rough.
       samples: control samples in a period.
-      amplitude_range, frequency_range: the least and the most that amplitude and frequency may be, if the cycle keeps
-        its place among the samples, and with the higher harmonics that the law sees: see `Loop.phases`. What one count
-        of an encoder moves s by is added to the largest amplitude. Known also for a law that switches, and for which no
-        wave balances.
+      amplitude_range, frequency_range: the least and the most that amplitude and frequency may be, if the cycle is
+        locked to the samples, and with the higher harmonics that the law sees: see `Loop.phases`. The largest amplitude
+        includes what one count of an encoder moves s by. Both are also known for a law that switches if the balance has
+        no solution: then a locked cycle is possible.
       coupling: largest amplitude of another driven channel under this one's command, over amplitude_x; 0 for a single
         channel. The prediction is for one channel alone: where this is not small, they oscillate together.
       gain: N, complex; response: L, complex, at the cycle.
@@ -138,9 +139,9 @@ def switches(loop: Loop) -> bool:
 
 
 def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chattering:
-    """Return what is known of the cycle of a law that switches where no wave balances: it keeps its place in samples.
+    """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
-    The law switches half a control period later than in the mean at most. The cycle is no larger, and no slower, than
+    Such a law switches at most half a control period later than in the mean. The cycle is no larger and no slower than
     the one with that delay.
     """
     loop = Loop(scenario, channel, 0.5 * scenario.control_period)
@@ -148,7 +149,7 @@ def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chatteri
     if not found:
         return Chattering(assumptions=said)
     wave = max(found, key=lambda wave: wave.omega)
-    said += ("no wave balances, but the law switches: a cycle that keeps its place among the samples is possible",)
+    said += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
     return Chattering(
         amplitude_range=(0.0, wave.s + loop.count),
         frequency_range=(wave.omega / math.tau, 0.5 / scenario.control_period),
@@ -326,9 +327,7 @@ def _described(loop: Loop, wave: Wave, said: tuple[str, ...], ranges: bool) -> C
         said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
     coupling = loop.coupling(wave.omega)
     if coupling:
-        said += (
-            f"other driven channels are at rest, though this one's command moves them {coupling:.2g} times as far",
-        )
+        said += (f"other driven channels are at rest, though this one's command moves one {coupling:.2g} times as far",)
     if wave.drift > 0.05:
         said += ("gains or memories of the law drift: the prediction is a snapshot",)
     sizes, omegas = [math.nan], [math.nan]

@@ -176,9 +176,10 @@ class Loop:
     def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
         """Return how far the phase of `gain` may be off at least and at most, rad: least <= 0 <= most.
 
-        The first reason is the position of the samples. `gain` is a mean over all positions; a cycle of a whole number
-        of samples keeps one. A relay then switches up to half a control period earlier or later than in the mean. The
-        second reason are the higher harmonics of e, which follow from those of u and change its first harmonic.
+        The first reason is the position of the samples in the period. `gain` is a mean over all positions, but a cycle
+        of a whole number of samples is locked to one. A relay then switches up to half a control period earlier or
+        later than in the mean. The second reason is that e has higher harmonics, too: they follow from those of u, and
+        change its first harmonic.
         """
         h = max(self.scenario.control_period, math.tau / omega / FINEST)
         locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))  # of an even number of samples, four or more

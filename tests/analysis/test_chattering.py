@@ -279,7 +279,7 @@ def test_a_physics_step_as_long_as_the_control_period_hides_the_limit_cycle_and_
 def test_channels_that_move_each_other_are_told():
     pair = chattering("classical", plant="double_pendulum", actuator=smc.Lag(0.01))
     assert pair.coupling > 1.0
-    assert any(f"moves them {pair.coupling:.2g} times" in said for said in pair.assumptions)
+    assert any(f"moves one {pair.coupling:.2g} times" in said for said in pair.assumptions)
     assert chattering("classical", plant="duffing", actuator=smc.Lag(0.01)).coupling == 0.0
     assert chattering("classical", plant="pendulum_network", actuator=smc.Lag(0.01)).coupling < 0.01
 

@@ -239,8 +239,8 @@ def chatter(
 
     With a law that switches and an actuator that lags, the loop oscillates without end. The frequency and the amplitude
     follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "±" is how far
-    amplitude or frequency may be off, because the cycle may keep its place among the control samples, which shifts the
-    instant at which the law switches, and because of the harmonics in s; "third" is the share of the third. If there
+    amplitude or frequency may be off, because the cycle may be locked to the control samples, which shifts the instant
+    at which the law switches, and because of the harmonics in s; "third" is the share of the third. If there
     are several driven channels, "coupling" is how far another one moves under this one's command, relative to its own
     motion: where that is not small, they oscillate together, and the prediction, for one channel alone, fails.
 
