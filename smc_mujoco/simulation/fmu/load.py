@@ -7,6 +7,7 @@ FMU is first tried in a separate process, which may crash or hang.
 
 import dataclasses
 import functools
+import gc
 import hashlib
 import itertools
 import json
@@ -55,11 +56,13 @@ CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # by the number that a run keeps in its memory
 _numbers = itertools.count(1)
+_begun: dict[int, int] = {}  # address of a memory -> number of the last instance that began there
 
 
 class Running(NamedTuple):
     """The instance of one channel of a run."""
 
+    law: "FmuLaw"
     slave: Slave
     start: float  # s
     last: list[float]  # u and s
@@ -78,6 +81,7 @@ class FmuLaw(Uncompiled):
       constants: the FMU's names and values of inputs that do not change.
       parameters: the FMU's names of its gains.
       period: s, of its steps; None for the control period.
+      once: whether a process can have only one instance.
     """
 
     path: str = dataclasses.field(compare=False)
@@ -88,6 +92,7 @@ class FmuLaw(Uncompiled):
     constants: tuple[tuple[str, float], ...]
     parameters: tuple[str, ...]
     period: float | None
+    once: bool = False
 
     why = "is an FMU, called from Python: several times slower than a law that compiles, and on one core"
 
@@ -115,11 +120,24 @@ class FmuLaw(Uncompiled):
         values = (max(-LARGEST, min(float(gain), LARGEST)) for gain in gains)
         fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
         names = [theirs for _, theirs in self.inputs]
+        address = memory.__array_interface__["data"][0]
+        _end(_begun.get(address, 0))  # of a run whose memory was set to 0, to begin again
+        if self.once:
+            self._make_room()
         made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
-        _running[place] = Running(made, y.t, [0.0, 0.0])
+        _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place
+
+    def _make_room(self) -> None:
+        """Raise ScenarioError if another instance of an FMU runs that can have only one in a process."""
+        gc.collect()  # ends the instances of runs that are over
+        if any(other.law == self for other in _running.values()):
+            raise ScenarioError(
+                f"FMU {Path(self.path).name!r} has one instance in a process, by its description: "
+                "give a plant of one channel"
+            )
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
@@ -143,7 +161,7 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
 def _end(place: int) -> None:
     """End an instance. What its library does then must not end the process by an exception."""
     try:
-        _running.pop(place).slave.close()
+        _running.pop(place).slave.close()  # there is none where it has ended already
     except Exception:
         return
 
@@ -223,6 +241,7 @@ def law_from_fmu(
         outputs=tuple(outputs.values()),
         constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()),
         parameters=tuple(theirs for theirs, _ in gains.values()),
+        once=bool(about.coSimulation.canBeInstantiatedOnlyOncePerProcess),
         period=_period(about) if period is None else number("period", period, above=0.0),
     )
     if isolate:

@@ -16,9 +16,11 @@ from helpers import fmu as helper  # noqa: E402
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control.c import build  # noqa: E402
+from smc_mujoco.control.law import Measurement  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.simulation.fmu import load  # noqa: E402
 from smc_mujoco.simulation.fmu.slave import Slave  # noqa: E402
+from smc_mujoco.simulation.reference import gains_of  # noqa: E402
 
 pytestmark = [
     pytest.mark.skipif(build.timed(["sh", "-c", "command -v ${CC:-cc}"], 10.0).returncode != 0, reason="no C compiler"),
@@ -94,6 +96,27 @@ def test_runs_have_instances_of_their_own_which_end_with_them(folder):
     assert (one.u != other.u).any()
     gc.collect()
     assert load._running == {}
+
+
+def test_a_memory_that_is_set_to_0_begins_again_and_ends_what_ran(folder):
+    law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "anew.fmu"), isolate=False)()
+    y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
+    first, second = (law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3))
+    assert first != second
+    memory[:] = 0.0
+    assert law.function(y, gains, memory) == first
+    assert len(load._running) == 1
+    del memory
+    assert load._running == {}
+
+
+def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp_path):
+    path = changed(foreign, tmp_path, ("<CoSimulation", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true"'))
+    law = smc.law_from_fmu(path, **RENAMED, isolate=False)()
+    fine = smc.run([scenario(law), scenario(law)])
+    assert [trace.failure for trace in fine] == [None, None]
+    network = smc.run(scenario(law, "pendulum_network"))
+    assert "FMU 'changed.fmu' has one instance in a process" in str(network.failure)
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
