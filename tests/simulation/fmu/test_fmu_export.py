@@ -37,7 +37,7 @@ FIRST = [n for n, law in catalogue().items() if law.relative_degree == 1 and not
 # (law, surface, estimator): each surface and each estimator once or more, laws with memory, of t, and of higher order.
 COMBINED = [
     *zip(FIRST, [n for n, s in SURFACES.items() if s.relative_degree == 1], itertools.cycle(estimator.catalogue())),
-    ("nested_third_order", None, "extended_state_observer"),
+    ("observer_free_third", None, "extended_state_observer"),
     ("prescribed_time", None, "kalman"),
     ("pid", None, "measured"),
 ]
@@ -113,7 +113,7 @@ def test_all_surfaces_and_estimators_are_among_the_combinations():
 
 
 def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
-    one = ("nested_third_order", None, "extended_state_observer")
+    one = ("observer_free_third", None, "extended_state_observer")
     trace = combined[one][1]
     source = smc.export_fmu(scenario(*one), folder / "source.fmu", binary=False)
     assert fmpy.supported_platforms(str(source)) == ["c-code"]
@@ -256,6 +256,7 @@ def test_each_component_has_gains_of_its_own(folder):
         ({"law__k1": -1.0}, "law.k1 = -1 is out of its range"),
         ({"estimator__L": 0.0}, "estimator.L = 0 is out of its range"),
         ({"u_max": float("nan")}, "u_max = nan is out of its range"),
+        ({"x": float("nan")}, "x = nan is out of its range"),
         ({"u_max": 0.0}, "u_max = 0 is out of its range"),
         ({"dt": 0.01}, "dt cannot be set now"),
         ({"u": 1.0}, "u cannot be set now"),
