@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.units import Unit
-from smc_mujoco.simulation.fmu.controller import Controller, Variable
+from smc_mujoco.simulation.fmu.controller import UNBOUNDED, Controller, Variable
 
 # Kind of joint -> units of force and position: name, exponents of the base units.
 JOINTS = {
@@ -177,7 +177,8 @@ def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
             continue
         role = "output" if one.name in OUTPUTS else ROLES[one.kind][0]
         unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
-        start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else f"{one.start:g}"
+        start = "unbounded" if one.start == UNBOUNDED else f"{one.start:g}"
+        start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
         cells = (one.name, role, unit, start, one.description)
         rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
     about = html.escape(summary(controller))
