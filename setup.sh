@@ -54,7 +54,7 @@ if ! wanted | cmp -s - .venv/installed; then
     wanted >.venv/installed
 fi
 if [ -n "$extra" ] && ! cmp -s "$extra" ".venv/$extra"; then
-    [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.5 GB)"
+    [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.6 GB)"
     install --only-binary :all: --require-hashes -r "$extra"
     cp "$extra" .venv/
 fi
