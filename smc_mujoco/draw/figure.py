@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from smc_mujoco.common.errors import ScenarioError, taken, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
-from smc_mujoco.draw import style
+from smc_mujoco.draw import style, ticks
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
@@ -127,6 +127,7 @@ def figure(
             )
         _draw_beside(page, others, column, places, names, colours, rests)
         pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key)
+        ticks.space(page)
         pages.write(page, paths)
     return page
 
@@ -219,9 +220,9 @@ def _level(frame: Axes, rows: Sequence[Axes]) -> None:
         return
     ranges = [ax.get_ylim() for ax in rows]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-    ticks = [tick for tick in MaxNLocator(3).tick_values(low, high).tolist() if low <= tick <= high]
+    places = [tick for tick in MaxNLocator(3).tick_values(low, high).tolist() if low <= tick <= high]
     for ax in (frame, *rows):
-        ax.set(ylim=(low, high), yticks=[ticks[0], ticks[-1]])
+        ax.set(ylim=(low, high), yticks=[places[0], places[-1]])
     for ax in rows[:-1]:
         ax.tick_params(labelbottom=False, length=0)
     frame.tick_params(labelcolor="none", length=0)  # its label stands beside these, as if they were seen
@@ -235,7 +236,6 @@ def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
             ax = page.add_subplot(rows[i, k], ylabel=panel.label)
             ax.set_xlim(0.0, end(panel.traces))
             ax.locator_params(axis="y", nbins=3)
-            ax.locator_params(axis="x", nbins=4)
             drawing.over_time(ax, panel, colours)
             drawing.jumps(ax, changes, named=i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)

@@ -234,11 +234,18 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
 
 
 def _settings(trace: Trace) -> Mapping[str, object]:
-    """Return the gains of a run and the fields of its scenario."""
-    scenario = trace.scenario
+    """Return the gains of a run, the parameters of its plant and the fields of its scenario."""
+    scenario, gains = trace.scenario, dict(trace.scenario.law.gains)
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
     del fields["law"], fields["plant"]
-    return dict(scenario.law.gains) | fields
+    plant = {f"plant's {name}" if name in gains else name: v for name, v in scenario.plant.parameters.items()}
+    return gains | plant | fields
+
+
+def distinct(names: Sequence[str]) -> list[str]:
+    """Return labels without the law that all of them begin with: "k = 1", "k = 2" of "Twisting: k = 1", ..."""
+    law = f"{names[0].partition(': ')[0]}: "
+    return [name.removeprefix(law) for name in names] if all(name.startswith(law) for name in names) else list(names)
 
 
 def _setting(name: str, value: object) -> str:

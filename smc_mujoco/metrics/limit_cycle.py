@@ -94,6 +94,8 @@ def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
     width = min(3, int(periods - 2) // 2)  # bins to each side of a line
     bins = np.arange(len(spectrum))
     lines = np.abs(bins - periods * np.maximum(np.round(bins / periods), 1.0)) <= width + 0.5
+    if lines[first:].all():  # the cycle is the fastest of all: there is nothing beside it
+        return 1.0
     covered = lines[first:].mean()
     if covered == 1.0:
         return 0.0  # so few bins are left that any spectrum looks like this

@@ -54,7 +54,7 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
     path = tmp_path_factory.mktemp("arm") / "arm.xml"
     path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>")
     plant = smc.plant_from(path, [f"j{i}" for i in range(7)])
-    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3)))
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=1.0, x0=0.2, reference=smc.Step(0.3)))
     return [trace, under(trace, "super_twisting", 0.8)]
 
 
@@ -89,7 +89,7 @@ def check(page) -> None:
     ("kind", "size"),
     [
         ("one", None), ("four", COLUMN), ("ten", PAGE), ("ten", COLUMN), ("failed", PAGE), ("jump", COLUMN),
-        ("jump", PAGE), ("short", None), ("arm", None), ("arm", PAGE), ("arm", COLUMN),
+        ("jump", PAGE), ("short", None), ("short", COLUMN), ("arm", None), ("arm", PAGE), ("arm", COLUMN),
     ],
 )  # fmt: skip
 def test_words_are_apart_and_on_the_page(kind, size, one, arm):

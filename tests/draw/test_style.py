@@ -100,3 +100,11 @@ def test_laws_that_would_share_a_colour_differ_in_signals_and_fronts_too(monkeyp
     assert len({to_hex(ax.lines[0].get_color()) for ax in rows.axes}) == 2
     (ax,) = fronts.axes
     assert len({to_hex(line.get_color()) for line in ax.lines if str(line.get_marker()) in MARKS}) == 2
+
+
+def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
+    runs = [smc.Scenario(plant=smc.plant("duffing", delta=delta), law="pid", duration=0.01) for delta in (0.2, 0.5)]
+    labels = style.labels(smc.run(runs), None)
+    assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
+    assert style.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
+    assert style.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]

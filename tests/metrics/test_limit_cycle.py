@@ -25,6 +25,12 @@ def test_a_wave_of_two_samples_is_found():
     assert limit_cycle(T, 0.2 * (-1.0) ** np.arange(len(T))) == pytest.approx((0.2, 500.0))
 
 
+def test_a_cycle_of_two_samples_on_a_decay_is_found_without_a_warning():
+    t = T[:679]
+    with np.errstate(all="raise"):
+        assert limit_cycle(t, np.exp(-100.0 * t) + 1e-5 * (-1.0) ** np.arange(len(t))) == pytest.approx((1e-5, 500.0))
+
+
 SHAPES = {
     "square": lambda angle: np.sign(np.sin(angle)),
     "saw": lambda angle: angle / math.pi % 2.0 - 1.0,

@@ -71,6 +71,8 @@ class Caption:
             side, below = max(widths) + 30 * scale, 20 * scale
         else:
             below += self.badge[:, 1].max()
+            if max(self.width(name) for name in names) > self.max_label:
+                self.names = style.distinct(names)
         top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
         self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
         self.sheet = functools.lru_cache(maxsize=16)(self._sheet)
