@@ -24,14 +24,14 @@ class Spaced(AutoLocator):
         assert self.axis is not None
         low, high = sorted(self.axis.get_view_interval())
         box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
-        for most in range(MOST, 1, -1):
+        for most in range(MOST, 0, -1):
             self.set_params(nbins=most)
             ticks = [tick for tick in self.tick_values(low, high).tolist() if low <= tick <= high]
             widest = max((style.width(text, self.size) for text in formatter.format_ticks(ticks)), default=0.0)
             pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low) if ticks[1:] else 0.0
-            if len(ticks) < 2 or widest + GAP * self.size <= pitch:
-                break
-        return ticks
+            if widest + GAP * self.size <= pitch:
+                return ticks
+        return ticks[:1]
 
 
 def space(page: Figure | SubFigure) -> None:

@@ -54,7 +54,7 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
     path = tmp_path_factory.mktemp("arm") / "arm.xml"
     path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>")
     plant = smc.plant_from(path, [f"j{i}" for i in range(7)])
-    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=1.0, x0=0.2, reference=smc.Step(0.3)))
+    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3)))
     return [trace, under(trace, "super_twisting", 0.8)]
 
 
