@@ -80,6 +80,15 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
     assert smc.tip_scores(pressed, force=10.0)["force_error"] == pytest.approx(100.0, abs=2.0)
 
 
+def test_rubbing_on_the_wall_does_not_change_the_force():
+    """Its torque is in the directions of sliding, where the sliding mode answers it, and presses no more for it."""
+    path = tasks.wall_path()
+    law, start = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2), tuple(one.values[0] for one in path)
+    rough = smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact="wall", duration=1.4)
+    late = tip.contacts(smc.run(rough)).force[-400:]
+    assert late.mean() == pytest.approx(20.0, rel=0.02)
+
+
 def test_a_lost_contact_is_marked():
     class Axes:
         def fill_between(self, t, low, high, where, **_):
