@@ -247,7 +247,12 @@ class Advice:
             return []
         known = {choice.law.name: choice for choice in self.choices}
         for need in self.needs:
-            better = self.better(first.law.name, need)
+            least = first.medians[need].median
+            better = {  # also over all conditions, not only in some
+                law: where
+                for law, where in self.better(first.law.name, need).items()
+                if known[law].medians[need].median < least
+            }
             if not better:
                 continue
             name = min(better, key=lambda one: (-len(better[one]), known[one].medians[need].median))

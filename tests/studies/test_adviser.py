@@ -123,6 +123,13 @@ def test_a_need_in_one_condition_is_named_with_it(advice):
     assert f"Second choice: {SLOW} (gains as given); better on calm under noise; worse on fast." in text(found)
 
 
+def test_a_law_that_is_better_in_one_condition_and_worse_over_all_is_not_named_for_a_need(advice):
+    found = with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 10, 8.5], classical=[3, 3, 11, 11])
+    assert found.law.name == "observer_free"
+    assert "better is slow under noise" in text(found)
+    assert "If only" not in text(found)
+
+
 def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     """Slow has the lower median in three blocks, but is ahead in half of the seeds only; in the fourth it is worse."""
     mixed, even = np.tile([0.5, 1.6], 12), np.ones(24)
