@@ -167,7 +167,7 @@ def plant(random: Random) -> smc.Plant:
     name = random.choice(smc.plants())
     plain = smc.plant(name)
     least, most = plain.sizes
-    parameters: dict[str, float] = {} if most == 1 else {"n": random.randint(least, min(most, 4))}
+    parameters: dict[str, float] = {} if most == 1 else {"n": random.randint(least, min(most, max(least, 4)))}
     for key in few(random, sorted(plain.parameters), 2):
         parameters[key] = positive(random) if key in plain.positive else wide(random)
     return smc.plant(name, **parameters)
@@ -218,6 +218,8 @@ def friction(random: Random) -> list:
         lambda: smc.Viscous(positive(random)),
         lambda: smc.Coulomb(positive(random)),
         lambda: changed(random, smc.LuGre, ["coulomb", "static", "stribeck"], ["stiffness", "damping"]),
+        lambda: changed(random, smc.Sigmoid, ["p1", "p2"], ["hold", "stiffness"]),
+        lambda: random.choice([smc.servo("mx106", "m6").friction, smc.servo("mx64", "m1").friction]),
     ]
     return [random.choice(kinds)() for _ in range(random.randint(0, 2))]
 
