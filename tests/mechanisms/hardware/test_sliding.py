@@ -180,7 +180,8 @@ def scenarios():
         yield smc.Scenario(
             plant="pendulum_network", law="classical", friction=servo.friction, actuator=servo.motor, x0=start, **gust
         )
-    yield smc.Scenario(plant="panda", law="none", friction=frictions[0], contact="table", v0=0.5, **common)
+    at_a_stop = (0.0, 0.0, 0.0, -0.0750, 0.0, 1.5, 0.0)  # the elbow, which it then meets: the load has its force
+    yield smc.Scenario(plant="panda", law="none", friction=frictions[2], x0=at_a_stop, v0=0.5, **common)
 
 
 def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
