@@ -329,7 +329,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     def my_spring(y, gains, memory):
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
-    def build():
+    def build(n):
         return mujoco.MjSpec.from_string("<mujoco/>")
 
     asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0)
