@@ -6,8 +6,8 @@
         return -gains.lam * saturate(s), s
 
 The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d,
-where a law of one channel sees x'' = f + g u. M and h come from MuJoCo's own functions for your own models and for
-`double_pendulum`. The other plants have one equation per channel, so their M is diagonal.
+where a law of one channel sees x'' = f + g u. M and h come from MuJoCo's own functions for your own models,
+`double_pendulum` and `panda`. The other plants have one equation per channel, so their M is diagonal.
 
 A gain is a vector (n,), too, unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays
 are copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.
