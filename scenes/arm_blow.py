@@ -22,8 +22,8 @@ def back(trace):
 
 def answer(runs):
     return (
-        f"the blow throws the tip off its path by {runs.least(thrown, unit='mm')} at least and "
-        f"{runs.most(thrown, unit='mm')} at most; first within 2 mm for good: {runs.least(back, unit='s')}"
+        f"after the blow the tip is off its path least with {runs.least(thrown, unit='mm')}, most with "
+        f"{runs.most(thrown, unit='mm')}; first within 2 mm for good: {runs.least(back, unit='s')}"
     )
 
 

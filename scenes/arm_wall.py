@@ -26,9 +26,9 @@ def stays(trace):
 
 def answer(runs):
     return (
-        f"in the mean the force is within {runs.most(off, unit='%')} of 20 N; it varies least with "
-        f"{runs.least(varies, unit='N')} and most with {runs.most(varies, unit='N')}; "
-        f"{runs.who('never loses the wall', 'never lose the wall', stays)} and goes less than 1 mm into it"
+        f"mean force off 20 N: least with {runs.least(off, unit='%')}, most with {runs.most(off, unit='%')}; it varies "
+        f"least with {runs.least(varies, unit='N')}, most with {runs.most(varies, unit='N')}; always on the wall and "
+        f"less than 1 mm in it: {runs.those(stays).named}"
     )
 
 
