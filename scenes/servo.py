@@ -32,8 +32,8 @@ def share(trace):
 
 def answer(runs):
     return (
-        f"lifting takes more of the motor's torque than letting down, where the pendulum is level, this many times: "
-        f"{runs.most(share)}, {runs.least(share)}"
+        f"where the pendulum is level, the motor's torque to lift it over that to let it down is largest with "
+        f"{runs.most(share)} and smallest with {runs.least(share)}"
     )
 
 
