@@ -3,8 +3,8 @@
 While the arm sways, the forearm is hit from the side at 1 s: 400 N for 20 ms, an impulse of 5 N s. Friction is that
 identified on a real Panda; no law sees the blow coming.
 
-Look for: the bars that turn red, where a motor gives all it has; the laws of M act on all joints at once, so that one
-joint's blow is not passed on to the others.
+Look for: the bars at 1 s, which jump for as long as the blow lasts; and the last panel, which shows how far the tip is
+thrown and how it comes back.
 """
 
 import smc_mujoco as smc
