@@ -18,7 +18,6 @@ from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time
-from smc_mujoco.metrics.conventions import Metric, parts
 from smc_mujoco.simulation.trace import Trace
 
 Measure = str | Callable[[Trace], float]
@@ -173,9 +172,7 @@ class Outcome:
         """Return the function of a measure; its value is NaN for a run that failed."""
         if isinstance(measure, str):
             metric = find("metric", measure, CATALOGUE)
-            value = (
-                functools.partial(_of_group, name=measure, group=group) if group else functools.partial(_single, metric)
-            )
+            value = functools.partial(_of_group, name=measure, group=group) if group else metric.of
         elif callable(measure):
             value = measure
         else:
@@ -260,11 +257,6 @@ def _all(some: Sequence[str], labels: Sequence[str]) -> str:
 def _exceeds(a: float, b: float, resolution: float) -> bool:
     """Return whether a is larger than b by more than the least relevant difference; never is no later than never."""
     return a != b and bool(exceeds(a, b, resolution=resolution))
-
-
-def _single(metric: Metric, trace: Trace) -> float:
-    """Return the single value of a metric."""
-    return metric.of(parts(trace))
 
 
 def _of_group(trace: Trace, name: str, group: str) -> float:
