@@ -8,6 +8,8 @@ Look for: the motor's torque at the same angle on the way up and down, which M6 
 that it still pushes upwards while it lets the load down.
 """
 
+import math
+
 import smc_mujoco as smc
 
 PENDULUM = smc.plant("inverted_pendulum", m=1.0, l=0.15)
@@ -23,11 +25,13 @@ def swinging(model):
 
 def torque(trace, up):
     passed = (trace.v < -0.1) & (trace.x <= ACROSS) if up else (trace.v > 0.1) & (trace.x >= ACROSS)
-    return -trace.force[passed.ravel()][0, 0]
+    found = -trace.force[passed]
+    return found[0] if len(found) else math.nan  # a short run does not get there
 
 
 def share(trace):
-    return torque(trace, up=True) / torque(trace, up=False)
+    down = torque(trace, up=False)
+    return torque(trace, up=True) / down if down else math.nan
 
 
 def answer(runs):

@@ -102,6 +102,11 @@ def curious(y, gains, memory):
     return u, memory[0]
 
 
+def within(plant):
+    """Least and largest positions of a plant's channels."""
+    return np.array([ends for _, *ends in plant.ranges]).T if plant.ranges else (-math.inf, math.inf)
+
+
 def scattered(number):
     """A random valid scenario."""
     rng = np.random.default_rng(number)
@@ -122,7 +127,7 @@ def scattered(number):
         control_period=period,
         physics_step=step,
         u_max=float(rng.choice([0.3, 6.0, math.inf])),
-        x0=tuple(rng.uniform(-1.5, 1.5, plant.n)),
+        x0=tuple(np.clip(rng.uniform(-1.5, 1.5, plant.n), *within(plant))),
         v0=tuple(rng.uniform(-1.5, 1.5, plant.n)),
         reference=signals[rng.integers(4)],
         disturbance=tuple(signals[i] for i in rng.choice(5, size=rng.integers(4), replace=False)),

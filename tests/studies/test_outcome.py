@@ -21,7 +21,7 @@ RUN = smc.Scenario(plant="duffing", law="classical", x0=1.0, duration=2.0)
 def made(scenario: smc.Scenario, settled: float, size: float = 1.0, **fields: object) -> smc.Trace:
     """A trace without a run: it reaches 0.1 % of its start, times `size`, at the share `settled` of the duration.
 
-    Command, speed and reaction grow with `size`; there is no reaction up to a size of 3.
+    Command, force, speed and reaction grow with `size`; there is no reaction up to a size of 3.
     """
     t = np.linspace(0.0, scenario.duration, 101)
     flip = np.where(np.arange(101) % 2, 1.0, -1.0)
@@ -31,6 +31,7 @@ def made(scenario: smc.Scenario, settled: float, size: float = 1.0, **fields: ob
         "x": x,
         "v": np.broadcast_to((flip * size * (np.arange(101) % 5 > size))[:, None], x.shape),
         "u": np.broadcast_to((flip * size)[:, None], x.shape),
+        "force": np.broadcast_to((flip * size)[:, None], x.shape),
         "reaction": np.broadcast_to((flip * 10.0 * size * (size > 3.0))[:, None], x.shape),
     }
     arrays = {name: np.ascontiguousarray(columns.get(name, np.zeros_like(x))) for name in LOGGED}

@@ -1,15 +1,16 @@
-"""Hybrid control: the tip presses with a wanted force along a direction n, and joints slide in all others.
+"""Hybrid control: u = M (P (r'' - c de) + a) + h + A' (force - B A v - n' L J a) + friction, a = -k sat(s / width).
 
-    u = M (w - z A w / G) + h + A' (force - B A v) + friction,    w = r'' - c de - k sat(s / width),
+The tip presses with a wanted force along the direction n, and the joints slide in all others. A = n' J is the row of
+the tip's Jacobian J along n, z = M^-1 A', G = A z, L = (J M^-1 J')^-1 the inertia of the tip, and s = P (de + c e). The
+projection P = 1 - z A / G keeps what does not move the tip along n. n' L J a is the force along n that a would exert.
+While a wall holds the tip along n, A v = 0. With the perfect model, a disturbance d and a slow motion
 
-with A = n' J the row of the tip's Jacobian along n, z = M^-1 A', G = A z, and s = P (de + c e), P = 1 - z A / G. P
-keeps what does not move the tip along n. While a wall holds the tip there, A v = 0, and with the perfect model
+    s' = P (a + M^-1 d),    f = force + A (a + M^-1 d) / G - n' L J a.
 
-    s' = -k P sat(s / width) + P d_a,    f = force - A M^-1 d / G + A' v / G,
-
-so the force errs by the disturbance d along n, whatever k is: nothing here measures it. A' v is small at slow motion.
-Friction of known joints is such a d. The law compensates f1 / (1 + exp(-f2 (v + f3))) - f1 / (1 + exp(-f2 f3)), the
-friction that C. Gaz et al. identified for a Panda. Without contact the tip moves along n at force / B.
+Friction of the wall is such a d = -J' t phi, along a t with n' t = 0. Once a cancels it, f = force. Other disturbances
+along n change the force, whatever k is: nothing here measures it. Friction of the joints is one of these. The law
+compensates f1 / (1 + exp(-f2 (v + f3))) - f1 / (1 + exp(-f2 f3)), the friction that C. Gaz et al. identified for a
+Panda. Without contact the tip moves along n at force / B.
 Gains: force, wanted, N; nx, ny, nz, direction in which it presses, in the world; B, damping along n [N s/m]; c, slope
 of the surface [1/s]; k, switching gain [rad/s^2]; width, of the boundary layer [rad/s]; f1, f2, f3, of the friction
 [N m, s/rad, rad/s].
