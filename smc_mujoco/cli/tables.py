@@ -53,7 +53,7 @@ BOARD_KEY = (
     "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition. A winner is "
     "better than every other law: its median is lower by more than 3 %, and the seeds confirm it. Over several "
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
-    "x, u of driven joints, in rad or m, N m or N"
+    "x, u of driven joints, in rad or m, and N m, N or V"
 )
 BOARDS = {  # of RealAIGym -> what it shows, and the headings of its columns
     "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),

@@ -40,8 +40,8 @@ def runs(
     """
     if not rig.ensemble:
         raise ScenarioError(
-            f"{rig.name} has one set of parameters, and no source states its errors: choose a rig with an ensemble, "
-            "such as qube_servo, or identify it from records and draw one with Identified.drawn"
+            f"{rig.name} has one set of parameters here, and no errors of them to draw others from: choose a rig with "
+            "an ensemble, such as qube_servo, or identify it from records and draw one with Identified.drawn"
         )
     if not (chosen := list(rig.laws if laws is None else laws)):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")

@@ -19,6 +19,7 @@ def residual_figure(
     measured: Record,
     predicted: Mapping[str, Record],
     fits: Mapping[str, Mapping[str, float]],
+    units: Mapping[str, str],
     path: str | Path,
 ) -> list[Path]:
     """Draw each column of a record, measured and predicted, beside its residuals. Write PATH.svg and PATH.png.
@@ -27,6 +28,7 @@ def residual_figure(
       t: s, (K,).
       measured: column -> values, (K,).
       predicted, fits: name of a twin -> what it predicts, and its fit of each column, percent.
+      units: column -> its unit.
     """
     from matplotlib.figure import Figure
 
@@ -42,7 +44,7 @@ def residual_figure(
             right.plot(t, residual, color=colour, lw=0.7)
             reached.append(f"{twin} {list(fits[twin].values())[k]:.1f} %")
             left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
-        left.set_ylabel(name)
+        left.set_ylabel(f"{name} ({units[name]})")
         left.set_title(f"fit: {', '.join(reached)}", loc="left", fontsize=9)
         right.axhline(0.0, color=MEASURED, lw=0.6)
         right.set_title(f"residual, rms: {', '.join(left_over)}", loc="left", fontsize=9)

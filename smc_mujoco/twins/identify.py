@@ -17,6 +17,7 @@ simulation with their own noise and rounding, and a standard error is at least t
 """
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.mechanisms.plant import Plant
@@ -88,8 +89,8 @@ class Identified:
                 found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
         if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
             found.append(
-                f"the worst fit is {worst:.0f} %: the model lacks something, or the search ended in a valley of its "
-                "cost; start from other values, with more starts or another seed"
+                f"the worst fit is {worst:.0f} %: the model lacks something, a column is another or in another unit, "
+                "or the search ended in a valley of its cost; start from other values, with more starts or another seed"
             )
         return found
 
@@ -134,7 +135,8 @@ class Identified:
 
         whole("record", record, 0, len(self.fits) - 1)
         predicted, measured, t = self.predictions[record]
-        return residual_figure(self.rig.label, t, measured, {"twin": predicted}, {"twin": self.fits[record]}, path)
+        fits = {"twin": self.fits[record]}
+        return residual_figure(self.rig.label, t, measured, {"twin": predicted}, fits, self.rig.units, path)
 
 
 def identify(
@@ -168,6 +170,8 @@ def identify(
     names = list(twin.free if quantities is None else quantities)
     for name in names:
         find(f"quantity of {twin.name}", name, twin.quantities)
+        if names.count(name) > 1:
+            raise ScenarioError(f"quantities have {name} {names.count(name)} times: name it once")
     if not names:
         raise ScenarioError(f"{twin.name} has no quantities to find: name some, of {', '.join(twin.quantities)}")
     whole("starts", starts, 1, 1000)
@@ -279,15 +283,17 @@ class Search:
             found = [rig.predictions(self.data) for rig in rigs]
         else:
             plan = [(i, at) for i in range(len(self.data)) for at in self._pieces(i, stage)]
-            scenarios = [
-                rig.replay(
-                    self.data[i], *at, rounded=False, closed=stage == "whole",
-                    state=states[i] if at[0] == rig.start else None,
-                )
-                for rig, states in zip(rigs, map(self.states, points), strict=True)
-                for i, at in plan
-            ]  # fmt: skip
-            traces = run(scenarios)
+            with warnings.catch_warnings():  # of values that are only tried
+                warnings.simplefilter("ignore", ScenarioWarning)
+                scenarios = [
+                    rig.replay(
+                        self.data[i], *at, rounded=False, closed=stage == "whole",
+                        state=states[i] if at[0] == rig.start else None,
+                    )
+                    for rig, states in zip(rigs, map(self.states, points), strict=True)
+                    for i, at in plan
+                ]  # fmt: skip
+                traces = run(scenarios)
             size = len(plan)
             found = [
                 [
@@ -388,7 +394,7 @@ class Search:
             alike = [self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]]
             raise ScenarioError(
                 f"the records of {self.twin.name} cannot tell {' and '.join(alike)} apart: leave one out, or give a "
-                "longer record or one of a richer motion"
+                "longer record or one of a richer motion, or look at its units and columns"
             )
         covariance = self._jackknife(J, r, z)
         deviation = np.sqrt(np.diag(covariance))
@@ -409,7 +415,7 @@ class Search:
             found = [f"{self.names[k]} ({values[self.names[k]]:.3g} ± {errors[self.names[k]]:.2g})" for k in (i, j)]
             raise ScenarioError(
                 f"the records of {self.twin.name} cannot tell {' and '.join(found)} apart: leave one out, or give a "
-                "longer record or one of a richer motion"
+                "longer record or one of a richer motion, or look at its units and columns"
             )
 
     def _jackknife(self, J: np.ndarray, r: np.ndarray, z: np.ndarray) -> np.ndarray:

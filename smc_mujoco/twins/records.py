@@ -109,7 +109,8 @@ def _csv(file: Path) -> Record:
     except (OSError, ValueError, csv.Error) as error:
         raise ScenarioError(f"cannot read {str(file)!r} as CSV ({error}): give cells between commas") from None
     if len(rows) < 2:
-        raise ScenarioError(f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples")
+        found = "no lines" if not rows else "only 1 line"
+        raise ScenarioError(f"{file} has {found}: give a first line with the columns' names, and samples")
     heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
     if wrong := next((i for i, row in enumerate(rows) if len(row) != len(heads)), None):
         raise ScenarioError(

@@ -265,6 +265,15 @@ class Rig:
         """Return the columns of a record that a replay reads, (K,) each. Raise ScenarioError as `fit` does."""
         return records.checked(record, self.columns, self.period, self.name)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each column that `fit` compares."""
+        if self.dynamics is not None:
+            return dict.fromkeys(self.columns.torque, "N m")
+        scenario = self.scenario("none")
+        joints = dict(zip(self.columns.x, scenario.plant.units, strict=False))
+        return joints | {self.columns.u: scenario.efforts[0]}
+
     @functools.cached_property
     def period(self) -> float | None:
         """The control period of closed-loop records, s; None for records of an open loop, which have their own."""
@@ -319,8 +328,8 @@ class Rig:
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
         """Raise ScenarioError if a record, of this fit, has degrees for radians.
 
-        Then it fits far better with all its angles, or those of a joint, in radians. A record that fits well is not
-        simulated again.
+        Then it fits far better with all its angles, those of a joint, or the references, in radians. A record that fits
+        well is not simulated again.
         """
         if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
             return
@@ -328,7 +337,9 @@ class Rig:
         each = [
             tuple(name for name in (x, *references[i : i + 1]) if name in record) for i, x in enumerate(self.columns.x)
         ]
-        suspects = list(dict.fromkeys([self.columns.angles, *((x,) for x in self.columns.x), *each]))
+        references = tuple(name for name in (self.columns.reference, *self.columns.others) if name in record)
+        sets = (self.columns.angles, *((x,) for x in self.columns.x), *each, references)
+        suspects = [names for names in dict.fromkeys(sets) if names]
         others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
         best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
         if min(others[best].values()) > max(FAR_BETTER, min(fit.values()) + FAR_BETTER):

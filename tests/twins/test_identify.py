@@ -162,6 +162,7 @@ def test_a_plants_own_parameters_are_found_from_a_run():
         (lambda run: smc.identify("emps", []), "there are no records: give at least one"),
         (lambda run: smc.identify("emps", "run.csv"), "record is 'run.csv': give a mapping of columns, such as"),
         (lambda run: smc.identify("emps", run, ["weight"]), "unknown quantity of emps 'weight': "),
+        (lambda run: smc.identify("emps", run, ["mass", "mass"]), "quantities have mass 2 times: name it once"),
         (lambda run: smc.identify("emps", run, []), "emps has no quantities to find: name some, of mass"),
         (lambda run: smc.identify("ip02", {"t": [0]}), "ip02 has no quantities to find: name some, of resistance"),
         (lambda run: smc.identify(3, run), "cannot identify 3: give a rig, the name of one, or a smc.Plant"),
@@ -186,7 +187,7 @@ def test_a_search_at_the_end_of_a_range_stays_within_it_to_the_last_bit():
 def test_a_poor_fit_is_said(found):
     assert found.notes == []
     poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
-    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, or the search ended in a valley")
+    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is another")
 
 
 def test_sets_that_the_records_allow_have_the_errors_and_the_correlations_found(found):
@@ -207,6 +208,14 @@ def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path)
     assert done.exit_code == 0, done.output
     assert re.search(r"delta +0\.[0-9]+ ", done.output)
     assert re.search(r" (99|100)\.\d \(", done.output)
+
+
+def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
+    columns = records.of_trace(moved, AXIS.columns)
+    long = {name: columns[name][:400] * (1e3 if name in "xr" else 1.0) for name in columns}  # mm in place of m
+    found = smc.identify(AXIS, long, starts=1, most=4)
+    assert any("in another unit" in note for note in found.notes)
+    assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
 
 def test_results_are_saved_and_drawn(found, tmp_path):
@@ -248,7 +257,8 @@ def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
     ("content", "sentence"),
     [
         ("t,x\n0,1\n1\n", "line 3: 1 cells for 2 columns: give one for each"),
-        ("t,x\n", "has 1 lines: give a first line with the columns' names, and samples"),
+        ("", "has no lines: give a first line"),
+        ("t,x\n", "has only 1 line: give a first line with the columns' names, and samples"),
     ],
 )
 def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path):

@@ -162,6 +162,7 @@ def changed(record, name, at, value):
         (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")}, "look like degrees"),
         (lambda r: r | {"alpha": np.rad2deg(r["alpha"])}, "the values of alpha of the record of qube_servo look like"),
         (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")}, "values of theta and target_theta of"),
+        (lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])}, "the values of target_theta and target_alpha of"),
         (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
     ],
 )  # fmt: skip
@@ -170,6 +171,12 @@ def test_bad_data_get_one_sentence(bad, sentence, record):
         QUBE.fit(bad(record))
     assert sentence in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_columns_have_the_units_of_the_machine():
+    assert QUBE.units == {"theta": "rad", "alpha": "rad", "plant_input": "V"}
+    assert smc.rig("emps").units == {"x": "m", "u": "V"}
+    assert smc.rig("realaigym_acrobot").units == {"tau_meas1": "N m", "tau_meas2": "N m"}
 
 
 def test_the_delay_is_a_whole_number_of_steps():

@@ -126,7 +126,8 @@ def replay(
 
         shown = {name: each.predictions([record])[0] for name, each in twins.items()}
         predicted = {name: each[0] for name, each in shown.items()}
-        terminal.wrote(*residual_figure(title, shown["twin"][2], shown["twin"][1], predicted, fits, figure))
+        _, measured, t = shown["twin"]
+        terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
     if film:
         repeated = run([each.replay(record, start, duration, rounded=False) for each in twins.values()])
         traces = [twin.measured(record, start, duration), *repeated]

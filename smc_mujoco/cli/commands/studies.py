@@ -193,7 +193,7 @@ def board(
     """Show RealAIGym's board of a robot, with this package's sliding-mode entry among the published rows.
 
     The task: swing the double pendulum up from rest and balance it, with one motor of 6 N m at the shoulder (pendubot)
-    or at the elbow (acrobot), in 10 s. Less is better in every criterion, more in the score. For a law of your own use
+    or at the elbow (acrobot), in 10 s. Less is better in every criterion, more in the score. For your own law use
     smc.boards, see docs/boards.md.
 
     Example: smc-mujoco board acrobot --figure acrobot --film acrobot.mp4
