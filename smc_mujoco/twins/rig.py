@@ -338,7 +338,7 @@ class Rig:
             tuple(name for name in (x, *references[i : i + 1]) if name in record) for i, x in enumerate(self.columns.x)
         ]
         references = tuple(name for name in (self.columns.reference, *self.columns.others) if name in record)
-        sets = (self.columns.angles, *((x,) for x in self.columns.x), *each, references)
+        sets = (self.columns.angles, *((name,) for name in (*self.columns.x, *references)), *each, references)
         suspects = [names for names in dict.fromkeys(sets) if names]
         others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
         best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
