@@ -253,7 +253,7 @@ class Loop:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
         xfrc, at = data.xfrc_applied.ravel(), self.channels
         xfrc[at["xfrc"]] = xfrc[at["push"]] = 0.0
-        self.push(data, t)
+        self.add_pushes(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
         for signal, memory, stream in zip(self.scenario.disturbance, self.signal_memory, self.streams, strict=True):
             if isinstance(signal, Push):
@@ -275,7 +275,7 @@ class Loop:
             raise Failure("the disturbance became NaN or inf")
         return d
 
-    def push(self, data: mujoco.MjData, t: float) -> None:
+    def add_pushes(self, data: mujoco.MjData, t: float) -> None:
         """Apply the disturbances that push one body each, at time t, s."""
         pushes = [one for one in self.scenario.disturbance if isinstance(one, Push)]
         bodies = [self.model.body(one.body).id for one in pushes]

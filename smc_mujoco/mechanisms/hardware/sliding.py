@@ -46,10 +46,14 @@ class Sliding(Friction):
         run, at qpos0.
     """
 
-    stateful = True
     names: ClassVar[tuple[str, ...]] = ()  # of the fields that the formula reads as p
 
     stiffness: PerJoint | None = dataclasses.field(default=None, kw_only=True)
+
+    @property
+    def stateful(self) -> bool:
+        """True: its force is held over each physics step, so RK4 would not make it more accurate."""
+        return True
 
     def __post_init__(self) -> None:
         self.check_each("stiffness", above=0.0)
