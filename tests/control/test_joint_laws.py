@@ -153,8 +153,8 @@ def test_time_delay_sliding_needs_no_model():
 
 
 def test_time_delay_sliding_is_stable_below_twice_the_inertia_and_not_above():
-    """For one joint with M = 1 / g the estimate's error is multiplied by 1 - m g each sample."""
-    plant = smc.plant("inverted_pendulum")
+    """For joints without coupling and M = 1 / g the estimate's error is multiplied by 1 - m g each sample."""
+    plant = smc.plant("inverted_pendulum_network", n=2, kc=0.0)
     M = plant.parameters["m"] * plant.parameters["l"] ** 2
     common = {"plant": plant, "reference": smc.Constant(0.0), "x0": 0.2, "duration": 0.5, "u_max": 1e9}
     stable = run(smc.law("time_delay_sliding", m=1.9 * M, k=1.0), **common)

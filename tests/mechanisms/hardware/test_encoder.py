@@ -346,7 +346,8 @@ def scattered(number):
     integrator = str(rng.choice(["RK4", "implicitfast", "Euler"]))
     step = 1e-3 if integrator == "RK4" else 2.5e-4
     name = str(rng.choice(smc.plants()))
-    plant = smc.plant(name, n=3) if smc.plant(name).sizes[1] > 2 else smc.plant(name)
+    least, most = smc.plant(name).sizes
+    plant = smc.plant(name, n=3) if least <= 3 <= most else smc.plant(name)
     return smc.Scenario(
         plant=plant,
         law=smc.law(str(rng.choice(["observer_free", "super_twisting"]))),
