@@ -8,8 +8,6 @@ Look for: the motor's torque at the same angle on the way up and down, which M6 
 that it still pushes upwards while it lets the load down.
 """
 
-import math
-
 import smc_mujoco as smc
 
 PENDULUM = smc.plant("inverted_pendulum", m=1.0, l=0.15)
@@ -26,12 +24,12 @@ def swinging(model):
 def torque(trace, up):
     passed = (trace.v < -0.1) & (trace.x <= ACROSS) if up else (trace.v > 0.1) & (trace.x >= ACROSS)
     found = -trace.force[passed]
-    return found[0] if len(found) else math.nan  # a short run does not get there
+    return found[0] if len(found) else float("nan")  # a short run does not get there
 
 
 def share(trace):
     down = torque(trace, up=False)
-    return torque(trace, up=True) / down if down else math.nan
+    return torque(trace, up=True) / down if down else float("nan")
 
 
 def answer(runs):

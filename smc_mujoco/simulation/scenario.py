@@ -286,7 +286,7 @@ class Scenario:
         """The physics step from which the jump holds; -1 without one."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
-    @functools.cached_property
+    @property
     def sliding(self) -> Sliding | None:
         """The friction by a formula, which the callback evaluates; None without one."""
         return next((part for part in self.friction if isinstance(part, Sliding)), None)

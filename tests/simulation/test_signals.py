@@ -24,6 +24,7 @@ from smc_mujoco.simulation.signals import (
     OrnsteinUhlenbeck,
     PerChannel,
     Pulse,
+    Push,
     Ramp,
     Recorded,
     Signal,
@@ -50,6 +51,7 @@ EVERY = [
     MinimumJerk(1.0, 0.2, 0.5),
     Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
 ]
+BLOW = Push("cart", x=2.0, z=-1.0, time=0.3, width=0.2)  # on a body, which not every plant has
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian)]  # what a reference may be
 
 
@@ -95,10 +97,10 @@ def refused(make, *parts):
 
 def test_every_kind_of_the_library_is_tested_here():
     kinds = {kind for kind in serialise._kinds(Signal).values() if kind.__module__.startswith("smc_mujoco.")}
-    assert kinds - {Recorded, PerChannel} == {type(signal) for signal in EVERY}
+    assert kinds - {Recorded, PerChannel} == {type(signal) for signal in [*EVERY, BLOW]}
 
 
-@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("signal", [*EVERY, BLOW], ids=lambda s: type(s).__name__)
 def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
     edges = np.array([0.1, 0.2, 0.25, 0.3, 0.305, 0.5, 0.7, 1.0, 1.3])
     times = np.sort(np.concatenate([np.arange(0.0, 1.6, 1e-3), edges, np.nextafter(edges, 2), np.nextafter(edges, 0)]))
@@ -485,7 +487,7 @@ def test_an_exported_trace_disturbs_another_run(tmp_path):
 # as data
 
 
-@pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("signal", [*EVERY, BLOW], ids=lambda s: type(s).__name__)
 def test_a_signal_survives_json(signal):
     made = scenario(disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0])
     assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
