@@ -42,6 +42,7 @@ STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
 UNDER_WAY = 1000  # most batches sent to workers and not finished; chosen
 ADDRESS = "dask://"
+LOGGERS = "distributed", "distributed.client", "tornado.application"  # those of dask that have a level of their own
 WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 Outcome = dict[str, Any]
@@ -219,10 +220,11 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
     with extra("cluster", f"executor {executor!r}"):
         from distributed import Client
         from distributed.scheduler import KilledWorker
-    log = logging.getLogger("distributed.client")  # an error is one sentence here, not also a traceback
-    before = log.level
+    logs = [logging.getLogger(name) for name in LOGGERS]  # an error is one sentence here, not also a traceback
+    before = [log.level for log in logs]
     try:
-        log.setLevel(logging.CRITICAL)
+        for log in logs:
+            log.setLevel(logging.CRITICAL)
         with Client(f"tcp://{executor.removeprefix(ADDRESS)}", timeout=WAIT, set_as_default=False) as client:
             with contextlib.suppress(TimeoutError):
                 client.wait_for_workers(1, timeout=WAIT)
@@ -236,7 +238,8 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
             f"no dask at {executor} ({error}): start `dask scheduler` and `dask worker` there"
         ) from None
     finally:
-        log.setLevel(before)
+        for log, level in zip(logs, before, strict=True):
+            log.setLevel(level)
 
 
 class _DaskExecutor(Executor):
