@@ -1,6 +1,6 @@
 """The notebooks as pages: their text and code, and below each cell what it shows when it runs.
 
-Outputs are kept with the figures, from one build of the site to the next, and made anew when the package changes.
+The site's cache keeps the outputs beside the figures. They are made again when the package changes.
 """
 
 import base64

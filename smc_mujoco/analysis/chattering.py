@@ -120,7 +120,7 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
-    """Return what `chattering` returns for a scenario; without `ranges` in half the time, and these are NaN."""
+    """Return what `chattering` returns; without `ranges` those of a predicted cycle are NaN, in half the time."""
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)

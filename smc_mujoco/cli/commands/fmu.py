@@ -84,10 +84,11 @@ def check_fmu(
         from smc_mujoco.simulation.fmu.load import check
 
     held = {}
-    for name, text in options.columns(constants or None).items():
+    for name, text in options.pairs(constants or None, "--constants", "enable=1").items():
         try:
             held[name] = float(text)
         except ValueError:
             raise ScenarioError(f"--constants: {name} is {text!r}: give a number, as {name}=0") from None
-    for line in check(file, timeout, variables=options.columns(variables or None), constants=held, period=period):
+    meant = options.pairs(variables or None, "--variables", "x=theta,u=torque")
+    for line in check(file, timeout, variables=meant, constants=held, period=period):
         print(line)

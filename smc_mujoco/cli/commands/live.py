@@ -67,13 +67,19 @@ def _serve(folder: Path, port: int, terminal: Terminal) -> None:
     import functools
     from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
+    from smc_mujoco.common.errors import ScenarioError
+
     class Quiet(SimpleHTTPRequestHandler):
         """A handler that prints no line for each request."""
 
         def log_message(self, format: str, *args: object) -> None:
             """Print nothing."""
 
-    with ThreadingHTTPServer(("127.0.0.1", port), functools.partial(Quiet, directory=str(folder))) as server:
+    try:
+        bound = ThreadingHTTPServer(("127.0.0.1", port), functools.partial(Quiet, directory=str(folder)))
+    except OSError as error:
+        raise ScenarioError(f"cannot serve at port {port} ({error.strerror}): give another --port") from None
+    with bound as server:
         terminal.note(f"open http://127.0.0.1:{server.server_port}/ (Ctrl-C ends it)")
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()

@@ -89,17 +89,22 @@ def json_file(json: Path | None) -> "tuple[Path | None, Terminal]":
     return terminal.printed, terminal
 
 
-def columns(text: str | None) -> dict[str, str]:
-    """Return the rig's name of a column -> the file's, from theta=arm_angle,t=time."""
+def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
+    """Return name -> text of an option such as theta=arm_angle,t=time; `example` is one of its kind."""
     from smc_mujoco.common.errors import ScenarioError
 
     found = {}
     for pair in names(text):
         ours, equals, theirs = pair.partition("=")
         if not (ours and equals and theirs):
-            raise ScenarioError(f"columns {pair!r} cannot be read: write them as theta=arm_angle,t=time")
+            raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
         found[ours.strip()] = theirs.strip()
     return found
+
+
+def columns(text: str | None) -> dict[str, str]:
+    """Return the rig's name of a column -> the file's, from theta=arm_angle,t=time."""
+    return pairs(text, "columns", "theta=arm_angle,t=time")
 
 
 def law(text: str) -> "str | Law":

@@ -13,7 +13,7 @@ its frame:
 
 m is the mass of the links, which scales all their masses and inertias; payload is that of a steel ball whose centre is
 the distance lp along the flange's axis from the flange. A mismatch or a jump adds kg to the payload, which is 0 by
-default. Each channel's nominal f has the other's commands; it is MuJoCo's own. The default reference is the maker's
+default. Each channel's nominal f has the others' commands; it is MuJoCo's own. The default reference is the maker's
 ready pose, `rest`; runs start from the home pose of mujoco_menagerie. The joints have no friction by
 default; `friction=smc.plant("panda").friction` is that which Gaz et al. identified.
 Source: masses, centres and inertias of the links: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca,

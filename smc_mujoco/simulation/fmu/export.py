@@ -47,10 +47,10 @@ def export_fmu(
     *,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
-    control_period: float = 1e-3,
-    u_max: float = math.inf,
+    control_period: float | None = None,
+    u_max: float | None = None,
     model: str | None = None,
-    joint: str = "hinge",
+    joint: str | None = None,
     binary: bool = True,
 ) -> Path:
     """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0, Co-Simulation. Return its path.
@@ -61,11 +61,11 @@ def export_fmu(
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
-      control_period: s; the law runs this often.
-      u_max: bound on |u|, N or N m; the parameter u_max of the FMU.
+      control_period: s; the law runs this often. Default: 1 ms.
+      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. Default: none.
       model: "nominal" gives the FMU the inputs f and g of x'' = f + g u. Default: "nominal" for a law that requires it,
         else "none".
-      joint: "hinge" for the units rad and N m, "slide" for m and N.
+      joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
     Inputs are x, v unless an estimator replaces it, the reference r, dr, ddr where the law reads it, and what else the
@@ -76,16 +76,17 @@ def export_fmu(
         compiler.
     """
     if isinstance(law, Scenario):
-        given = {"surface": surface, "velocity": velocity, "model": model}
-        law, about, joint = _of_scenario(law, given)
+        given = {"surface": surface, "velocity": velocity, "control_period": control_period}
+        law, about, joint = _of_scenario(law, given | {"u_max": u_max, "model": model, "joint": joint})
     else:
         about = {
             "surface": surface,
             "velocity": velocity,
-            "control_period": control_period,
-            "u_max": u_max,
+            "control_period": 1e-3 if control_period is None else control_period,
+            "u_max": math.inf if u_max is None else u_max,
             "model": model,
         }
+        joint = "hinge" if joint is None else joint
     find("joint", joint, description.JOINTS)
     controller = _controller(law, **about)
     identifier = _identifier(controller.law.name)

@@ -116,7 +116,7 @@ def attempt(order: dict[str, Any], progress: Any) -> None:
 def main(file: str) -> None:
     """Carry out the order in a JSON file."""
     order = json.loads(Path(file).read_text(encoding="utf-8"))
-    with Path(order["progress"]).open("w", buffering=1) as progress:
+    with Path(order["progress"]).open("w", buffering=1, encoding="utf-8") as progress:
         try:
             attempt(order, progress)
         except Exception as error:

@@ -363,7 +363,7 @@ def test_a_formula_that_raises_ends_its_own_run_with_a_sentence():
 
 @dataclasses.dataclass(frozen=True)
 class Failing(Sliding):
-    """A friction that raises below 0.5 m/s."""
+    """A friction that raises below 0.99 m/s."""
 
     @staticmethod
     def value(v, motor, load, p):

@@ -99,7 +99,7 @@ def test_runs_have_instances_of_their_own_which_end_with_them(folder):
 
 
 def test_a_memory_that_is_set_to_0_begins_again_and_ends_what_ran(folder):
-    law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "anew.fmu"), isolate=False)()
+    law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "written_again.fmu"), isolate=False)()
     assert law.function is not None
     y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
     first, second = [law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3)]
