@@ -21,12 +21,15 @@ def _kill(process: subprocess.Popen[str]) -> None:
         process.kill()
 
 
-def timed(command: Sequence[str], timeout: float, output: bool = True) -> subprocess.CompletedProcess[str]:
+def timed(
+    command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a command, and stop it and every process that it started when its time is up.
 
     Args:
       timeout: s.
       output: whether to keep what it prints. A user's code may print without end and fill the memory.
+      cwd: the folder that it runs in. Default: the present one.
 
     Raises:
       TimedOut: its time was up.
@@ -35,6 +38,7 @@ def timed(command: Sequence[str], timeout: float, output: bool = True) -> subpro
     pipe = subprocess.PIPE if output else subprocess.DEVNULL
     process = subprocess.Popen(
         command,
+        cwd=cwd,
         stdin=subprocess.DEVNULL,
         stdout=pipe,
         stderr=pipe,

@@ -5,6 +5,7 @@ import importlib.util
 import json
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +25,13 @@ RUNNER = (
 import fs from "node:fs";
 import loadMujoco from "./vendor/mujoco.js";
 import { trace } from "./engine.js";
-import { laws } from "./laws.js";
+import * as functions from "./components.js";
 const facts = read(fs.readFileSync("facts.json", "utf8"));
 const mujoco = await loadMujoco();
 const vfs = new mujoco.MjVFS();
 for (const [name, text] of Object.entries(facts.includes)) vfs.addBuffer(name, new TextEncoder().encode(text));
 const cases = read(fs.readFileSync(0, "utf8"));
-console.log(JSON.stringify(cases.map(([chosen, duration]) => trace(mujoco, vfs, facts, laws, chosen, duration))));
+console.log(JSON.stringify(cases.map(([chosen, duration]) => trace(mujoco, vfs, facts, functions, chosen, duration))));
 """
 )
 
@@ -80,12 +81,18 @@ def scenario(chosen: dict[str, Any], duration: float) -> smc.Scenario:
     law = gain_sets.law(plant, name) if smc.plant(plant).n == 1 else smc.law(name)
     law = dataclasses.replace(law, gains={**law.gains, **given.pop("gains", {})})
     fields: dict[str, Any] = {}
-    for key, make in (
-        ("friction", smc.Coulomb), ("noise", lambda n: smc.Noise(**n)), ("reference", smc.Constant),
-        ("disturbance", lambda d: smc.Sine(**d)),
-    ):  # fmt: skip
-        if key in given:
-            fields[key] = make(given.pop(key))
+    makers: dict[str, Callable[[Any], Any]] = {
+        "friction": smc.Coulomb,
+        "noise": lambda n: smc.Noise(**n),
+        "reference": smc.Constant,
+        "disturbance": lambda d: smc.Sine(**{"amplitude": 0.0} | d),
+        "surface": lambda s: smc.surface(s["name"], **s.get("gains", {})),
+        "velocity": lambda v: smc.estimator(v["name"], **v.get("gains", {})),
+    }
+    for key in makers.keys() & given.keys():
+        fields[key] = makers[key](given.pop(key))
+    if "counts" in given:
+        fields["sensor"] = smc.Encoder(counts=given.pop("counts"))
     if "mass" in given:
         fields["mismatch"] = {"mass": given.pop("mass")}
     return smc.Scenario(plant=plant, law=law, duration=duration, **fields, **given)

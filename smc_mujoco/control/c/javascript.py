@@ -1,4 +1,4 @@
-"""Laws in JavaScript, for a browser: the C of a law with the syntax that differs.
+"""Laws, surfaces and velocity estimators in JavaScript, for a browser: their C with the syntax that differs.
 
 The C that `translate` writes has numbers of 64 bits and few kinds of statements, all of which JavaScript has, too. So
 it is rewritten line by line. Results differ from those of the C only where the two libraries' tanh, exp or pow do,
@@ -28,33 +28,35 @@ MATHEMATICAL = set(MATH) - set(WRITTEN_OUT)
 WORD = re.compile(r"(?<![\w.>$])[A-Za-z_]\w*")
 
 
-def law_to_js(law: Component) -> str:
-    """Return a law of one channel as an expression in JavaScript: a function (y, gains, memory, out).
+def to_js(component: Component) -> str:
+    """Return a component of one channel as an expression in JavaScript: a function (y, gains, memory, out).
 
-    `y` has the measurement's fields by name. `gains` and `memory` are arrays; gains are in the law's order. The results
-    u and s go to out[0] and out[1].
+    `y` has the fields of the measurement, or of an estimator's reading, by name. `gains` and `memory` are arrays; gains
+    are in the component's order. Its two results go to out[0] and out[1]. The acceleration of an estimator that gives
+    none is NaN.
 
     Raises:
-      ScenarioError: the law uses Python without translation, which is quoted.
+      ScenarioError: the component uses Python without translation, which is quoted.
     """
-    if isinstance(law.function, AtAddress):
-        raise ScenarioError(f"law {law.name!r} is a C function, which no browser runs: give it in Python")
-    if law.joint or law.of_channel(0) is not law:
-        raise ScenarioError(f"law {law.name!r} is of several joints: give one of a single joint")
+    what = f"{component.kind} {component.name!r}"
+    if isinstance(component.function, AtAddress):
+        raise ScenarioError(f"{what} is a C function, which no browser runs: give it in Python")
+    if component.joint or component.of_channel(0) is not component:
+        raise ScenarioError(f"{what} is of several joints: give one of a single joint")
     try:
-        _, code = translate(law, single=False)
+        _, code = translate(component, single=False)
     except Untranslatable as error:
-        raise ScenarioError(f"law {law.name!r} cannot be written in JavaScript: {error}") from None
+        raise ScenarioError(f"{what} cannot be written in JavaScript: {error}") from None
     if re.search(r"\bfloat\b", code):
-        raise ScenarioError(f"law {law.name!r} computes in numbers of 32 bits: give one of 64 bits")
-    places = [f"const GAIN_{plain(name)} = {i};" for i, name in enumerate(law.gains)]
+        raise ScenarioError(f"{what} computes in numbers of 32 bits: give one of 64 bits")
+    places = [f"const GAIN_{plain(name)} = {i};" for i, name in enumerate(component.gains)]
     helpers = [text for name, text in WRITTEN_OUT.items() if re.search(rf"\b{name}\(", code)]
-    body = "\n".join(["'use strict';", *places, *helpers, _rewritten(code), "return smc_law;"])
+    body = "\n".join(["'use strict';", *places, *helpers, _rewritten(code), f"return smc_{component.kind};"])
     return f"(() => {{\n{body}\n}})()"
 
 
 def _rewritten(code: str) -> str:
-    """Return the functions and constant arrays of a law's C in JavaScript."""
+    """Return the functions and constant arrays of some C in JavaScript."""
     code = _arrays(WORD.sub(_word, code))
     code = re.sub(r"^ *\(void\)[\w$]+;\n", "", code, flags=re.MULTILINE)
     code = re.sub(r"\n\{\n(.*?)\n\}(?=\n|$)", _body, code, flags=re.DOTALL)

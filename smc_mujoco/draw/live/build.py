@@ -1,19 +1,21 @@
-"""The live page as a folder: the page's own files, the facts, the laws in JavaScript, and the packages from npm."""
+"""The live page as a folder: its own files, the facts, laws and the like in JavaScript, and the packages from npm."""
 
 import contextlib
 import json
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.common.files import plain
-from smc_mujoco.control.c.javascript import law_to_js
+from smc_mujoco.control import estimator, surface
+from smc_mujoco.control.c.javascript import to_js
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.control.law import laws as laws_for
+from smc_mujoco.control.properties import reads
 from smc_mujoco.draw.live import facts as known
 from smc_mujoco.draw.live import npm
 from smc_mujoco.mechanisms.plant import Plant
@@ -47,25 +49,40 @@ def live(
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
     chosen = known.checked(names or PLANTS)
     own = [_own(law) for law in taken("laws", laws)]
-    functions = {law.name: law_to_js(law) for law in own}
-    library = [law for law in _library(chosen) if law.name not in functions]
-    for law in library:
+    functions = {("law", law.name): to_js(law) for law in own}
+    offered = list(own)
+    for one in _library(chosen):
         with contextlib.suppress(ScenarioError):  # of one that no browser runs, such as a law in C
-            functions[law.name] = law_to_js(law)
-    page = known.facts(chosen, [law for law in library if law.name in functions], own)
+            if (one.kind, one.name) not in functions:
+                functions[one.kind, one.name] = to_js(one)
+                offered.append(one)
+    page = known.facts(chosen, offered, own)
     folder = _free(Path(out))
     vendor = npm.fetched()
     shutil.copytree(PAGE, folder, dirs_exist_ok=True)
     shutil.copytree(vendor, folder / "vendor", dirs_exist_ok=True)
-    entries = ",\n".join(f"{json.dumps(name)}: {text}" for name, text in functions.items())
-    (folder / "laws.js").write_text(f"export const laws = {{\n{entries},\n}};\n", encoding="utf-8")
+    (folder / "components.js").write_text(_script(functions), encoding="utf-8")
     (folder / MARK).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
     return folder / "index.html"
 
 
 def _library(chosen: Sequence[Plant]) -> list[Component]:
-    """Return the laws of the library that suit one of the plants."""
-    return [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
+    """Return the library's laws that suit one of the plants, its surfaces and its velocity estimators.
+
+    Without the surfaces that read an acceleration, which are for actuators with a lag.
+    """
+    laws = [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
+    surfaces = [template() for template in surface.catalogue().values() if "a" not in reads(template)]
+    return [*laws, *surfaces, *(template() for template in estimator.catalogue().values())]
+
+
+def _script(functions: Mapping[tuple[str, str], str]) -> str:
+    """Return a module that exports laws, surfaces and estimators: each an object of functions by name."""
+    lines = []
+    for kind in ("law", "surface", "estimator"):
+        entries = [f"{json.dumps(name)}: {text},\n" for (of, name), text in functions.items() if of == kind]
+        lines.append(f"export const {kind}s = {{\n{''.join(entries)}}};\n")
+    return "".join(lines)
 
 
 def _own(law: object) -> Component:

@@ -1,4 +1,4 @@
-"""What the live page knows of plants and laws, as data for facts.json.
+"""What the live page knows of plants, laws, surfaces and velocity estimators, as data for facts.json.
 
 Labels, formulas, colours, gains and their ranges come from the catalogues; the numbers of a model from the plant. The
 page loads the plant's MJCF and sets the same fields of the model as a run does.
@@ -17,21 +17,24 @@ import numpy as np
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.docstring import entry
-from smc_mujoco.control.law import fits, laws
+from smc_mujoco.control.law import Measurement, fits, laws
 from smc_mujoco.control.properties import reads
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Field, Plant, array, as_plant, catalogue, model_path
+from smc_mujoco.simulation import controller
 from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
 
 MODEL = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
 AROUND = 10.0  # factor on either side of a gain whose range tuning does not know: chosen
+ACRONYM = 3  # letters: such a name is one, as PID
 START = ("observer_free", "classical")  # the laws that the page opens with: the paper's, and the first of all
 
 
@@ -65,10 +68,12 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
     return found
 
 
-def facts(chosen: Sequence[Plant], library: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
-    """Return what the page knows of these plants, of laws of the library, and of the user's own laws."""
-    known = {law.name: law for law in (*library, *own)}
-    suited = {plant.name: [law for law in known.values() if _suits(law, plant)] for plant in chosen}
+def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
+    """Return what the page knows of these plants and of the components that it offers, the user's own laws among them.
+
+    The numbers of a step are the engine's: how long it is, where its last stage is, and which state has diverged.
+    """
+    kinds = {kind: [one for one in offered if one.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
         "version": __version__,
         "includes": {name: model_path(name).read_text(encoding="utf-8") for name in _included(chosen)},
@@ -76,43 +81,52 @@ def facts(chosen: Sequence[Plant], library: Sequence[Component], own: Sequence[C
         "max_step": defaults.MAX_STEP,
         "realistic_step": defaults.REALISTIC_STEP,
         "control_period": defaults.Scenario.control_period,
+        "last_stage": controller.LAST_STAGE,
+        "max_state": controller.MAX_STATE,
+        "max_control": controller.MAX_CONTROL,
         "own": [law.name for law in own],
-        "plants": {plant.name: _plant(plant, suited[plant.name], own) for plant in chosen},
-        "laws": {name: _law(law) for name, law in known.items()},
+        "plants": {plant.name: _plant(plant, kinds, own) for plant in chosen},
+        "laws": {law.name: _component(law) | _law(law) for law in kinds["law"]},
+        "surfaces": {one.name: _component(one) for one in kinds["surface"]},
+        "estimators": {one.name: _component(one) for one in kinds["estimator"]},
     }
 
 
-def _suits(law: Component, plant: Plant) -> bool:
-    """Return whether the page offers a law on a plant."""
-    return law.name in laws(plant) if law.name in laws() else fits(law, plant)
+def _component(one: Component) -> dict[str, Any]:
+    """Return the facts about a law, surface or estimator that the page shows and the engine needs."""
+    parts = entry(one.template) if one.template is not None and one.template.doc else None
+    name = one.name.rstrip("_")
+    return {
+        "label": name.upper() if len(name) <= ACRONYM else style.in_words(name),
+        "formula": parts.formula if parts and parts.formula != one.name else "",
+        "source": parts.source if parts else "",
+        "order": list(one.gains),
+        "gains": dict(one.gains),
+        "memory": one.memory,
+    }
 
 
 def _law(law: Component) -> dict[str, Any]:
-    """Return the facts about a law."""
-    template = law.template
-    parts = entry(template) if template is not None and template.doc else None
-    reading = template is None or bool(reads(template) & MODEL)
+    """Return the facts that only laws have."""
+    read = reads(law.template) if law.template is not None else frozenset(Measurement._fields)
     return {
         "label": style.law_name(law),
         "colour": style.law_colour(law),
         "colour_dark": _lighter(style.law_colour(law)),
-        "formula": parts.formula if parts and parts.formula != law.name else "",
-        "source": parts.source if parts else "",
-        "family": template.family if template is not None else "",
-        "order": list(law.gains),
-        "gains": dict(law.gains),
-        "memory": law.memory,
+        "family": law.template.family if law.template is not None else "",
         "requires_model": law.requires_model,
-        "model_optional": reading and not law.requires_model,
-        "reads_model": reading,
+        "reads_model": bool(read & MODEL),
+        "takes_surface": "has_surface" in read and law.relative_degree == 1,
     }
 
 
-def _plant(plant: Plant, offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
+def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence[Component]) -> dict[str, Any]:
     """Return the facts about a plant, with the gains of the laws that are offered on it, the user's own first."""
     model = mujoco.MjModel.from_xml_path(str(_mjcf(plant)))
     joints = [model.joint(int(joint)) for joint in joint_ids(model)]
     resolved = defaults.Scenario(plant=plant, law="none").resolved
+    suited = set(laws(plant))
+    offered = [law for law in kinds["law"] if (law.name in suited if law.name in laws() else fits(law, plant))]
     gains = {law.name: _gains(law, plant, law in own) for law in offered}
     return {
         "label": style.plant_name(plant),
@@ -126,14 +140,16 @@ def _plant(plant: Plant, offered: Sequence[Component], own: Sequence[Component])
             for joint, unit in zip(joints, plant.units, strict=True)
         ],
         "ctrl": int(drive_ids(model)[0]),
-        "smooth": plant.smooth,
         "extent": float(model.stat.extent),  # m, of the picture
         "center": model.stat.center.tolist(),
         "fields": _fields(model, plant),
+        "skins": _skins(plant),
         "friction": [_part(model, field) for field in Coulomb(1.0).fields(model)],
         "laws": list(gains),
-        "gains": {name: values for name, (values, _) in gains.items()},
-        "ranges": {name: ranges for name, (_, ranges) in gains.items()},
+        "gains": gains,
+        "ranges": {law.name: _ranges(law, plant, gains[law.name]) for law in offered},
+        "surface_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["surface"]},
+        "estimator_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["estimator"]},
         "start": _opening([law.name for law in own if law.name in gains], list(gains)),
         "started": max(range(plant.n), key=lambda i: abs(resolved.x0[i])),
         "beside": abs(plant.lane[0]) > abs(plant.lane[1]),
@@ -213,6 +229,39 @@ def _written(model: mujoco.MjModel, plant: Plant, factor: float) -> dict[str, np
     return found
 
 
+def _skins(plant: Plant) -> list[dict[str, Any]]:
+    """Return the skins that the plant's build adds to its MJCF, such as springs; lengths in m.
+
+    A vertex follows the bodies of the skin's bones, each with a weight.
+    """
+    model, found = compiled(plant.spec()), []
+    for i in range(model.nskin):
+        first, count = model.skin_vertadr[i], model.skin_vertnum[i]
+        face, faces = model.skin_faceadr[i], model.skin_facenum[i]
+        bones = range(model.skin_boneadr[i], model.skin_boneadr[i] + model.skin_bonenum[i])
+        weights = np.zeros((count, len(bones)))
+        for column, bone in enumerate(bones):
+            at = slice(model.skin_bonevertadr[bone], model.skin_bonevertadr[bone] + model.skin_bonevertnum[bone])
+            weights[model.skin_bonevertid[at], column] = model.skin_bonevertweight[at]
+        found.append(
+            {
+                "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
+                "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
+                "faces": model.skin_face[face : face + faces].ravel().tolist(),
+                "weights": weights.round(5).ravel().tolist(),
+                "bones": [
+                    {
+                        "body": model.body(int(model.skin_bonebodyid[bone])).name,
+                        "position": model.skin_bonebindpos[bone].tolist(),
+                        "quaternion": model.skin_bonebindquat[bone].tolist(),
+                    }
+                    for bone in bones
+                ],
+            }
+        )
+    return found
+
+
 def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
     """Return a part's write into a field, by places in the flat field."""
     values = array(model, field.name)
@@ -225,26 +274,31 @@ def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
     }
 
 
-def _gains(law: Component, plant: Plant, own: bool) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Return a law's gains on a plant, those of the library's laws tuned if they can be, and the sliders' ranges."""
+def _gains(law: Component, plant: Plant, own: bool) -> dict[str, float]:
+    """Return a law's gains on a plant: those of the library's laws tuned, if they can be."""
     values = dict(law.gains)
     if not own:
         with contextlib.suppress(ScenarioError):
             values = dict(gain_sets.law(plant, law.name).gains)
-    try:
-        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=law.requires_model)
-        known: Mapping[str, tuple[float, float]] = search_space.box(law, scales)
-    except ScenarioError:
-        known = {}
+    return values
+
+
+def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[str, list[float]]:
+    """Return gain -> the ends of its slider, for the gains of a component that are to choose."""
+    known: Mapping[str, tuple[float, float]] = {}
+    with contextlib.suppress(ScenarioError):
+        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=one.requires_model)
+        if one.kind != "estimator":  # whose scales are those of noise and sampling, not the plant's
+            known = search_space.box(one, scales)
     ranges = {}
     for name, value in values.items():
         if name in known:
             ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
-        elif 0.0 < value < float("inf") and _free(law, name):
+        elif 0.0 < value < float("inf") and _free(one, name):
             ranges[name] = [value / AROUND, value * AROUND]
-    return values, ranges
+    return ranges
 
 
-def _free(law: Component, name: str) -> bool:
+def _free(one: Component, name: str) -> bool:
     """Return whether a gain is one to choose, and not an initial value, an exponent or the like."""
-    return law.template is None or not law.template.gains[name].held
+    return one.template is None or not one.template.gains[name].held

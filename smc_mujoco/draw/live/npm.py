@@ -8,7 +8,6 @@ import hashlib
 import importlib.util
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from importlib.metadata import files
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from smc_mujoco.common import extras
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.process import TimedOut, timed
 
 PINNED = Path(__file__).parent / "packages"
 # File of a package -> its name in vendor/.
@@ -87,10 +87,8 @@ def npm() -> list[str]:
 def _install(command: list[str], folder: Path) -> None:
     """Install the pinned packages in a folder."""
     try:
-        done = subprocess.run(
-            [*command, "ci", *FLAGS], cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False
-        )
-    except subprocess.TimeoutExpired:
+        done = timed([*command, "ci", *FLAGS], TIMEOUT, cwd=folder)
+    except TimedOut:
         raise ScenarioError("npm did not fetch the live page's packages within 10 minutes: try again later") from None
     if done.returncode:
         lines = done.stderr.strip().splitlines()

@@ -1,4 +1,4 @@
-"""Laws in JavaScript: each gives the numbers of its Python, and what cannot be translated is said."""
+"""Laws, surfaces and estimators in JavaScript: each gives the numbers of its Python; what has none is said."""
 
 import json
 import math
@@ -10,18 +10,20 @@ import pytest
 from helpers.live import READ, node
 
 import smc_mujoco as smc
-from smc_mujoco.control.c.javascript import law_to_js
+from smc_mujoco.control import estimator, surface
+from smc_mujoco.control.c.javascript import to_js
+from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement, catalogue
 
-CALLS = 40  # of each law, with random measurements and one memory
+CALLS = 40  # of each component, with random measurements and one memory
 SCRIPT = """
 import fs from "node:fs";
-import { laws } from "./laws.js";
+import { components } from "./components.js";
 const given = read(fs.readFileSync(0, "utf8"));
 const results = {};
 for (const [name, { gains, memory, measurements }] of Object.entries(given)) {
   const held = new Float64Array(memory);
-  results[name] = measurements.map((y) => { const out = [0, 0]; laws[name](y, gains, held, out); return out; });
+  results[name] = measurements.map((y) => { const out = [0, 0]; components[name](y, gains, held, out); return out; });
 }
 console.log(JSON.stringify(results));
 """
@@ -34,22 +36,32 @@ def measured(rng: random.Random, k: int) -> dict[str, float]:
     return y | ({"e": 0.0, "de": 0.0} if k % 7 == 0 else {})
 
 
-def compared(laws, tmp_path) -> dict[str, float]:
-    """The largest relative difference between the JavaScript of each law and its Python."""
+def outputs(component, y, gains, memory) -> tuple[float, float]:
+    """The two results of a component's Python; NaN for the acceleration of an estimator that gives none."""
+    function = getattr(component.function, "py_func", component.function)
+    found = function(
+        (Reading(y["dt"], y["x"], y["v"]) if component.kind == "estimator" else Measurement(**y)), gains, memory
+    )
+    first, second = found if isinstance(found, tuple) else (found, math.nan)
+    return float(first), float(second)
+
+
+def compared(components, tmp_path) -> dict[str, float]:
+    """The largest relative difference between the JavaScript of each component and its Python."""
     given, expected, rng = {}, {}, random.Random(1)
-    for law in laws:
-        memory, rows = np.zeros(law.memory), [measured(rng, k) for k in range(CALLS)]
-        function = getattr(law.function, "py_func", law.function)
-        gains = SimpleNamespace(**law.gains)
-        expected[law.name] = [tuple(map(float, function(Measurement(**y), gains, memory))) for y in rows]
-        given[law.name] = {"gains": list(law.gains.values()), "memory": law.memory, "measurements": rows}
-    entries = ",\n".join(f"{json.dumps(law.name)}: {law_to_js(law)}" for law in laws)
-    (tmp_path / "laws.js").write_text(f"export const laws = {{{entries}}};")
+    for one in components:
+        memory, rows = np.zeros(one.memory), [measured(rng, k) for k in range(CALLS)]
+        gains = SimpleNamespace(**one.gains)
+        expected[one.name] = [outputs(one, y, gains, memory) for y in rows]
+        given[one.name] = {"gains": list(one.gains.values()), "memory": one.memory, "measurements": rows}
+    entries = ",\n".join(f"{json.dumps(one.name)}: {to_js(one)}" for one in components)
+    (tmp_path / "components.js").write_text(f"export const components = {{{entries}}};")
     found = node(READ + SCRIPT, tmp_path, given)
     differences = {}
     for name, rows in expected.items():
-        pairs = zip(np.ravel(found[name]), np.ravel(rows), strict=True)
-        differences[name] = max(abs(a - b) / (1.0 + abs(b)) for a, b in pairs)
+        pairs = zip(np.ravel(np.array(found[name], float)), np.ravel(rows), strict=True)  # JSON has null for NaN
+        alike = [(a, b) for a, b in pairs if not (math.isnan(a) and math.isnan(b))]
+        differences[name] = max(abs(a - b) / (1.0 + abs(b)) for a, b in alike)
     return differences
 
 
@@ -57,6 +69,13 @@ def test_every_law_gives_the_numbers_of_its_python(tmp_path):
     laws = [template() for name, template in catalogue().items() if name != "observer_free_single"]
     found = compared(laws, tmp_path)
     assert len(found) > 40
+    assert {name: difference for name, difference in found.items() if not difference < 1e-13} == {}
+
+
+@pytest.mark.parametrize("known", [surface.catalogue, estimator.catalogue])
+def test_every_surface_and_estimator_gives_the_numbers_of_its_python(tmp_path, known):
+    found = compared([template() for template in known().values()], tmp_path)
+    assert len(found) >= 8
     assert {name: difference for name, difference in found.items() if not difference < 1e-13} == {}
 
 
@@ -93,7 +112,7 @@ def test_whole_numbers_and_loops_are_as_in_python(tmp_path):
 )
 def test_a_law_without_javascript_says_why(law, sentence):
     with pytest.raises(smc.ScenarioError, match=sentence):
-        law_to_js(law())
+        to_js(law())
 
 
 def test_a_law_that_calls_a_library_is_quoted():
@@ -102,4 +121,4 @@ def test_a_law_that_calls_a_library_is_quoted():
         return np.sinc(y.e), y.e
 
     with pytest.raises(smc.ScenarioError, match=r"cannot be written in JavaScript: .*sinc"):
-        law_to_js(reads())
+        to_js(reads())

@@ -75,7 +75,7 @@ def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, cap
     assert found["own"] == ["tamed", "slow", "pid"]
     assert found["plants"]["duffing"]["start"] == ["tamed", "slow"]
     assert (gains["slow"]["k"], gains["pid"]["kp"]) == (2.0, 50.0)
-    assert "Math.tanh" in (tmp_path / "page" / "laws.js").read_text()
+    assert "Math.tanh" in (tmp_path / "page" / "components.js").read_text()
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,14 @@
 // One simulation of a plant under a law: the scenario of smc_mujoco, with MuJoCo's WebAssembly build.
 //
 // It does what the package's control callback does, in the same order. At each control sample
-//     state -> noise -> law -> saturation -> delay buffer
+//     state -> noise -> encoder -> velocity estimator -> surface -> law -> saturation -> delay buffer
 // and at each physics step the command whose delay has passed goes to the actuator and is held. Time counts in steps.
 // Nothing here knows the page, so that node runs it as well.
 
-const MAX_STATE = 1e6; // SI units: a run beyond it has diverged
-const LAST_STAGE = 1 - 1e-8; // of a step: where the last stage of RK4 evaluates signals
-const MAX_CONTROL = 1e10;
+const PARTS = ["law", "surface", "velocity"]; // of a controller
+
+// The velocity estimator where none is chosen: an encoder measures no velocity.
+export const estimatorFor = (counts) => (counts ? "filtered_difference" : "measured");
 
 // Return the scenario for what the reader has chosen; `facts` are the numbers that the package wrote.
 export function scenario(facts, chosen) {
@@ -16,12 +17,15 @@ export function scenario(facts, chosen) {
   const given = Object.fromEntries(Object.entries(chosen).filter(([, value]) => value !== undefined));
   const s = {
     x0: plant.x0, reference: 0, u_max: plant.u_max, control_period: facts.control_period, input_delay: 0, friction: 0,
-    mass: 1, seed: 0, noise: { position: 0, velocity: 0 }, disturbance: { amplitude: 0, omega: 5 },
+    mass: 1, seed: 0, noise: { position: 0, velocity: 0 }, disturbance: { amplitude: 0, omega: 0 },
     model: law.requires_model ? "nominal" : "none",
+    counts: 0, // of the encoder; 0 for none
+    surface: null, // {name, gains}; null for the law's own
+    velocity: { name: estimatorFor(chosen.counts) }, // {name, gains} of the estimator
     ...given,
-    gains: { ...law.gains, ...plant.gains[chosen.law], ...chosen.gains },
+    gains: { ...plant.gains[chosen.law], ...chosen.gains },
   };
-  s.realistic = s.friction > 0 || !plant.smooth;
+  s.realistic = s.friction > 0;
   const largest = s.realistic ? facts.realistic_step : facts.max_step;
   s.steps = Math.ceil(s.control_period / largest - 1e-9);
   s.physics_step = s.control_period / s.steps;
@@ -29,20 +33,57 @@ export function scenario(facts, chosen) {
   return s;
 }
 
+// A law, surface or velocity estimator with its gains, and with a memory for each channel.
+class Component {
+  constructor(name, known, call, gains, channels) {
+    Object.assign(this, { name, known, call, gains: { ...known.gains, ...gains }, channels });
+    this.setGains({});
+    this.reset();
+  }
+
+  setGains(gains) {
+    Object.assign(this.gains, gains);
+    this.values = this.known.order.map((name) => this.gains[name]);
+  }
+
+  reset() {
+    this.memories = Array.from({ length: this.channels }, () => new Float64Array(this.known.memory));
+  }
+
+  // Go on with the memory of another one, if that is of the same kind.
+  resume(other) {
+    if (other?.name === this.name) this.memories = other.memories.map((memory) => memory.slice());
+  }
+
+  // Write the two results for channel i to `out`.
+  run(y, i, out) {
+    this.call(y, this.values, this.memories[i], out);
+  }
+
+  // The same, without a change of the memory.
+  peek(y, i, out) {
+    this.call(y, this.values, this.memories[i].slice(), out);
+  }
+}
+
 export class Simulation {
-  // mujoco: the module. vfs: an MjVFS with the files that models include. laws: name -> function.
-  constructor(mujoco, vfs, facts, laws, chosen) {
+  // mujoco: the module. vfs: an MjVFS with the files that models include. functions: laws, surfaces and estimators,
+  // name -> function each.
+  constructor(mujoco, vfs, facts, functions, chosen) {
     this.mujoco = mujoco;
     this.facts = facts;
     this.chosen = chosen;
     this.s = scenario(facts, chosen);
     this.plant = facts.plants[chosen.plant];
-    this.lawFacts = facts.laws[chosen.law];
-    this.law = laws[chosen.law];
+    const { s, plant } = this;
+    const made = (kind, { name, gains }) => new Component(name, facts[kind][name], functions[kind][name], gains, plant.channels.length);
+    this.law = made("laws", { name: chosen.law, gains: s.gains });
+    this.surface = s.surface && made("surfaces", s.surface);
+    this.velocity = made("estimators", s.velocity);
     this.model = this.compile(vfs, true);
     this.data = new mujoco.MjData(this.model);
     // what a law may know: the nominal mechanism, without friction and with the nominal mass
-    this.nominal = this.lawFacts.reads_model ? this.compile(vfs, false) : null;
+    this.nominal = this.law.known.reads_model ? this.compile(vfs, false) : null;
     this.nominalData = this.nominal && new mujoco.MjData(this.nominal);
     this.reset();
   }
@@ -77,15 +118,14 @@ export class Simulation {
 
   // Go back to the initial state.
   reset() {
-    const { mujoco, plant, s, lawFacts } = this;
+    const { mujoco, plant, s } = this;
     mujoco.mj_resetData(this.model, this.data);
     plant.channels.forEach((channel, i) => (this.data.qpos[channel.qpos] = s.x0[i]));
     mujoco.mj_forward(this.model, this.data);
     this.step = 0; // physics steps done
     this.failed = null; // why and when, once it has
     this.push = new Float64Array(this.model.nv); // generalised force of the reader's hand
-    this.memory = new Float64Array(lawFacts.memory);
-    this.gains = lawFacts.order.map((name) => s.gains[name]);
+    for (const part of PARTS) this[part]?.reset();
     this.commands = new Float64Array(Math.floor(s.delay_steps / s.steps) + 2); // a ring
     this.y = {};
     this.out = [0, 0];
@@ -93,23 +133,17 @@ export class Simulation {
     this.views = null;
   }
 
-  // Go on from the state of another simulation of the same plant and law.
+  // Go on from the state of another simulation of the same plant.
   resume(other) {
     this.data.qpos.set(other.data.qpos);
     this.data.qvel.set(other.data.qvel);
     this.mujoco.mj_forward(this.model, this.data);
     this.step = Math.round(other.time / this.s.control_period) * this.s.steps;
-    this.memory.set(other.memory);
+    for (const part of PARTS) this[part]?.resume(other[part]);
     this.commands.fill(other.latest.u);
     this.push.set(other.push);
     this.latest = other.latest;
     this.failed = other.failed;
-  }
-
-  // Change the gains of a running law.
-  setGains(gains) {
-    this.s.gains = { ...this.s.gains, ...gains };
-    this.gains = this.lawFacts.order.map((name) => this.s.gains[name]);
   }
 
   get time() {
@@ -136,7 +170,7 @@ export class Simulation {
     const { s, plant } = this;
     const { qpos, qvel, ctrl } = this.arrays;
     const sampled = this.step % s.steps === 0;
-    if (![...qpos, ...qvel].every((value) => Math.abs(value) < MAX_STATE)) return this.fail("diverged");
+    if (![...qpos, ...qvel].every((value) => Math.abs(value) < this.facts.max_state)) return this.fail("diverged");
     if (sampled && !this.sample(this.step / s.steps)) return this.fail("law is not finite");
     const past = this.step - s.delay_steps;
     if (past >= 0 && past % s.steps === 0) ctrl[plant.ctrl] = this.commands[(past / s.steps) % this.commands.length];
@@ -158,28 +192,62 @@ export class Simulation {
     const { qpos, qvel } = this.arrays;
     const x = plant.channels.map((channel) => qpos[channel.qpos]);
     const v = plant.channels.map((channel) => qvel[channel.dof]);
-    const seen = { x: [...x], v: [...v] };
-    if (s.noise.position !== 0 || s.noise.velocity !== 0) {
-      x.forEach((_, i) => {
-        const [first, second] = normals(s.seed, i, k);
-        seen.x[i] += s.noise.position * first;
-        seen.v[i] += s.noise.velocity * second;
-      });
-    }
+    const seen = this.measure(x, v, k);
     const partner = plant.channels.length > 1; // a joint without actuator, which the driven one moves
     const [f, g] = this.equation(seen);
     Object.assign(y, {
       t: k * s.control_period, dt: s.control_period, x: seen.x[0], v: seen.v[0],
       e: seen.x[0] - s.reference, de: seen.v[0], r: s.reference, dr: 0, ddr: 0,
-      f: f[0], g: g[0], a: 0, limit: s.u_max, model: s.model === "nominal" ? 1 : 0,
+      f: f[0], g: g[0], a: Number.isNaN(seen.a[0]) ? 0 : seen.a[0], limit: s.u_max, model: s.model === "nominal" ? 1 : 0,
       has_surface: 0, s: 0, v_eq: 0,
       q: partner ? seen.x[1] : 0, dq: partner ? seen.v[1] : 0, fq: partner ? f[1] : 0, gq: partner ? g[1] : 0,
     });
-    this.law(y, this.gains, this.memory, out);
+    if (this.surface) {
+      this.surface.run(y, 0, out);
+      [y.has_surface, y.s, y.v_eq] = [1, out[0], out[1]];
+    }
+    this.law.run(y, 0, out);
     const u = Math.min(Math.max(out[0], -s.u_max), s.u_max);
     this.commands[k % this.commands.length] = u;
     this.latest = { t: y.t, x, v, u, s: out[1], r: s.reference, d: 0 };
-    return Number.isFinite(out[0]) && Number.isFinite(out[1]) && Math.abs(u) < MAX_CONTROL;
+    return Number.isFinite(out[0]) && Number.isFinite(out[1]) && Math.abs(u) < this.facts.max_control;
+  }
+
+  // What the controller sees of x and v of all channels at sample k: position, velocity and acceleration.
+  measure(x, v, k) {
+    const { s, plant, out } = this;
+    const noisy = s.noise.position !== 0 || s.noise.velocity !== 0;
+    const reading = { dt: s.control_period, x: 0, v: 0 };
+    const seen = { x: [], v: [], a: [] }; // a is NaN where the estimator gives none
+    plant.channels.forEach(({ unit }, i) => {
+      [reading.x, reading.v] = [x[i], v[i]];
+      if (noisy) {
+        const [first, second] = normals(s.seed, i, k);
+        reading.x += s.noise.position * first;
+        reading.v += s.noise.velocity * second;
+      }
+      if (s.counts !== 0) {
+        const quantum = (unit === "rad" ? 2 * Math.PI : 1) / s.counts;
+        reading.x = quantum * Math.floor(reading.x / quantum + 0.5);
+      }
+      this.velocity.run(reading, i, out);
+      seen.x.push(reading.x);
+      seen.v.push(out[0]);
+      seen.a.push(out[1]);
+    });
+    return seen;
+  }
+
+  // The sliding variable, if the first channel were at x and v at present.
+  slidingAt(x, v) {
+    const { s, out } = this;
+    const y = { ...this.y, x, v, e: x - s.reference, de: v, has_surface: 0, s: 0, v_eq: 0 };
+    if (this.surface) {
+      this.surface.peek(y, 0, out);
+      [y.has_surface, y.s, y.v_eq] = [1, out[0], out[1]];
+    }
+    this.law.peek(y, 0, out);
+    return out[1];
   }
 
   // The nominal f and g of x'' = f + g u in each channel: the accelerations without a command, and what one adds.
@@ -230,7 +298,7 @@ export class Simulation {
         qvel[i] = start[1][i] + h * dv;
       }
     };
-    for (const [fraction, weights] of [[0, []], [0.5, [0.5]], [0.5, [0, 0.5]], [LAST_STAGE, [0, 0, 1]]]) {
+    for (const [fraction, weights] of [[0, []], [0.5, [0.5]], [0.5, [0, 0.5]], [this.facts.last_stage, [0, 0, 1]]]) {
       moveTo(weights);
       this.disturb(fraction);
       mujoco.mj_forward(model, data);
@@ -241,8 +309,8 @@ export class Simulation {
 }
 
 // Simulate a scenario of a duration, s. Return {t, u, s, x: [...channels], v: [...]}, an array of samples each.
-export function trace(mujoco, vfs, facts, laws, chosen, duration) {
-  const run = new Simulation(mujoco, vfs, facts, laws, chosen);
+export function trace(mujoco, vfs, facts, functions, chosen, duration) {
+  const run = new Simulation(mujoco, vfs, facts, functions, chosen);
   const samples = Math.floor(duration / run.s.control_period + 1e-6);
   const found = { t: [], u: [], s: [], d: [], x: run.plant.channels.map(() => []), v: run.plant.channels.map(() => []) };
   for (let step = 0; step < samples * run.s.steps && !run.failed; step++) {

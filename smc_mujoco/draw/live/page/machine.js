@@ -86,6 +86,38 @@ function tiles() {
   return texture;
 }
 
+// A skin, such as a spring, whose vertices follow bodies. The bones stand where MuJoCo's bodies are.
+function skinned({ vertices, faces, weights, bones, rgba: [r, g, b] }) {
+  const geometry = new THREE.BufferGeometry();
+  const count = vertices.length / 3;
+  const [indices, shares] = [new Uint16Array(4 * count), new Float32Array(4 * count)]; // at most four bones a vertex
+  for (let i = 0; i < count; i++) {
+    bones.forEach((_, k) => ([indices[4 * i + k], shares[4 * i + k]] = [k, weights[bones.length * i + k]]));
+  }
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(vertices, 3));
+  geometry.setAttribute("skinIndex", new THREE.BufferAttribute(indices, 4));
+  geometry.setAttribute("skinWeight", new THREE.BufferAttribute(shares, 4));
+  geometry.setIndex(faces);
+  geometry.computeVertexNormals();
+  const colour = new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace);
+  const mesh = new THREE.SkinnedMesh(geometry, new THREE.MeshPhongMaterial({ color: colour, shininess: 60, specular: 0x333333 }));
+  const at = bones.map(({ position, quaternion: [w, x, y, z] }) => new THREE.Matrix4().compose(
+    new THREE.Vector3(...position), new THREE.Quaternion(x, y, z, w), new THREE.Vector3(1, 1, 1)));
+  mesh.bind(new THREE.Skeleton(bones.map(() => new THREE.Bone()), at.map((matrix) => matrix.invert())), new THREE.Matrix4());
+  for (const bone of mesh.skeleton.bones) bone.matrixAutoUpdate = false;
+  mesh.add(...mesh.skeleton.bones);
+  mesh.frustumCulled = false; // its bounds are those of the first pose
+  return mesh;
+}
+
+// A pose of MuJoCo as a matrix: position i of p, and rotation i of m.
+function pose(matrix, p, m, i) {
+  const [a, b] = [3 * i, 9 * i];
+  return matrix.set(
+    m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
+  );
+}
+
 // One machine: the scene of a simulation.
 class Machine {
   constructor(simulation, colour) {
@@ -112,6 +144,13 @@ class Machine {
       this.scene.add(mesh);
       this.meshes.push(mesh);
     }
+    this.skins = simulation.plant.skins.map((skin) => {
+      const mesh = skinned(skin);
+      mesh.castShadow = mesh.receiveShadow = true;
+      mesh.userData.bodies = skin.bones.map(({ body }) => mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, body));
+      this.scene.add(mesh);
+      return mesh;
+    });
     this.moving = this.meshes.filter((mesh) => model.body_weldid[mesh.userData.body] !== 0);
     this.arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 1, css("--focus"), 0.1, 0.05);
     this.arrow.visible = false;
@@ -123,6 +162,7 @@ class Machine {
   // Free what the graphics card holds.
   dispose() {
     this.scene.traverse((each) => {
+      each.skeleton?.dispose();
       each.geometry?.dispose();
       each.material?.dispose();
     });
@@ -157,16 +197,18 @@ class Machine {
     scene.fog = new THREE.Fog(css("--stage"), 5 * extent, 12 * extent);
   }
 
-  // Put meshes where MuJoCo's geoms are.
+  // Put meshes where MuJoCo's geoms are, and skins where its bodies are.
   place(meshes = this.moving) {
-    const { geom_xpos: p, geom_xmat: m } = this.simulation.data;
+    const { geom_xpos, geom_xmat, xpos, xmat } = this.simulation.data;
     for (const mesh of meshes) {
-      const i = mesh.userData.geom;
-      const [a, b] = [3 * i, 9 * i];
-      mesh.matrix.set(
-        m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
-      );
+      pose(mesh.matrix, geom_xpos, geom_xmat, mesh.userData.geom);
       mesh.matrixWorldNeedsUpdate = true;
+    }
+    for (const { skeleton, userData } of this.skins) {
+      skeleton.bones.forEach((bone, k) => {
+        pose(bone.matrix, xpos, xmat, userData.bodies[k]);
+        bone.matrixWorldNeedsUpdate = true;
+      });
     }
   }
 

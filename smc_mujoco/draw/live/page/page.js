@@ -1,8 +1,8 @@
 // The page: what the reader chooses, its simulations, pictures and plots.
 
 import loadMujoco from "./vendor/mujoco.js";
-import { Simulation, trace } from "./engine.js";
-import { laws } from "./laws.js";
+import { Simulation, estimatorFor, trace } from "./engine.js";
+import * as functions from "./components.js"; // laws, surfaces, estimators
 import { Stage } from "./machine.js";
 import { History, overTime, phasePlane } from "./plots.js";
 
@@ -11,12 +11,15 @@ const SLOWEST = 0.1; // s: a frame that took longer slows the simulation down in
 const GRADES = 1000; // of a slider
 const WORDS = { NaN, Infinity, "-Infinity": -Infinity };
 const SIDES = ["a", "b"];
+const PARTS = { surface: "surfaces", velocity: "estimators" }; // of a controller beside its law -> where their facts are
+const COUNTS = [64, 256, 1024, 4096, 16384]; // of an encoder, per revolution or metre: what the page offers
 
 const $ = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 let facts, mujoco, vfs, stage;
-// What the reader has chosen: {plant, a: {law, gains, model}, b: {...}, and a number for each condition}
+// What the reader has chosen: {plant, a: {law, gains, model, surface, velocity}, b: {...}, counts, and a number for each
+// condition}. A surface or velocity estimator is {name, gains}, or null for the default.
 let chosen;
 let running = [];
 let playing = true;
@@ -25,13 +28,14 @@ let owed = 0; // s of simulated time
 
 const plantFacts = () => facts.plants[chosen.plant];
 const sides = () => SIDES.filter((side) => chosen[side].law);
+const controller = (law) => ({ law, gains: {}, surface: null, velocity: null });
 
 // ---- what is chosen, as an address and as a scenario
 
 function opening(plant) {
   const { start, conditions } = facts.plants[plant];
   const numbers = Object.fromEntries(conditions.map(({ name, value }) => [name, value]));
-  return { plant, ...numbers, a: { law: start[0], gains: {} }, b: { law: start[1] ?? "", gains: {} } };
+  return { plant, ...numbers, counts: 0, a: controller(start[0]), b: controller(start[1] ?? "") };
 }
 
 function fromAddress() {
@@ -42,15 +46,22 @@ function fromAddress() {
     const value = parseFloat(given.get(name));
     if (Number.isFinite(value)) made[name] = Math.min(Math.max(value, least), most);
   }
+  const counts = Math.round(parseFloat(given.get("counts")));
+  if (counts >= 2 && counts <= 2 ** 32) made.counts = counts;
+  const gains = (key, order) => Object.fromEntries(
+    order.map((name) => [name, parseFloat(given.get(`${key}.${name}`))]).filter(([, value]) => !Number.isNaN(value)));
   for (const side of SIDES) {
     if (!given.has(side)) continue;
     const law = given.get(side);
     if (!facts.plants[plant].laws.includes(law) && !(side === "b" && law === "")) continue;
-    made[side] = { law, gains: {} };
+    made[side] = controller(law);
     if (law === "") continue;
-    for (const name of facts.laws[law].order) {
-      const value = parseFloat(given.get(`${side}.${name}`));
-      if (!Number.isNaN(value)) made[side].gains[name] = value;
+    made[side].gains = gains(side, facts.laws[law].order);
+    for (const [part, kind] of Object.entries(PARTS)) {
+      const key = `${side}-${part}`;
+      const name = given.get(key);
+      if (!Object.hasOwn(facts[kind], name) || (part === "surface" && !facts.laws[law].takes_surface)) continue;
+      made[side][part] = { name, gains: gains(key, facts[kind][name].order) };
     }
     if (given.has(`${side}.model`)) made[side].model = given.get(`${side}.model`) === "nominal" ? "nominal" : "none";
   }
@@ -60,21 +71,29 @@ function fromAddress() {
 function toAddress() {
   const words = new URLSearchParams({ plant: chosen.plant });
   for (const side of SIDES) {
-    words.set(side, chosen[side].law);
-    for (const [name, value] of Object.entries(chosen[side].gains)) words.set(`${side}.${name}`, value);
+    const put = (key, name, gains) => {
+      words.set(key, name);
+      for (const [gain, value] of Object.entries(gains)) words.set(`${key}.${gain}`, value);
+    };
+    put(side, chosen[side].law, chosen[side].gains);
+    for (const part of Object.keys(PARTS)) {
+      if (chosen[side][part]) put(`${side}-${part}`, chosen[side][part].name, chosen[side][part].gains);
+    }
     if (chosen[side].model) words.set(`${side}.model`, chosen[side].model);
   }
   for (const { name, value } of plantFacts().conditions) if (chosen[name] !== value) words.set(name, chosen[name]);
+  if (chosen.counts) words.set("counts", chosen.counts);
   history.replaceState(null, "", `#${words}`);
 }
 
 // The scenario of one side, as the engine takes it.
 function scenarioOf(side) {
-  const { plant, start, reference, mass, friction, delay, noise, amplitude, omega, period, bound } = chosen;
+  const { plant, start, reference, mass, friction, delay, noise, amplitude, omega, period, bound, counts } = chosen;
+  const { law, gains, model, surface, velocity } = chosen[side];
   const x0 = [...plantFacts().x0];
   x0[plantFacts().started] = start;
   return {
-    plant, law: chosen[side].law, gains: chosen[side].gains, model: chosen[side].model, x0, reference, mass, friction,
+    plant, law, gains, model, surface, velocity: velocity ?? undefined, counts, x0, reference, mass, friction,
     input_delay: delay / 1000, control_period: period / 1000, u_max: bound, disturbance: { amplitude, omega },
     noise: { position: noise * facts.noise.position, velocity: noise * facts.noise.velocity },
   };
@@ -82,7 +101,7 @@ function scenarioOf(side) {
 
 // ---- simulations
 
-const made = (side) => new Simulation(mujoco, vfs, facts, laws, scenarioOf(side));
+const made = (side) => new Simulation(mujoco, vfs, facts, functions, scenarioOf(side));
 
 function colours() {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
@@ -148,26 +167,26 @@ function simulate(seconds) {
   owed -= done;
   const failures = running.filter(({ simulation }) => simulation.failed);
   if (failures.length) {
-    say(failures.map(({ simulation: { failed, lawFacts } }) =>
-      `${lawFacts.label}: ${failed.why} at ${failed.time.toFixed(2)} s`).join("; "));
+    say(failures.map(({ simulation: { failed, law } }) =>
+      `${law.known.label}: ${failed.why} at ${failed.time.toFixed(2)} s`).join("; "));
   }
 }
 
-// The line s = 0 of a law in the phase plane, as a function v(x); null if s is not linear in v.
+// The curve s = 0 of a simulation in the phase plane, at present: a function of x and of the least and largest v, which
+// returns v, or NaN where s does not change its sign.
 function surfaceOf({ simulation }) {
-  const { y, memory, law, gains, s } = simulation;
-  const at = (x, v) => {
-    const out = [0, 0];
-    law({ ...y, x, v, e: x - s.reference, de: v }, gains, memory.slice(), out);
-    return out[1];
+  return (x, [low, high]) => {
+    const at = (v) => simulation.slidingAt(x, v);
+    const [first, last] = [at(low), at(high)];
+    if (!(first * last < 0)) return NaN;
+    const small = (s) => Math.abs(s) < 1e-6 * (Math.abs(first) + Math.abs(last));
+    let v = low - (first * (high - low)) / (last - first); // exact where s is linear in v
+    for (let k = 0; k < 40 && !small(at(v)); k++) { // else by halves
+      if (k > 0) [low, high] = at(v) * first > 0 ? [v, high] : [low, v];
+      v = (low + high) / 2;
+    }
+    return small(at(v)) ? v : NaN;
   };
-  const line = (x) => {
-    const [zero, one] = [at(x, 0), at(x, 1)];
-    return -zero / (one - zero);
-  };
-  const x = s.reference + 0.3;
-  const error = Math.abs(at(x, line(x))) + Math.abs(at(x, 2) - 2 * at(x, 1) + at(x, 0));
-  return error < 1e-9 ? line : null;
 }
 
 // ---- the loop
@@ -313,6 +332,48 @@ function slider({ name, label, unit, least, most, value, step }, put) {
   return element("div", { class: "slider" }, element("span", {}, label), range, exact, element("small", {}, unit ?? ""));
 }
 
+const of = (side) => running.find((each) => each.side === side);
+
+// The formula of a law, surface or estimator, and a slider for each gain that is to choose. `put` takes {gain: number}.
+function gainSliders({ formula, source, order }, values, ranges, put) {
+  const shown = order.filter((name) => ranges[name]); // not an initial value, an exponent, the size of a table
+  return [
+    element("p", { class: "formula", title: source }, pretty(formula)),
+    ...shown.map((name) => {
+      const [least, most] = ranges[name];
+      return slider({ name, label: pretty(name), least, most, value: values[name] }, (number) => {
+        put({ [name]: number });
+        toAddress();
+      });
+    }),
+  ];
+}
+
+// The choice of a side's surface or velocity estimator, and its gains.
+function partForm(side, part, title) {
+  const kind = facts[PARTS[part]];
+  const ranges = plantFacts()[part === "surface" ? "surface_ranges" : "estimator_ranges"];
+  const fallback = part === "surface" ? "" : estimatorFor(chosen.counts);
+  const { name, gains } = chosen[side][part] ?? { name: fallback, gains: {} };
+  const select = element("select", { id: `${part}-${side}`, onchange: ({ target: { value } }) => {
+    chosen[side][part] = value === fallback ? null : { name: value, gains: {} };
+    change();
+    lawForm(side);
+    $(`${part}-${side}`).focus();
+    toAddress();
+  } });
+  if (part === "surface") select.append(element("option", { value: "" }, "the law's own"));
+  for (const [value, { label }] of Object.entries(kind)) select.append(element("option", { value }, label));
+  select.value = name;
+  const row = element("div", { class: "part" }, element("label", { for: `${part}-${side}` }, title), select);
+  if (!name) return [row];
+  return [row, ...gainSliders(kind[name], { ...kind[name].gains, ...gains }, ranges[name], (changed) => {
+    chosen[side][part] ??= { name, gains: {} };
+    Object.assign(chosen[side][part].gains, changed);
+    of(side).simulation[part].setGains(changed);
+  })];
+}
+
 function lawForm(side) {
   const form = $(`law-${side}`);
   const { laws: offered, gains: tuned, ranges } = plantFacts();
@@ -331,24 +392,19 @@ function lawForm(side) {
   const parts = [element("h2", {}, element("label", { for: `choice-${side}` }, side === "a" ? "First law" : "Second law")), select];
   if (law) {
     const known = facts.laws[law];
-    parts.push(element("p", { class: "formula", title: known.source }, pretty(known.formula)));
-    for (const name of known.order) {
-      const value = chosen[side].gains[name] ?? tuned[law][name];
-      const [least, most] = ranges[law][name] ?? [];
-      if (least === undefined) continue; // held: an initial value, an exponent, the size of a table
-      parts.push(slider({ name, label: pretty(name), least, most, value }, (number) => {
-        chosen[side].gains[name] = number;
-        running.find((each) => each.side === side).simulation.setGains({ [name]: number });
-        toAddress();
-      }));
-    }
-    if (known.model_optional) {
+    parts.push(...gainSliders(known, { ...tuned[law], ...chosen[side].gains }, ranges[law], (gains) => {
+      Object.assign(chosen[side].gains, gains);
+      of(side).simulation.law.setGains(gains);
+    }));
+    if (known.takes_surface) parts.push(...partForm(side, "surface", "Surface"));
+    parts.push(...partForm(side, "velocity", "Velocity"));
+    if (known.reads_model && !known.requires_model) {
       const knows = element("input", { type: "checkbox", onchange: (event) => {
         chosen[side].model = event.target.checked ? "nominal" : "none";
         change();
         toAddress();
       } });
-      knows.checked = (chosen[side].model ?? (known.requires_model ? "nominal" : "none")) === "nominal";
+      knows.checked = chosen[side].model === "nominal";
       parts.push(element("label", { class: "check" }, knows, "knows the plant's equation"));
     }
   }
@@ -362,11 +418,25 @@ function conditionsForm() {
     else change();
     toAddress();
   }));
-  $("conditions").replaceChildren(element("h2", {}, "Conditions"), ...parts);
+  $("conditions").replaceChildren(element("h2", {}, "Conditions"), ...parts, encoderForm());
+}
+
+function encoderForm() {
+  const per = plantFacts().channels[0].unit === "rad" ? "revolution" : "metre";
+  const offered = [...new Set([0, ...COUNTS, chosen.counts])].sort((one, other) => one - other);
+  const select = element("select", { id: "counts", onchange: ({ target: { value } }) => {
+    chosen.counts = parseInt(value);
+    change();
+    SIDES.forEach(lawForm);
+    toAddress();
+  } });
+  select.append(...offered.map((counts) => element("option", { value: counts }, counts ? `${counts} counts per ${per}` : "none: x as it is")));
+  select.value = chosen.counts;
+  return element("div", { class: "part" }, element("label", { for: "counts" }, "Encoder"), select);
 }
 
 function choose(side, law) {
-  chosen[side] = { law, gains: {} };
+  chosen[side] = controller(law);
   lawForm(side);
   restart();
   toAddress();
@@ -462,7 +532,7 @@ async function begin() {
   window.live = {
     facts,
     running: () => running,
-    trace: (chosen, duration) => trace(mujoco, vfs, facts, laws, chosen, duration),
+    trace: (chosen, duration) => trace(mujoco, vfs, facts, functions, chosen, duration),
     onScreen: (i, geom) => stage.onScreen(i, geom),
   };
   document.documentElement.dataset.ready = "";

@@ -1,6 +1,7 @@
 // Plots of the last seconds of a few simulations, on canvases.
 
 const ROOM = { left: 46, right: 8, top: 4, bottom: 18 }; // px around the axes
+const CURVE = 60; // parts of the curve s = 0
 const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
 
 // The last `seconds` of a simulation's samples, in rings.
@@ -153,7 +154,7 @@ export function overTime(canvas, colours, series, names, { now, seconds, levels 
   pen.restore();
 }
 
-// Draw the phase plane: v over x of the histories, and the line s = 0 of each law that has one.
+// Draw the phase plane: v over x of the histories, and the curve s = 0 of each, from its function `surface`.
 export function phasePlane(canvas, colours, series, { reference, least, unit }) {
   const on = prepared(canvas);
   const range = { x: [Infinity, -Infinity], v: [Infinity, -Infinity] };
@@ -168,7 +169,8 @@ export function phasePlane(canvas, colours, series, { reference, least, unit }) 
   range.x = [Math.min(range.x[0], reference), Math.max(range.x[1], reference)];
   range.v = [Math.min(range.v[0], 0), Math.max(range.v[1], 0)];
   const x = padded(...range.x, least);
-  const place = axes(on, colours, x, padded(...range.v, least), ` ${unit}`);
+  const v = padded(...range.v, least);
+  const place = axes(on, colours, x, v, ` ${unit}`);
   const { pen, width, height } = on;
   pen.save();
   pen.beginPath();
@@ -180,8 +182,15 @@ export function phasePlane(canvas, colours, series, { reference, least, unit }) 
     pen.strokeStyle = colour;
     pen.globalAlpha = 0.55;
     pen.setLineDash([5, 4]);
-    const points = Array.from({ length: 41 }, (_, i) => x[0] + ((x[1] - x[0]) * i) / 40);
-    line(pen, points.map((at) => [place.x(at), place.y(surface(at))]));
+    pen.beginPath();
+    for (let i = 0, begun = false; i <= CURVE; i++) {
+      const at = x[0] + ((x[1] - x[0]) * i) / CURVE;
+      const height = surface(at, v);
+      const here = !Number.isNaN(height);
+      if (here) pen[begun ? "lineTo" : "moveTo"](place.x(at), place.y(height));
+      begun = here;
+    }
+    pen.stroke();
   }
   pen.setLineDash([]);
   pen.globalAlpha = 1;
