@@ -136,8 +136,10 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
             table.add_row(_label(label, trace), FAILED)
             continue
         cells = [number(factor * values[label].get(name, math.nan)) for name, _, factor in shown.values()]
-        joint, work = worst_joint(trace, "work")
-        table.add_row(_label(label, trace), *cells, *([f"{number(work)} ({joint})"] * room))
+        if room:
+            joint, work = worst_joint(trace, "work")
+            cells.append(f"{number(work)} ({joint})")
+        table.add_row(_label(label, trace), *cells)
     return [table]
 
 

@@ -55,7 +55,7 @@ def joints(
         for i, (name, unit) in enumerate(zip(joint_names(plant), plant.units, strict=True))
     ]
     if plant.tip:
-        panels.append(("tip, distance (mm)", _distance))
+        panels.append(("tip, distance (mm)", lambda trace: 1e3 * tip.tip_error(trace)))
     touching = all(trace.scenario.contact.kind != "none" for trace in traces)
     if touching:
         panels.append(("contact, normal force (N)", lambda trace: tip.contacts(trace).force))
@@ -101,12 +101,6 @@ def keep_within(ax: Axes, sizes: list[tuple[float, float, float]]) -> None:
         place = {"xytext": (-3, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
         text = f"one run: up to {style.short(largest[0])}"
         ax.annotate(text, (1.0, 1.0), xycoords="axes fraction", fontsize=style.points(8.0), color=style.MUTED, **place)
-
-
-def _distance(trace: Trace) -> np.ndarray:
-    """Return how far the tip is from where the references want it, (K + 1,) mm."""
-    plant = trace.scenario.plant
-    return 1e3 * np.linalg.norm(tip.tip_path(plant, trace.x) - tip.tip_path(plant, trace.r), axis=1)
 
 
 def mark_losses(ax: Axes, t: np.ndarray, force: np.ndarray, colour: str, row: int) -> None:

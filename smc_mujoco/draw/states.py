@@ -16,9 +16,8 @@ import numpy as np
 
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.metrics import conventions
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
@@ -99,7 +98,7 @@ def has_dry_friction(scenario: Scenario) -> bool:
     plant = scenario.plant
     if any(plant.parameters[name] > 0.0 for name in plant.dry):
         return True
-    if any((isinstance(f, Coulomb) and f.level > 0.0) or isinstance(f, LuGre | Sliding) for f in scenario.friction):
+    if any((isinstance(f, Coulomb) and f.level > 0.0) or f.bristles for f in scenario.friction):
         return True
     if scenario.contact.kind == "none":
         return False

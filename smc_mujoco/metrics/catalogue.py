@@ -7,8 +7,8 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 
 from __future__ import annotations
 
-import functools
 import math
+import weakref
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
+# Limit cycles of traces that are being scored: two metrics ask for each.
+_CYCLES: weakref.WeakKeyDictionary[Trace, tuple[float, float]] = weakref.WeakKeyDictionary()
 
 
 def metrics() -> tuple[Metric, ...]:
@@ -244,11 +246,12 @@ def chattering_frequency(trace: Trace) -> float:
     return _cycle(trace)[1]
 
 
-@functools.lru_cache(maxsize=1)  # two metrics ask for it, one after the other
 def _cycle(trace: Trace) -> tuple[float, float]:
     """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
-    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
-    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
+    if trace not in _CYCLES:
+        found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
+        _CYCLES[trace] = max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
+    return _CYCLES[trace]
 
 
 @metric("s", realistic=True)

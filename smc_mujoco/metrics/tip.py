@@ -2,8 +2,9 @@
 
 The tip is the plant's site of that name, `plant.tip`. Its path follows from the joints' positions. Forces of contact
 are MuJoCo's at the logged state under the logged command: those of the sample, not means over a control period. So they
-are known only where a drive has no state that a trace lacks, such as a motor's current. The state of a friction does
-not matter: a sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
+are known only where the actuators have no state that a trace lacks, such as a motor's current or the rotor behind a
+backlash. The state of a friction does not matter: a sliding contact's spring carries 99 % of a change of load, see
+`mechanisms.hardware.contact`. Joints without a channel are taken to be where they start.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
         raise ScenarioError(f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')")
     model = plant.load()
     data, site = mujoco.MjData(model), model.site(plant.tip).id
+    data.qpos[:] = assembly.initial_pose(model)
     places, found = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
     for k, each in enumerate(x):
         data.qpos[places] = each
@@ -60,25 +62,33 @@ def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
     return found
 
 
+def tip_error(trace: Trace) -> np.ndarray:
+    """Return how far the tip is from where the references want it, (K + 1,) m. Raises like `tip_path`."""
+    plant = trace.scenario.plant
+    return np.linalg.norm(tip_path(plant, trace.x) - tip_path(plant, trace.r), axis=1)
+
+
 def contacts(trace: Trace) -> Contacts:
     """Return the normal forces and depths of a run's contacts.
 
     Raises:
-      ScenarioError: the scenario has no contact, or a drive with a state that a trace lacks.
+      ScenarioError: the scenario has no contact, or an actuator with a state that a trace lacks.
     """
     scenario = trace.scenario.resolved
     if scenario.contact.kind == "none":
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
-    if stateful := [part for part in scenario.actuator if part.stateful]:
-        raise ScenarioError(f"the state of {type(stateful[0]).__name__} is not in a trace, so its contacts are unknown")
+    if unknown := [part for part in scenario.actuator if part.stateful or not part.drives]:
+        raise ScenarioError(f"the state of {type(unknown[0]).__name__} is not in a trace, so its contacts are unknown")
     compiled = assembly.model([scenario])
     model = assembly.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
     found, wrench = Contacts(*np.zeros((2, len(trace.t)))), np.zeros(6)
+    data.qpos[:] = assembly.initial_pose(model)
+    jump = None if scenario.jump is None else -(-scenario.jump_step // scenario.steps)  # its first sample
     for k in range(len(trace.t)):
-        if k * scenario.steps == scenario.jump_step:
+        if k == jump:
             assembly.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
         data.qpos[positions], data.qvel[rates], data.ctrl[drives] = trace.x[k], trace.v[k], trace.applied[k, :n]
@@ -107,8 +117,7 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
       ScenarioError: the plant has no tip, or the run failed.
     """
     conventions.refuse(trace)
-    plant = trace.scenario.plant
-    error = np.linalg.norm(tip_path(plant, trace.x) - tip_path(plant, trace.r), axis=1)
+    error = tip_error(trace)
     found = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
     if trace.scenario.contact.kind != "none":
         wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)

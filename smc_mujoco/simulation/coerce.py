@@ -19,9 +19,7 @@ from smc_mujoco.control.surface import surface as find_surface
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
@@ -244,7 +242,7 @@ def friction(value: Friction | Sequence[Friction] | None) -> tuple[Friction, ...
     """Return frictions sorted by kind, from one, several or None. No two are of a kind, at most one has bristles."""
     items = parts("friction", value, Friction, "smc.Coulomb(0.05)")
     check_once("friction", items, [type(part).__name__ for part in items])
-    if len(alone := [part for part in items if isinstance(part, LuGre | Sliding)]) > 1:
+    if len(alone := [part for part in items if part.bristles]) > 1:
         first, second = (type(part).__name__ for part in alone[:2])
         raise ScenarioError(f"friction has {first} and {second}, which both hold a joint by bristles: give one")
     return tuple(sorted(items, key=lambda part: type(part).__name__))

@@ -92,13 +92,15 @@ def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dic
     return found
 
 
-def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints as in the model.
-
-    That is, in the model's start keyframe, or else in qpos0.
-    """
+def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
+    """Return the pose from which joints without a channel start, (nq,): the model's start keyframe, or else qpos0."""
     key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
-    qpos, qvel = (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy(), np.zeros(compiled.nv)
+    return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
+
+
+def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints as in `initial_pose`."""
+    qpos, qvel = initial_pose(compiled), np.zeros(compiled.nv)
     resolved = scenario.resolved
     for joint, x, v in zip(joint_ids(compiled), resolved.x0, resolved.v0, strict=True):
         rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)

@@ -14,8 +14,8 @@ import numpy as np
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
-from smc_mujoco.metrics.catalogue import score
-from smc_mujoco.metrics.tip import tip_path, tip_scores
+from smc_mujoco.metrics.catalogue import tv_rate
+from smc_mujoco.metrics.tip import tip_error, tip_scores
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
@@ -27,7 +27,7 @@ NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, of an encoder
 SWAY, BEAT = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5), 0.6  # rad and s: chosen, up to a rad/s in each joint
 DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # of a search, kg
 ROUGH = 1000.0  # N m/s: a variation of u that counts as much as the error; chosen before any search
-BEHIND, PROBE = 0.004, 0.012  # m: chosen; the radius of the probe
+BEFORE, BEHIND, PROBE = 0.0005, 0.004, 0.012  # m, from the wall's face: chosen; the radius of the probe
 SPREAD = 0.05  # rad, of starts about the task's own; chosen
 BLOW = 1.0  # s, of the blow in its task
 PRESS, REACH = 20.0, (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # N; rad, from where the wall's path is found
@@ -105,15 +105,15 @@ def pick_and_place() -> tuple[Waypoints, ...]:
 
 
 @functools.cache
-def wall_path(behind: float | None = None) -> tuple[Waypoints, ...]:
+def wall_path(behind: float = -BEFORE) -> tuple[Waypoints, ...]:
     """Return references on which the tip slides along the wall, across and up, at rest until 0.4 s.
 
     Args:
-      behind: how far the path is behind the wall's face, m; None: half a millimetre before it.
+      behind: how far the path is behind the wall's face, m; below 0: before it.
     """
     from smc_mujoco.mechanisms.plants.panda import WALL
 
-    x = WALL - PROBE + (-5e-4 if behind is None else behind)
+    x = WALL - PROBE + behind
     points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
     return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
 
@@ -124,7 +124,8 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     Args:
       task: "sway"; "payload", picked up at 1 s; "wall", pressed on while the tip slides; "behind", the same path 4 mm
         behind the wall's face; or "blow", at 1 s of a sway.
-      seed: of the noise, and of the start, which is within 0.05 rad of the task's; 0: at the task's.
+      seed: of the noise, and of the start, which is within 0.05 rad of the task's. 0: at the task's own start. At the
+        wall every seed starts there, as the tip must be in front of it.
       payload: kg that the arm carries from the start, unknown to the law.
     """
     one = arm()
@@ -133,8 +134,8 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         "blow": sway,
         "payload": pick_and_place,
         "wall": wall_path,
+        "behind": lambda: wall_path(BEHIND),
     }
-    references["behind"] = lambda: wall_path(BEHIND)
     wanted = find("task of the arm", task, references)()
     start = np.array([signal.values[0] for signal in (wall_path() if task == "behind" else wanted)])
     if seed and task not in ("wall", "behind"):
@@ -146,16 +147,24 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         "wall": {"duration": 3.8, "contact": "wall"},
         "behind": {"duration": 3.8, "contact": "wall"},
     }[task]
-    mismatch = {"payload": payload} if payload else {}
-    common = {"plant": one, "law": law, "reference": wanted, "x0": tuple(start), "seed": seed, "noise": NOISE}
-    gravity = {"model": "nominal"}  # observer_free_joint compensates gravity of the unloaded arm
-    return Scenario(**common | gravity | fields, mismatch=mismatch, friction=one.friction, control_period=1e-3)
+    return Scenario(
+        plant=one,
+        law=law,
+        reference=wanted,
+        x0=tuple(start),
+        seed=seed,
+        noise=NOISE,
+        model="nominal",  # with it observer_free_joint compensates gravity, of the arm without payload
+        mismatch={"payload": payload} if payload else {},
+        friction=one.friction,
+        control_period=1e-3,
+        **fields,
+    )
 
 
 def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
     """Return how far the tip is from where the references want it at the samples from a time in s on, m."""
-    late, one = trace.t >= after, trace.scenario.plant
-    return np.linalg.norm(tip_path(one, trace.x[late]) - tip_path(one, trace.r[late]), axis=1)
+    return tip_error(trace)[trace.t >= after]
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
@@ -171,7 +180,7 @@ def cost(trace: Trace) -> float:
     """Return the objective of the search: the tip's rms error, mm, more by the roughness of u."""
     if trace.failure is not None:
         return math.inf
-    return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + score(trace)["tv_rate"] / ROUGH)
+    return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + tv_rate(trace) / ROUGH)
 
 
 def search(name: str, draws: int = DRAWS) -> tuple[dict[str, float], float]:

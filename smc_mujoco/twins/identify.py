@@ -18,7 +18,7 @@ simulation with their own noise and rounding, and a standard error is at least t
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -240,27 +240,22 @@ class Search:
         return found
 
     def at_rest(self, z: np.ndarray) -> np.ndarray:
-        """Return the point with velocity 0 at the start of each record, if it is free."""
-        rest = z.copy()
-        if len(self.free):
-            n = len(self.twin.columns.x)
-            moved = rest[len(self.names) :].reshape(len(self.data), -1)
-            moved[:, -n:] = [-self.measured[i][n:] / self.state_scales[i][-n:] for i in range(len(self.data))]
+        """Return the point with velocity 0 at the start of each record. States at the start must be free."""
+        rest, n = z.copy(), len(self.twin.columns.x)
+        moved = rest[len(self.names) :].reshape(len(self.data), -1)
+        moved[:, -n:] = [-self.measured[i][n:] / self.state_scales[i][-n:] for i in range(len(self.data))]
         return rest
 
     def _measured_state(self, i: int) -> np.ndarray:
         """Return positions and velocities at the start of a record as they are measured, (2n,)."""
-        period = self._period(i)
+        period = self.twin.step(self.checked[i])
         return np.concatenate(files.state(self.checked[i], self.twin.columns, period, round(self.twin.start / period)))
 
     def _state_scales(self, i: int) -> np.ndarray:
         """Return the units of positions and velocities at the start of a record, (2n,)."""
-        columns = [self.checked[i][name] for name in self.twin.columns.x]
-        varied = [each.std() for each in (*columns, *(files.rate(each, self._period(i)) for each in columns))]
+        columns, period = [self.checked[i][name] for name in self.twin.columns.x], self.twin.step(self.checked[i])
+        varied = [each.std() for each in (*columns, *(files.rate(each, period) for each in columns))]
         return STATE_SCALE * np.array([each or 1.0 for each in varied])
-
-    def _period(self, i: int) -> float:
-        return self.twin.period or files.step_of(self.checked[i], self.twin.columns)
 
     def values(self, z: np.ndarray) -> dict[str, float]:
         """Return the quantities at a point of the search, within their ranges to the last bit."""
@@ -365,6 +360,8 @@ class Search:
 
         Dry friction makes a kink in the cost at rest, where a search from another velocity ends early.
         """
+        if not len(self.free):
+            return self.refine("whole", z, most)
         z = self.refine("whole", self.better("whole", z, self.at_rest(z)), most)
         rest = self.better("whole", z, self.at_rest(z))
         return z if rest is z else self.refine("whole", rest, most)
@@ -391,11 +388,7 @@ class Search:
         J = J - by_states @ np.linalg.lstsq(by_states, J, rcond=None)[0]  # what no state at a start can do
         _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
         if singular[-1] < SAME * singular[0]:
-            alike = [self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]]
-            raise ScenarioError(
-                f"the records of {self.twin.name} cannot tell {' and '.join(alike)} apart: leave one out, or give a "
-                "longer record or one of a richer motion, or look at its units and columns"
-            )
+            raise self._alike(self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2])
         covariance = self._jackknife(J, r, z)
         deviation = np.sqrt(np.diag(covariance))
         with np.errstate(all="ignore"):
@@ -412,11 +405,15 @@ class Search:
         pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
         i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
         if pairs[i, j] > MAX_CORRELATION:
-            found = [f"{self.names[k]} ({values[self.names[k]]:.3g} ± {errors[self.names[k]]:.2g})" for k in (i, j)]
-            raise ScenarioError(
-                f"the records of {self.twin.name} cannot tell {' and '.join(found)} apart: leave one out, or give a "
-                "longer record or one of a richer motion, or look at its units and columns"
-            )
+            two = self.names[i], self.names[j]
+            raise self._alike(f"{name} ({values[name]:.3g} ± {errors[name]:.2g})" for name in two)
+
+    def _alike(self, quantities: Iterable[str]) -> ScenarioError:
+        """Return the error that the records cannot tell some quantities apart."""
+        return ScenarioError(
+            f"the records of {self.twin.name} cannot tell {' and '.join(quantities)} apart: leave one out, or give a "
+            "longer record or one of a richer motion, or look at its units and columns"
+        )
 
     def _jackknife(self, J: np.ndarray, r: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""

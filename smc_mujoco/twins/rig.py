@@ -196,7 +196,7 @@ class Rig:
         if self.dynamics is not None:
             raise ScenarioError(f"records of {self.name} are not repeated, as their torques are predicted: use fit")
         data = self.checked(record)
-        period = self.period or records.step_of(data, self.columns)
+        period = self.step(data)
         first = round((self.start if start is None else start) / period)
         last = len(data[self.columns.time]) - 1
         if duration is not None:
@@ -278,6 +278,10 @@ class Rig:
     def period(self) -> float | None:
         """The control period of closed-loop records, s; None for records of an open loop, which have their own."""
         return None if self.controller is None else self.scenario().control_period
+
+    def step(self, data: Record) -> float:
+        """Return the time between samples of a record, as `checked` returns it, s: in a closed loop the period."""
+        return self.period or records.step_of(data, self.columns)
 
     def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
         """Return the records as columns, and the rig that repeats them: of traces with their law, from their start.
@@ -398,7 +402,7 @@ class Rig:
         if self.dynamics is not None:
             measured = self.measured_torques(record)
             return percentages({name: np.zeros_like(values) for name, values in measured.items()}, measured)
-        first = round(self.score_from / (self.period or records.step_of(data, columns)))
+        first = round(self.score_from / self.step(data))
         measured = {name: data[name][first:] for name in columns.x}
         if self.period is None:
             return percentages({name: np.full_like(values, values[0]) for name, values in measured.items()}, measured)

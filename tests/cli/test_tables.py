@@ -40,3 +40,16 @@ def test_a_table_of_scores_has_commands_in_volts():
 def test_a_film_tells_the_arrow_of_the_control_in_volts():
     scales = arrows.scales([VOLTS])
     assert any("2 V" in line for line in caption.key([VOLTS], scales))
+
+
+def test_a_table_of_tips_looks_for_the_worst_joint_only_where_it_has_room(monkeypatch):
+    asked = []
+    monkeypatch.setattr(tables, "worst_joint", lambda trace, metric: asked.append(metric) or ("joint4", 12.5))
+    law, start = smc.arms.hybrid(), smc.arms.scenario("wall", smc.arms.hybrid()).x0
+    free, pressing = smc.run(
+        [smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one) for one in ("none", "wall")]
+    )
+    assert "12.5 (joint4)" in printed(tables.tips("runs", {"free": free}))
+    assert asked == ["work"]
+    assert "joint4" not in printed(tables.tips("runs", {"pressing": pressing}))
+    assert asked == ["work"]

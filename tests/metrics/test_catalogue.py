@@ -1,8 +1,10 @@
 """Every metric on signals with known values, against python-control, and under invariances."""
 
 import dataclasses
+import gc
 import inspect
 import math
+import weakref
 from types import SimpleNamespace
 
 import control
@@ -692,6 +694,19 @@ def test_scoring_looks_for_the_limit_cycle_of_a_channel_once(monkeypatch):
     monkeypatch.setattr(limit_cycle, "of_trace", lambda trace, channel: asked.append(channel) or (0.1, 10.0))
     assert m.score(cart)["chattering_frequency"] == 10.0
     assert asked == [0]
+
+
+def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
+    t, asked = np.arange(2001) / 100, []
+    both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))
+    monkeypatch.setattr(limit_cycle, "of_trace", lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0))
+    m.scores(both)
+    m.score(both)
+    assert len(asked) == 4  # two groups, scored twice
+    kept = weakref.ref(both)
+    del both
+    gc.collect()
+    assert kept() is None
 
 
 # Invariances

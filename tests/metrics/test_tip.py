@@ -1,5 +1,7 @@
 """Scores of arms: the tip's path and force, and every metric of each joint by itself."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -67,6 +69,46 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
         felt = -(A @ pressed.reaction[k]) / (A @ A)
         np.testing.assert_allclose(pressed.reaction[k], -A * felt, atol=0.05)
         assert found.force[k] == pytest.approx(felt, rel=5e-3)
+
+
+def changed(trace, **fields):
+    """The trace as if its scenario had other fields."""
+    return dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, **fields))
+
+
+def test_contact_forces_know_a_jump_between_two_samples(pressed):
+    """From the first sample at or after it."""
+    heavy = {"payload": 2.0}
+    before, after = tip.contacts(pressed), tip.contacts(changed(pressed, mismatch=heavy))
+    assert pressed.scenario.steps > 1
+    for time in (0.5004, 0.501):
+        found = tip.contacts(changed(pressed, jump=smc.Jump(time, heavy)))
+        assert found.force[:501].tolist() == before.force[:501].tolist()
+        assert found.force[501:].tolist() == after.force[501:].tolist()
+    assert np.all(before.force[501:] != after.force[501:])
+
+
+def test_contact_forces_are_unknown_behind_parts_with_a_state_of_their_own(pressed):
+    for part in (smc.Lag(0.01), smc.Backlash(0.01)):
+        with pytest.raises(smc.ScenarioError, match=f"the state of {type(part).__name__} is not in a trace"):
+            tip.contacts(changed(pressed, actuator=part))
+
+
+LIFTED = """
+<mujoco><worldbody><geom name="floor" type="plane" size="3 3 1"/>
+  <body name="lift"><joint name="lift" type="slide" axis="0 0 1" damping="1e9"/><geom size="0.05"/>
+    <body pos="0 0 0.3"><joint name="turn" axis="0 1 0" damping="5"/>
+      <geom type="capsule" size="0.03" fromto="0 0 0 0.5 0 0" mass="1"/><site name="tip" pos="0.5 0 0"/></body>
+  </body></worldbody>
+  <actuator><motor joint="turn"/></actuator>
+  <keyframe><key name="up" qpos="0.7 0"/></keyframe></mujoco>
+"""
+
+
+def test_joints_without_a_channel_are_where_they_start():
+    """A lift that holds the arm 0.7 m higher than the model's qpos0."""
+    plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
+    np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
 
 
 def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):

@@ -184,6 +184,15 @@ def test_a_search_at_the_end_of_a_range_stays_within_it_to_the_last_bit():
     assert search.rig(search.low).values["back_emf"] == 1e-4
 
 
+def test_a_search_without_free_states_looks_for_no_other_start(monkeypatch):
+    """They would be the same start, simulated twice."""
+    search = Search(smc.rig("qube_servo"), ["back_emf"], [], [], lambda count: None)
+    search.free = np.zeros(0, int)
+    monkeypatch.setattr(Search, "refine", lambda self, stage, z, most: z + 1.0)
+    monkeypatch.setattr(Search, "better", lambda self, stage, *points: pytest.fail("it simulates"))
+    assert search.refine_from_rest(np.zeros(1), 3) == [1.0]
+
+
 def test_a_poor_fit_is_said(found):
     assert found.notes == []
     poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))

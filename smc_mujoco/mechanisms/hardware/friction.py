@@ -88,6 +88,8 @@ class LuGre(Friction):
         0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
     """
 
+    bristles = True
+
     coulomb: float
     static: float
     stribeck: float

@@ -70,6 +70,8 @@ class Part:
 class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
+    bristles: ClassVar[bool] = False  # whether it holds a joint at rest by bristles; at most one friction may
+
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
 

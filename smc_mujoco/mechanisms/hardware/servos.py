@@ -48,8 +48,6 @@ class ServoFriction(Sliding):
       vs, alpha: rad/s, 1: where dry friction falls, and how steeply; greater than 0.
     """
 
-    names = ("kv", "kc", "km", "ke", "kcs", "kms", "kes", "kmq", "keq", "vs", "alpha")
-
     kv: PerJoint = 0.0
     kc: PerJoint = 0.0
     km: PerJoint = 0.0

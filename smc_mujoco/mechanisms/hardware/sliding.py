@@ -19,7 +19,7 @@ What the callback computes is the control of an actuator `passive:<joint>`, held
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -46,9 +46,14 @@ class Sliding(Friction):
         run, at qpos0.
     """
 
-    names: ClassVar[tuple[str, ...]] = ()  # of the fields that the formula reads as p
+    bristles = True
 
     stiffness: PerJoint | None = dataclasses.field(default=None, kw_only=True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The fields that the formula reads as p: all that a class adds to this one."""
+        return tuple(field.name for field in dataclasses.fields(self) if field.name != "stiffness")
 
     @property
     def stateful(self) -> bool:
@@ -140,8 +145,6 @@ class Sigmoid(Sliding):
       hold: N m (N), 0 or more: what holds a joint at rest, in both directions. None: the limits of F, which are what
         dry friction tends to. 0: nothing does; friction is F alone, at rest too.
     """
-
-    names = ("p1", "p2", "p3", "hold")
 
     p1: PerJoint
     p2: PerJoint

@@ -154,7 +154,6 @@ def test_friction_only_takes_energy():
 class Curious(Sliding):
     """A friction of one's own, which reads all that it may."""
 
-    names = ("a", "b")
     a: float | tuple[float, ...] = 0.3
     b: float | tuple[float, ...] = 0.05
 

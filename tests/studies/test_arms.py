@@ -1,0 +1,37 @@
+"""Tasks of the arm: what seeds change, where the wall's path is, and the cost of the search for gains."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.mechanisms.plants import panda
+from smc_mujoco.metrics.tip import tip_path
+from smc_mujoco.studies import arms
+
+LAW = arms.gained("computed_torque_sliding")
+
+
+def test_seeds_move_the_start_but_at_the_wall():
+    for task in ("sway", "payload", "blow"):
+        own, other = (np.array(arms.scenario(task, LAW, seed).x0) for seed in (0, 3))
+        assert own.tolist() == [signal.values[0] for signal in arms.scenario(task, LAW).references]
+        assert 0.0 < np.abs(other - own).max() <= arms.SPREAD
+    for task in ("wall", "behind"):
+        assert arms.scenario(task, LAW, 3).x0 == arms.scenario("wall", LAW).x0
+    assert arms.scenario("wall", LAW, 3).seed == 3
+
+
+@pytest.mark.parametrize(("task", "behind"), [("wall", -5e-4), ("behind", 4e-3)])
+def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
+    scenario = arms.scenario(task, LAW)
+    joints = np.array([signal.values for signal in scenario.references]).T
+    probe = tip_path(scenario.plant, joints)[:, 0] + arms.PROBE
+    np.testing.assert_allclose(probe, panda.WALL + behind, atol=1e-6)
+
+
+def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
+    start = smc.plant("panda").rest
+    trace = smc.run(smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05))
+    rms, rate = smc.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
+    assert arms.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
+    assert np.isfinite(arms.cost(trace))
