@@ -14,7 +14,9 @@ import dataclasses
 import functools
 import importlib.metadata
 import importlib.util
+import itertools
 import operator
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
@@ -64,20 +66,41 @@ class Added(Generic[T_co]):
     def __str__(self) -> str:
         return f"package {self.package!r}: its {KINDS[self.point.group][0]} {self.point.name!r} ({self.point.value})"
 
-    @functools.cached_property
+    @property
     def value(self) -> T_co:
         """The entry.
 
         Raises:
           ScenarioError: it cannot be loaded, or is not what it should be.
         """
+        found = self._load() if _being_imported(self.point.module) else self._loaded
+        if isinstance(found, ScenarioError):
+            raise ScenarioError(str(found)) from found.__cause__
+        return found
+
+    @functools.cached_property
+    def _loaded(self) -> T_co | ScenarioError:
+        """What `_load` returned first: a package that fails is imported once, not at each look at the list."""
+        return self._load()
+
+    def _load(self) -> T_co | ScenarioError:
+        """Return the entry, or the error that says what is wrong with it."""
         try:
             return self.make(self.point)
         except ScenarioError as error:
-            raise ScenarioError(f"{self}: {error}") from None
+            return ScenarioError(f"{self}: {error}")
         except (Exception, SystemExit) as error:  # whatever another package raises
             why = one_line(f"{type(error).__name__}: {error}")
-            raise ScenarioError(f"{self} cannot be loaded ({why}): update or uninstall that package") from error
+            failed = ScenarioError(f"{self} cannot be loaded ({why}): update or uninstall that package")
+            failed.__cause__ = error
+            return failed
+
+
+def _being_imported(module: str) -> bool:
+    """Return whether a module, or a package around it, is being imported, so that its entries may not be there yet."""
+    around = itertools.accumulate(module.split("."), "{}.{}".format)
+    specs = (getattr(sys.modules.get(name), "__spec__", None) for name in around)
+    return any(getattr(spec, "_initializing", False) for spec in specs)  # importlib's own mark
 
 
 class Catalogue(Mapping[str, T_co]):

@@ -117,6 +117,7 @@ def compute_elsewhere(
       ScenarioError: the workers died, cannot load the scenarios, or have other code than this process.
     """
     sent: dict[Future[list[Outcome]], Batch] = {}
+    plants: run_key.Hashes = {}
 
     def collect(most: int) -> None:
         """Finish batches until at most `most` are under way."""
@@ -132,7 +133,7 @@ def compute_elsewhere(
         for batch in batches:
             collect(UNDER_WAY - 1)
             scenarios = [one.scenario for one in batch]
-            task = _packed(scenarios), [run_key.key(s) for s in scenarios]
+            task = _packed(scenarios), [run_key.key(s, plants=plants) for s in scenarios]
             try:
                 sent[pool.submit(work, *task)] = batch
             except RuntimeError as error:  # it was shut down, or its workers died
@@ -172,8 +173,9 @@ def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
         scenarios: list[Scenario] = pickle.loads(packed)
     except (ImportError, AttributeError) as error:
         raise ScenarioError(f"a worker says {error}: put your laws in a module that workers can import") from None
+    plants: run_key.Hashes = {}
     for scenario, sent in zip(scenarios, keys, strict=True):
-        if run_key.key(scenario) != sent:
+        if run_key.key(scenario, plants=plants) != sent:
             versions = {"Python": platform.python_version()} | run_key.described(scenario)["versions"]
             here = ", ".join(f"{name} {version}" for name, version in versions.items())
             raise ScenarioError(f"a worker has other code for {scenario.law} ({here}): install the same there as here")

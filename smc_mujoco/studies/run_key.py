@@ -19,6 +19,7 @@ from smc_mujoco.studies.papers.gaber import scenarios
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
+Hashes = dict[Plant, list[str]]  # of the code and the files of other packages' plants, for runs that are keyed together
 UNRELATED = (
     "studies/audit",
     "studies/papers",
@@ -36,15 +37,19 @@ def described(scenario: Scenario) -> dict[str, Any]:
     return data
 
 
-def key(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
+def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None) -> str:
     """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions.
 
-    `data` is the result of `described`, if the caller has it.
+    Args:
+      data: the result of `described`, if the caller has it.
+      plants: a dict that keeps the hashes of plants from one call to the next, for callers with many runs. It begins
+        empty, as the file that a plant reads may change until the next study.
     """
     data = data or described(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
-    text = to_json([data, _codes(scenario), fingerprint.package(*UNRELATED)], sort_keys=True)
+    codes = _codes(scenario, {} if plants is None else plants)
+    text = to_json([data, codes, fingerprint.package(*UNRELATED)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
@@ -54,14 +59,14 @@ def portable_key(scenario: Scenario) -> str:
     It holds neither the versions of packages nor the rest of this package's code, on which a run depends too.
     """
     data = described(scenario) | {"versions": None, "condition": None}  # a condition's name adds nothing to the fields
-    return hashlib.sha256(to_json([data, _codes(scenario)], sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(to_json([data, _codes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
 
 
-def row(scenario: Scenario) -> dict[str, Any]:
-    """Return the columns of a table that describe a run."""
+def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
+    """Return the columns of a table that describe a run. `plants` is that of `key`."""
     data = described(scenario)
     return {
-        "hash": key(scenario, data),
+        "hash": key(scenario, data, plants),
         "plant": scenario.plant.name,
         "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)),
@@ -91,21 +96,26 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
 
-def _codes(s: Scenario) -> list[str]:
-    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's plant and parts."""
+def _codes(s: Scenario, plants: Hashes) -> list[str]:
+    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's parts and plant."""
     functions = [part.function for part in (*s.law.parts, s.velocity, s.surface) if part is not None]
     known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
     signals = [type(signal) for signal in known if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
-    own: list[Any] = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
-    mjcf: list[str] = []
-    if not s.plant.build.__module__.startswith(PACKAGE):
-        builds = *s.plant.contacts.items(), *s.plant.mechanisms.items()
-        own += [s.plant.build, s.plant.fields, s.plant.nominal, builds]
-        mjcf = [digest_of(s.plant.spec())]  # which its build may read from a file
-    elif not s.plant.nominal.__module__.startswith(PACKAGE):
-        own.append(s.plant.nominal)
-    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)] + mjcf
+    own = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
+    if s.plant not in plants:
+        plants[s.plant] = _plant_codes(s.plant)
+    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)] + plants[s.plant]
+
+
+def _plant_codes(plant: Plant) -> list[str]:
+    """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file."""
+    if plant.build.__module__.startswith(PACKAGE):
+        own = [] if plant.nominal.__module__.startswith(PACKAGE) else [plant.nominal]
+        return [fingerprint.of(thing) for thing in own]
+    builds = *plant.contacts.items(), *plant.mechanisms.items()
+    functions = plant.build, plant.fields, plant.nominal, builds
+    return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
 
 
 def _compared(data: dict[str, Any]) -> str:

@@ -91,7 +91,8 @@ def study(
     find("choice of traces", traces, dict.fromkeys(saved_traces.CHOICES))
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
-    by_key = _by_key(scenarios)
+    plants: run_key.Hashes = {}
+    by_key = _by_key(scenarios, plants)
     store.open(resume)
     missing = [scenario for name, scenario in by_key.items() if name not in store.where]
     if progress and (done := len(by_key) - len(missing)):
@@ -99,12 +100,12 @@ def study(
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
 
         def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
-            store.add([run_key.row(one.scenario) | its for one, its in zip(batch, outcomes, strict=True)])
+            store.add([run_key.row(one.scenario, plants) | its for one, its in zip(batch, outcomes, strict=True)])
             counts.finished(len(batch))
 
         def finish_here(batch: Batch, found: Sequence[Trace]) -> None:
             for trace in found if traces == "all" else ():
-                trace.save(saved_traces.path(folder, run_key.row(trace.scenario)))
+                trace.save(saved_traces.path(folder, run_key.row(trace.scenario, plants)))
             finish(batch, [executors.outcome(trace) for trace in found])
 
         if where == "local":
@@ -118,7 +119,7 @@ def study(
     return table
 
 
-def _by_key(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
+def _by_key(scenarios: Iterable[Scenario], plants: run_key.Hashes) -> dict[str, Scenario]:
     """Return key -> scenario, in order, with the first of equal ones."""
     found: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
@@ -126,7 +127,7 @@ def _by_key(scenarios: Iterable[Scenario]) -> dict[str, Scenario]:
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         checked_name(scenario.law)
-        found.setdefault(key(scenario), scenario)
+        found.setdefault(key(scenario, plants=plants), scenario)
     if not found:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
     return found

@@ -127,6 +127,20 @@ def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
     assert plant.catalogue()["early_plant"] is early_plants.early_plant
 
 
+def test_a_package_that_lists_the_catalogue_before_its_entry_is_there_has_it_afterwards(install):
+    """As a script does that compares its own law with all others."""
+    install(
+        "forward",
+        {"laws": {"forward_law": "forward_laws:forward_law"}},
+        forward_laws="import smc_mujoco as smc\nbefore = smc.laws()\n" + LAW.replace("NAME", "forward_law"),
+    )
+    with pytest.warns(smc.PackageWarning, match="'forward_law'"):
+        import forward_laws  # pyright: ignore[reportMissingImports]
+    assert "forward_law" not in forward_laws.before
+    assert smc.law("forward_law").name == "forward_law"
+    assert "forward_law" in smc.laws()
+
+
 def test_every_catalogue_takes_entries(install):
     install(
         "many",
@@ -167,6 +181,22 @@ def test_a_package_brings_the_gains_of_its_law(install):
     text = '{"scenario": {"law": {"gains": {"k": 7.0}}}}'
     (folder / "tuned_gains" / "balanced" / "duffing-tuned_law.json").write_text(text)
     assert gain_sets.law("duffing", "tuned_law").gains["k"] == 7.0
+
+
+def test_a_study_hashes_a_package_s_plant_once(install, tmp_path, monkeypatch):
+    """Writing its model as XML takes longer than a short run."""
+    install(
+        "hashed",
+        {"plants": {"hashed_plant": "hashed_plants:hashed_plant"}},
+        hashed_plants=PLANT.replace("NAME", "hashed_plant")
+        + "build = hashed_plant.build\nhashed_plant = dataclasses.replace(hashed_plant, build=lambda n: build(n))\n",
+    )
+    hashed, real = [], run_key.digest_of
+    monkeypatch.setattr(run_key, "digest_of", lambda spec: hashed.append(spec) or real(spec))
+    runs = smc.grid(["hashed_plant"], ["classical", "pid"], ["nominal"], seeds=4, duration=0.02, gains="default")
+    smc.study(runs, tmp_path / "study")
+    assert len(hashed) == 1
+    assert len({*map(run_key.key, runs)}) == len(runs)
 
 
 def test_a_run_s_key_has_the_mjcf_that_a_plant_reads(install):
@@ -234,6 +264,21 @@ def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):
     assert "good" in smc.laws()
     assert not BROKEN.keys() & {*smc.laws()}
     assert smc.run(smc.Scenario(plant="duffing", law="good", duration=0.01)).failure is None
+
+
+def test_an_entry_that_fails_is_loaded_once(install, monkeypatch):
+    """Else each list, and each look at a name, would take as long as the import of that package."""
+    install("slow", {"laws": {"slow_law": "slow_laws:slow_law"}}, slow_laws="raise ImportError('no torch')")
+    loads, real = [], catalogue.EntryPoint.load
+    monkeypatch.setattr(catalogue.EntryPoint, "load", lambda point: loads.append(point.name) or real(point))
+    sentences = set()
+    for _ in range(3):
+        with pytest.raises(smc.ScenarioError) as raised:
+            smc.law("slow_law")
+        sentences.add(str(raised.value))
+        assert isinstance(raised.value.__cause__, ImportError)
+    said(smc.laws)
+    assert (loads, len(sentences)) == (["slow_law"], 1)
 
 
 def test_a_name_of_the_library_is_not_taken_over(install):

@@ -258,8 +258,9 @@ def tried(source: Source, timeout: float) -> None:
 def _complaint(source: Source, last: str, code: int | None, timeout: float) -> ScenarioError:
     """Return the error for a model, from the last line of its trial and the exit code, None if it was stopped."""
     stage, _, words = last.partition(" ")
-    full = code == -getattr(signal, "SIGKILL", 0) or re.search(r"unknown exception|bad_alloc|memory|allocat", words)
-    if full:
+    names = {known.value: known.name for known in signal.Signals}
+    how = "" if code is None else names.get(-code, f"exit code {code}")
+    if how == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", words):
         return ScenarioError(f"{source.label} takes MuJoCo more than {MEMORY / 2**30:g} GiB of memory: make it smaller")
     if stage == "error":
         return broken(source.path or source.label, words)
@@ -267,8 +268,6 @@ def _complaint(source: Source, last: str, code: int | None, timeout: float) -> S
         return ScenarioError(
             f"{source.label} takes MuJoCo more than {timeout:g} s to compile: make it smaller, or give timeout="
         )
-    names = {known.value: known.name for known in signal.Signals}
-    how = names.get(-code, f"exit code {code}")
     hint = f"more than {MEMORY / 2**30:g} GiB of memory" if how == "SIGABRT" else "a model that attaches itself"
     return ScenarioError(f"{source.label} ends MuJoCo with {how}, as does {hint}: fix the model")
 

@@ -29,7 +29,7 @@ from smc_mujoco.studies.audit.paper import Entry, Paper, duration_of
 from smc_mujoco.studies.audit.threshold import Threshold
 from smc_mujoco.studies.audit.verdict import Check, check
 from smc_mujoco.studies.executors import outcome
-from smc_mujoco.studies.run_key import key
+from smc_mujoco.studies.run_key import Hashes, key
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
@@ -179,7 +179,8 @@ class Runs:
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
         """Return every metric of every scenario, in order; a run that fails has inf in every metric."""
-        wanted = [(_key(scenario), scenario) for scenario in scenarios]
+        plants: Hashes = {}
+        wanted = [(_key(scenario, plants), scenario) for scenario in scenarios]
         new = {name: scenario for name, scenario in wanted if name not in self._known}
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
@@ -199,8 +200,9 @@ class Runs:
         """Return the traces of scenarios, in order; they are not kept."""
         wanted: Sequence[Scenario] = list(scenarios)
         traces = dict(stream(wanted, self.threads))
+        plants: Hashes = {}
         for i, scenario in enumerate(wanted):
-            name = _key(scenario)
+            name = _key(scenario, plants)
             self.used[name] = self.used.get(name, Used(scenario))._replace(trace=_hash_of_trace(traces[i]))
         return [traces[i] for i in range(len(wanted))]
 
@@ -214,9 +216,9 @@ def of_table(table: "Table") -> dict[str, Result]:
     return {row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()}
 
 
-def _key(scenario: Scenario) -> str:
+def _key(scenario: Scenario, plants: Hashes) -> str:
     """Return the key of a run without the name of its condition, which changes nothing in it."""
-    return key(scenario.named(None))
+    return key(scenario.named(None), plants=plants)
 
 
 def _hash_of_scores(scores: Scores) -> str:
