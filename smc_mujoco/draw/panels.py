@@ -268,7 +268,7 @@ def rests(trace: Trace) -> list[int]:
 def target(ax: Axes, panel: Panel) -> None:
     """Draw each reference (zero for an error) as long as a run has it, its settling band, and the play of a gear."""
     several = sorted(panel.traces, key=lambda trace: len(trace.t))
-    for trace in {trace.scenario.reference: trace for trace in several}.values():
+    for trace in {trace.scenario.resolved.reference: trace for trace in several}.values():
         r = reference(trace)
         known = np.isfinite(r)
         r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
@@ -319,7 +319,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     low, high = limits(traces, "v")
     longest = sorted(traces, key=lambda trace: len(trace.t))
-    for trace in {trace.scenario.reference: trace for trace in longest}.values():
+    for trace in {trace.scenario.resolved.reference: trace for trace in longest}.values():
         r, dr = orbit(trace)
         if dr.any():
             ax.plot(r, dr, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
@@ -330,7 +330,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
 
 def reference(trace: Trace) -> np.ndarray:
     """Return the reference of a trace's channels, (K + 1,), or the mean of their references if these differ."""
-    return trace.r.mean(axis=1) if isinstance(trace.scenario.reference, PerChannel) else trace.r[:, 0]
+    return trace.r.mean(axis=1) if isinstance(trace.scenario.resolved.reference, PerChannel) else trace.r[:, 0]
 
 
 def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from smc_mujoco.common.html import Html, fields, panel
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import coerce
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
@@ -22,7 +21,6 @@ MAX_VALUE = 200  # characters of a value
 def scenario(s: "Scenario") -> Html:
     """Return the fields that a scenario was given, and below them the defaults that it resolves to."""
     defaults = {one.name: one.default for one in dataclasses.fields(s)}
-    defaults["reference"] = coerce.reference(None, s.plant)
     given = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
     blank = (None, (), {})
     plain = {"noise": _nothing(s.noise), "contact": s.contact.kind == "none"}

@@ -452,7 +452,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
 
 def references(scenario: Scenario) -> tuple[Signal, ...]:
     """Return the reference of all channels, or those of the driven channels if they differ."""
-    one = scenario.reference
+    one = scenario.resolved.reference
     return one.signals if isinstance(one, PerChannel) else (one,)
 
 

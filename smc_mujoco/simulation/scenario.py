@@ -108,9 +108,10 @@ class Scenario:
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
 
     A field is None where nothing was given and its default depends on other fields: model, physics_step, u_max, x0, v0,
-    velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps None, so
-    that a default follows the fields that it depends on. Scenarios whose resolved fields are equal are equal, and give
-    the same trace to the last bit.
+    reference, velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps
+    None, so that a default follows the fields that it depends on. The law alone is never None: one that is left out is
+    taken from the plant's channels at once. Scenarios whose resolved fields are equal are equal, and give the same
+    trace to the last bit.
 
     Raises:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
@@ -131,7 +132,7 @@ class Scenario:
     u_max: float | tuple[float, ...] | None = field(converter=coerce.unchanged_bound, default=None)
     x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
     v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
-    reference: Signal = field(converter=coerce.unchanged_reference, default=None)
+    reference: Signal | None = field(converter=coerce.unchanged_reference, default=None)
     feedforward: Signal | None = field(converter=coerce.feedforward, default=None)
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
@@ -253,7 +254,7 @@ class Scenario:
     @property
     def references(self) -> tuple[Signal, ...]:
         """The reference of each driven channel."""
-        one = self.reference
+        one = self.resolved.reference
         return one.signals if isinstance(one, PerChannel) else (one,) * self.plant.driven
 
     @functools.cached_property
@@ -336,6 +337,7 @@ class Resolved(Scenario):
     u_max: float | tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
     x0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
     v0: tuple[float, ...]  # pyright: ignore[reportIncompatibleVariableOverride]
+    reference: Signal  # pyright: ignore[reportIncompatibleVariableOverride]
     velocity: Estimator  # pyright: ignore[reportIncompatibleVariableOverride]
     integrator: str
 
@@ -359,6 +361,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "u_max": suggested_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
+        "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": "implicitfast" if s.realistic else "RK4",
     }

@@ -28,7 +28,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
-DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0")  # None where not given
+DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
 PARTS = ("friction", "contact", "actuator", "sensor")
 OTHER_LAWS = ("smc_mujoco.studies.boards.entries",)  # modules with laws that are not in the catalogue
 T = TypeVar("T")

@@ -117,6 +117,9 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
     assert plant == plain  # the same mechanism
     assert smc.Scenario(plant=plain, **others, **COMMON) == given
     assert pickle.loads(pickle.dumps(suggested)) == suggested
+    assert suggested.reference is None
+    assert suggested.references == (SINE, REST)
+    assert dataclasses.replace(suggested, plant=plain).references == (REST, REST)  # a default follows the plant
 
 
 REFUSED = {

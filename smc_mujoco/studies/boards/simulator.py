@@ -187,7 +187,7 @@ class Machine:
     def __init__(self, scenario: Scenario):
         resolved = scenario.resolved
         self.driven = shoulder_first(scenario.plant.name).index(0)
-        if scenario.surface is not None or scenario.reference != REST or scenario.feedforward is not None:
+        if scenario.surface is not None or resolved.reference != REST or scenario.feedforward is not None:
             raise ScenarioError(
                 f"the robustness test of {scenario.plant.name} is one of the law and its estimator alone: leave out "
                 "surface, reference and feedforward"
