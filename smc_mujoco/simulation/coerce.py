@@ -202,26 +202,20 @@ def suggested_reference(plant: Plant) -> Signal:
     """Return the reference that the plant's channels suggest, and the plant's rest for those that suggest none."""
     resting = [Constant(x) for x in plant.rest] or [REST]
     given = plant.suggested.get("reference", (None,) * len(resting))
-    each_one = [still if one is None else one for still, one in zip(itertools.cycle(resting), given, strict=False)]
-    return one_or_each(each_one)
+    return reference(
+        [still if one is None else one for still, one in zip(itertools.cycle(resting), given, strict=False)], plant
+    )
 
 
-def one_or_each(signals: Sequence[Signal]) -> Signal:
-    """Return one signal for all channels where theirs are equal, otherwise one that has a signal for each."""
-    return signals[0] if all(one == signals[0] for one in signals) else PerChannel(tuple(signals))
-
-
-def reference(value: Signal | ByChannel[Signal] | None, plant: Plant) -> Signal | None:
+def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each."""
-    if value is None:
-        return None
     value = value.signals if isinstance(value, PerChannel) else value
     listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
     items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
     for item in items:
         if not isinstance(item, Signal):
             raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant(0.0)")
-    return one_or_each(items)
+    return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 
 def feedforward(value: Signal | None) -> Signal | None:

@@ -181,7 +181,7 @@ class Scenario:
             raise ScenarioError(f"contact is {shown(self.contact)}: give smc.Contact(...) or one of {kinds}")
         self.contact.check(self.plant)
         put(law=coerce.laws(self.law, self.plant))
-        put(reference=coerce.reference(self.reference, self.plant))
+        put(reference=None if self.reference is None else coerce.reference(self.reference, self.plant))
         put(model=coerce.one_of("model", self.model, coerce.MODELS))
         put(integrator=coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS))
         put(mechanism=coerce.mechanism(self.mechanism, self.plant))

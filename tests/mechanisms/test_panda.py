@@ -134,11 +134,19 @@ def test_the_default_reference_is_the_makers_ready_pose():
     ready = np.radians([0, -45, 0, -135, 0, 90, 45])
     scenario = smc.Scenario(plant="panda", law="computed_torque_sliding", duration=0.01)
     np.testing.assert_allclose([signal.amplitude for signal in scenario.references], ready)
-    assert dataclasses.replace(scenario, seed=1).reference == scenario.reference
     held = dataclasses.replace(scenario, reference=smc.Constant(0.0))
     assert set(held.references) == {smc.Constant(0.0)}
+
+
+def test_a_reference_that_is_left_out_follows_the_plant():
+    scenario = smc.Scenario(plant="panda", law="computed_torque_sliding", duration=0.01)
+    assert scenario.reference is None
+    other = dataclasses.replace(scenario, plant="double_pendulum")
+    assert (other.reference, other.references) == (None, (smc.Constant(0.0),) * 2)
+    given = dataclasses.replace(scenario, reference=scenario.references)
+    assert given == scenario
     with pytest.raises(smc.ScenarioError, match="reference has 7 values for the 2 driven channels of double_pendulum"):
-        dataclasses.replace(scenario, plant="double_pendulum")
+        dataclasses.replace(given, plant="double_pendulum")
 
 
 def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():

@@ -8,12 +8,14 @@ import json
 import math
 import pickle
 
+import mujoco
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.simulation import native, reference, serialise
+from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.signals import (
     TERMS,
     BandLimited,
@@ -160,6 +162,27 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
     length = smc.plant(name).parameters["l"]
     np.testing.assert_allclose(gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7)
     np.testing.assert_allclose(gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4)  # and is logged as it acts
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("axis", "force"), [("x", "y"), ("y", "x"), ("z", "x")])
+def test_a_gust_turns_a_hinge_by_its_arm(axis, force, sign):
+    """Against MuJoCo's own torque of a force of 1 N at the body's centre of mass, which is off all axes."""
+    turn = " ".join(str(sign * (name == axis)) for name in "xyz")
+    mjcf = f"""<mujoco><worldbody><body pos=".1 .2 .3"><joint name="q" axis="{turn}"/>
+        <geom type="sphere" size=".1" pos=".2 .3 .4" mass="1"/></body></worldbody>
+        <actuator><motor joint="q"/></actuator>
+        <sensor><jointpos joint="q"/><jointvel joint="q"/></sensor></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    data = mujoco.MjData(model)
+    data.qpos[0] = 0.4
+    mujoco.mj_forward(model, data)
+    (channel,) = channels(model)
+    torque, push = np.zeros(model.nv), np.array([float(name == force) for name in "xyz"])
+    mujoco.mj_applyFT(model, data, push, np.zeros(3), data.xipos[1], 1, torque)
+    arm = data.xipos.ravel()[channel["tip"]] - data.xanchor.ravel()[channel["anchor"]]
+    assert channel["push_sign"] * arm == pytest.approx(torque[0], rel=1e-12)
+    assert channel["push"] == 6 + "xyz".index(force)
 
 
 @pytest.mark.parametrize("step", [1e-3, 5e-4, 2.5e-4, 1e-4])
