@@ -308,7 +308,7 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
 
 
 def test_an_extra_that_pip_cannot_install_here_names_a_python_on_which_it_can(monkeypatch):
-    monkeypatch.setattr(extras, "LAST", {"dm": (3, 10)})
+    monkeypatch.setattr(extras, "LAST_PYTHON", {"dm": (3, 10)})
     assert extras.cure("dm").startswith("take Python 3.10, ")
     assert extras.cure("rl") == "pip install 'smc-mujoco[rl]'"
 

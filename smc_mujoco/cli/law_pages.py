@@ -23,11 +23,12 @@ from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import Plant
 
-INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")
+INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")  # of authors
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
+# Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
-ARRIVES = {"s": "s", "e": "e", "": "–"}
-CALLS = {
+ARRIVES = {"s": "s", "e": "e", "": "–"}  # what is 0 after a finite time -> cell of a table
+CALLS = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",
     "estimator": "smc.Scenario(velocity=smc.estimator({}), ...)",
@@ -35,7 +36,7 @@ CALLS = {
 
 
 def catalogue() -> dict[str, list[tuple[Template, str]]]:
-    """Return name -> the law, the surface and the velocity estimator of that name, each with its package."""
+    """Return name -> the law, surface and velocity estimator of that name, each with its package."""
     by_name: dict[str, list[tuple[Template, str]]] = {}
     for templates in CATALOGUES.values():
         for name, template in templates().items():
@@ -44,7 +45,7 @@ def catalogue() -> dict[str, list[tuple[Template, str]]]:
 
 
 def brief(source: str) -> str:
-    """Return a source in short: its first author, or two, and its year."""
+    """Return a source in short: its one or two authors, or the first "et al.", and its year."""
     first = INITIALS.sub("", source).partition(";")[0]
     authors, *others = re.split(r", | \(", first.partition('"')[0])
     if authors.startswith("the law of "):  # what follows is by others
@@ -81,11 +82,16 @@ def print_pages(name: str | None, console: Console) -> None:
             table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
         console.print(table, "")
     filters = "[cyan]smc-mujoco laws --needs continuous,two-gains[/]"
-    console.print(f"One in full: [cyan]smc-mujoco laws NAME[/]; those that suit: {filters}", highlight=False)
+    console.print(f"One in full: [cyan]smc-mujoco laws NAME[/]. Only some: {filters}", highlight=False)
 
 
 def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:
     """Print a table of the laws that have all these properties, with what distinguishes them.
+
+    Args:
+      needs: names of PROPERTIES.
+      family: only laws of this family; None for any.
+      plant: only laws that suit this plant; None for any.
 
     Raises:
       ScenarioError: an unknown property, family or plant.
@@ -96,7 +102,7 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
     title = f"{len(found)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
     title += f" for {kind}" * (kind is not None)
     if "no-velocity" in needs:
-        text = 'Every law runs without a velocity sensor where the scenario estimates it: velocity="levant".'
+        text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
     if not found:
         console.print(f"{title}: leave out a need, --family or --plant", highlight=False)
@@ -107,12 +113,16 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
         u = "continuous" if law.continuous else "jumps"
         table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
     console.print(table, "")
-    key = "arrives: what is 0 after a finite time by theory, s or the error e. u: whether it jumps there."
+    key = "u: continuous, or jumps. arrives: what theory says is 0 after a finite time, s or the error e."
     console.print(key, style="dim", highlight=False)
 
 
 def print_page(template: Template, console: Console, package: str = "") -> None:
-    """Print everything about one law, surface or estimator, and the package that it is from if that is another one."""
+    """Print everything about one law, surface or estimator.
+
+    Args:
+      package: that it is from; "" for this one.
+    """
     parts, is_law = entry(template), template.kind == "law"
     console.print(Text.assemble((template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")))
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))

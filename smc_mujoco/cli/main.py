@@ -49,14 +49,14 @@ for name, command in COMMANDS.items():
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line. An error that the user can correct ends in one sentence and exit code 2."""
-    for name in ("stdin", "stdout", "stderr"):  # in this order, so that each gets the descriptor that was closed
+    for name in ("stdin", "stdout", "stderr"):  # a closed stream; in this order each gets its own descriptor again
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
+        stream.reconfigure(errors="replace")  # a character that the terminal lacks is shown as ?
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
-    choose_gl()  # before a command imports mujoco, which fails where MUJOCO_GL names no backend
+    choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
 

@@ -1,4 +1,4 @@
-"""Performance of a scene: from its declaration to printed scores, traces, figures and a film."""
+"""Running a scene: from its declaration to printed scores, traces, figures and a film."""
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +33,13 @@ def perform(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
 
-    Each trace is written as .npz, and also in the formats of `export`. `speed` is the film's.
+    Args:
+      video: whether to film the scene.
+      threads: simulations at once; None for one per core.
+      clock: measures the time of each part.
+      export: formats in which traces are written besides .npz.
+      question: printed first.
+      speed: playback speed of the film; None to choose it by the motion.
     """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
@@ -73,7 +79,7 @@ def _title(scene: Scene, condition: str) -> str:
 
 
 def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullcontext) -> Traces:
-    """Run all scenarios of the scene, in one call, with a progress bar."""
+    """Run all scenarios of the scene at once, with a progress bar."""
     with clock("compiling"):
         runs = [(condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()]
     traces: dict[str, dict[str, Trace]] = {condition: {} for condition in scene.conditions}
@@ -85,7 +91,7 @@ def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullco
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
-    """Save each run as .npz, and in each format of Trace.export; return the files."""
+    """Save each run as .npz, and in each format of `export`; return the files."""
     written: list[Path] = []
     for condition, runs in traces.items():
         for label, trace in runs.items():
@@ -129,7 +135,7 @@ def _labels(runs: Mapping[str, Trace]) -> list[str]:
 
 
 def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None = None) -> list[Path]:
-    """Film the scene's filmed condition; where nothing can render, print why and return no file."""
+    """Film the scene's filmed condition and return the file; if nothing can render, print why and return []."""
     runs = traces[scene.film]
     path = out / f"{slug(scene.film)}.mp4"
     return filmed(list(runs.values()), path, _labels(runs), _title(scene, scene.film), terminal, speed, scene.camera)
@@ -144,7 +150,7 @@ def filmed(
     speed: float | None = None,
     camera: Camera | None = None,
 ) -> list[Path]:
-    """Film runs with a progress bar and return the file; where nothing can render, print why and return no file."""
+    """Film runs with a progress bar and return the file; if nothing can render, print why and return []."""
     from smc_mujoco.draw.film import film as video
 
     if sentence := video.missing() or gl.note():

@@ -1,4 +1,4 @@
-"""Tables of the command line: scores, answers, traces, leaderboards, advice, margins, tunings, claims."""
+"""Tables of the command line: scores, leaderboards, boards, advice, margins, chattering, tunings, claims, rigs."""
 
 import math
 import textwrap
@@ -55,7 +55,7 @@ BOARD_KEY = (
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
     "x, u of driven joints, in rad or m, and N m, N or V"
 )
-BOARDS = {  # of RealAIGym -> what it shows, and the headings of its columns
+BOARDS = {  # board of RealAIGym -> title and headings of columns
     "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),
     "robustness": (
         "survived",
@@ -63,6 +63,7 @@ BOARDS = {  # of RealAIGym -> what it shows, and the headings of its columns
     ),
 }
 MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
+MIN_FIT = -1000.0  # %: a twin with a smaller fit moves away from the record, chosen for the width of a column
 # Verdicts have a colour beside their mark, from a palette for the colour-blind.
 COLOURS = {
     verdicts.SUPPORTED: "blue",
@@ -88,9 +89,9 @@ def plain(*columns: Column | str, **options: Any) -> Table:
 
 
 def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table for each group of channels: a line for each run, a column for each metric.
+    """Return a table for each group of channels, with a line for each run and a column for each metric.
 
-    Where there are several groups, the titles name them.
+    If there are several groups, the titles name them.
     """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
@@ -110,7 +111,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     return tables
 
 
-MAX_TIP_COLUMNS = 5  # so that the joint's name fits into 80 columns
+MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
 TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
@@ -123,7 +124,7 @@ TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score,
 
 
 def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table of what the tips of arms do, with the joint that works hardest; none for other plants."""
+    """Return a table of the tips of arms, with the joint that does most work; [] for other plants."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
@@ -144,7 +145,7 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
 
 
 def headings(scenario: Scenario) -> dict[Group, str]:
-    """Return the plant's groups of channels, each with a heading that names its joints; a single group has none."""
+    """Return group of channels -> heading that names its joints; "" for the only group of a plant."""
     each = groups(scenario)
     if len(each) == 1:
         return {each[0]: ""}
@@ -158,10 +159,13 @@ def headings(scenario: Scenario) -> dict[Group, str]:
 
 
 def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
-    """Return the tables of some metrics of condition -> label -> trace.
+    """Return a table for each metric, with a line for each label and a column for each condition.
 
-    There is a table for each metric, with a line for each label and a column for each condition. A single condition
-    has one table, with a column for each metric. Metrics that apply to no plant are left out.
+    If there is only one condition, there is one table, with a column for each metric.
+
+    Args:
+      names: of the metrics. Those that apply to none of the plants are left out.
+      traces: condition -> label -> trace.
     """
     every = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = {(scenario.plant, scenario.efforts[0]): None for scenario in every}
@@ -187,14 +191,14 @@ def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]
 
 
 def _cell(metric: Metric, trace: Trace | None) -> Text | str:
-    """Return a metric of a run as text; "" if there is no run, or the metric does not apply to its plant."""
+    """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
     return FAILED if trace.diverged_at is not None else number(metric.of(trace))
 
 
 def _by_label(title: str, heads: Iterable[Text], width: int = 16) -> Table:
-    """Return an empty table with a column for labels, cut to a width, and columns for numbers."""
+    """Return an empty table with a column for labels, at most `width` characters wide, and columns for numbers."""
     label = Column("law", no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     return titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
@@ -241,7 +245,7 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
 
 
 def with_package(line: str, package: str) -> str:
-    """Return the line about an entry, with the name of the package that it is from if that is another one."""
+    """Return the line about an entry, with the name of its package in brackets; "" stands for this package."""
     return f"{line} [{package}]" if package else line
 
 
@@ -292,13 +296,18 @@ def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | No
 
 
 def _sample(blocks: Sequence[Block]) -> str:
-    """Return the sample of the blocks in words, or the largest number of seeds where samples differ."""
+    """Return the sample of the blocks in words, or the largest number of seeds if the samples differ."""
     samples = {_folded(block.sample, 15) for block in blocks}
     return samples.pop() if len(samples) == 1 else f"{max(block.seeds for block in blocks)} seeds"
 
 
 def _block_cell(board: Board | None, like: Block) -> Text:
-    """Return the winner of the block with the plant and condition of `like`, and two medians; else how many tie."""
+    """Return the winner of a block with its median and the next one, or how many laws are level.
+
+    Args:
+      board: None if the metric has no board.
+      like: a block of the plant and condition that are meant.
+    """
     blocks = {(block.plant, block.condition): block for block in board.blocks} if board else {}
     block = blocks.get((like.plant, like.condition))
     if board is None or block is None:
@@ -351,11 +360,11 @@ def _winner_cell(board: Board | None) -> Text:
     return text
 
 
-# advice
+# boards and advice
 
 
 def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: str) -> Table:
-    """Return a simulation or a robustness board as a table, with the row of the name `own` in bold."""
+    """Return RealAIGym's simulation board or robustness board of a robot, with the row named `own` in bold."""
     tests = isinstance(rows[0], RobustnessRow)
     title, heads = BOARDS["robustness" if tests else "simulation"]
     columns = [Column(head, justify="right") for head in heads]
@@ -380,13 +389,13 @@ def advice(found: Advice) -> Table:
 
 
 def _two_lines(cell: str) -> str:
-    """Return "1.2 (1.1 to 1.3) *" with its interval on a second line."""
+    """Return "1.2 (1.1 to 1.3) *" as two lines, the second with the interval."""
     middle, _, rest = cell.partition(" (")
     interval, _, star = rest.partition(")")
     return f"{middle}{star}\n{interval.replace(' to ', '–')}" if rest else cell
 
 
-# margins and tunings
+# margins, chattering and tunings
 
 
 def margins(kind: str, found: Sequence[Margin]) -> Table:
@@ -411,7 +420,13 @@ def chattering(
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
 ) -> Table:
-    """Return predicted and measured limit cycles, a line for each scenario."""
+    """Return predicted and measured limit cycles, a line for each scenario.
+
+    Args:
+      channel: the driven channel.
+      cycles: the predictions.
+      measured: amplitude of s in its unit, and frequency in Hz.
+    """
     plant = scenarios[0].plant
     last = "coupling" if plant.driven > 1 else "third"
     heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
@@ -431,7 +446,7 @@ def _share(share: float) -> str:
 
 
 def designs(designs: Sequence[Design], unit: str) -> Table:
-    """Return the gains of each design and the constant disturbance, in this unit, that it tolerates."""
+    """Return the gains of each design, and the constant disturbance, in `unit`, that it tolerates."""
     table = titled("largest gains", "law", "gains", Column(f"tolerates ({unit})", justify="right"))
     for one in designs:
         gains = ", ".join(f"{name}={number(gain)}" for name, gain in one.law.gains.items() if math.isfinite(gain))
@@ -517,16 +532,23 @@ def _print_claim(claim: Claim, console: Console) -> None:
         console.print(Padding(table, (0, 0, 1, 2)))
 
 
+# rigs
+
+
 def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return the fit of each twin of a record, percent; one beyond all measure is "falls"."""
+    """Return the fit of each twin of a record, %; "falls" for one below MIN_FIT."""
     table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(found.values()))))
     for name, fit in found.items():
-        table.add_row(name, *(f"{value:z.1f}" if value > -1000.0 else "falls" for value in fit.values()))
+        table.add_row(name, *(f"{value:z.1f}" if value > MIN_FIT else "falls" for value in fit.values()))
     return table
 
 
 def identified(found: Identified, names: Sequence[str]) -> list[Table]:
-    """Return the quantities found, with their errors and what they were, and the fit of each record, by its name."""
+    """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
+
+    Args:
+      names: of the records.
+    """
     values = titled(
         found.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
     )
@@ -537,5 +559,6 @@ def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     heads = [Column(head, justify="right") for head in found.fits[0]]
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
+        # a fit before of less than -999 % is cut to the width of the column
         fits.add_row(name, *(f"{value:.1f} ({max(before[key], -999.0):.1f})" for key, value in fit.items()))
     return [values, fits]

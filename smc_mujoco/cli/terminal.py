@@ -15,7 +15,7 @@ from smc_mujoco.common.errors import ScenarioError, printable
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
-    """End the command with one sentence on an error that the user can correct, and on Ctrl-C."""
+    """Print one sentence instead of a traceback on an error that the user can correct, and on Ctrl-C, and exit."""
     try:
         yield
     except ScenarioError as error:
@@ -39,9 +39,11 @@ def _fail(sentence: str, code: int = 2) -> None:
 class Terminal(Console):
     """The console of a command, which also measures the time of the command.
 
+    Args:
+      prints: name of a result file to print on stdout instead of keeping it; all else then goes to stderr. "" for none.
+
     Attributes:
-      printed: a file in a temporary folder, which is printed when it has been written, or None. Then all else goes to
-        stderr.
+      printed: where the command is to write that file, or None. `wrote` prints and deletes it.
     """
 
     def __init__(self, prints: str = ""):
@@ -60,7 +62,7 @@ class Terminal(Console):
         self.print(text, style=style, soft_wrap=not wrap, highlight=False, markup=False)
 
     def wrote(self, *files: Path) -> None:
-        """Print which files were written, and the text of the one that is to be printed."""
+        """Print the names of files that were written, but the content of the file `printed`."""
         for file in files:
             if self._folder and file == self.printed:
                 print(file.read_text(encoding="utf-8"), end="")

@@ -110,7 +110,7 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
     kinds = {name: kind_of(hint) for name, hint in hints.items()}
     defaults = {name: p.default for name, p in signature.parameters.items() if name in kinds}
     if any(default is None and not kinds[name].takes(None) for name, default in defaults.items()):
-        return None  # a Scenario: its annotations say what fields hold, not what they are made from
+        return None  # a Scenario: its annotations are the types that its fields have, not those that it accepts
     for name, value in given.items():
         kind = kinds.get(name)
         if kind and not kind.takes(value):
@@ -195,7 +195,7 @@ def _whole(value: Any) -> bool:
     return isinstance(value, numbers.Integral) and whole("", value, -(2**63), 2**63 - 1) is not None
 
 
-KINDS: dict[Any, Kind] = {
+KINDS: dict[Any, Kind] = {  # annotation -> what it asks for
     Any: Kind(lambda value: True, "anything", "anything"),
     bool: Kind(_flag, "True or False", "flags"),
     int: Kind(_whole, "a whole number", "whole numbers"),
@@ -249,8 +249,7 @@ def _mapping(kinds: Sequence[Kind]) -> Kind:
     keys, values = kinds
 
     def test(value: Any) -> bool:
-        items = value.items() if isinstance(value, Mapping) else [(keys, None)]
-        return all(keys.takes(key) and values.takes(item) for key, item in items)
+        return isinstance(value, Mapping) and all(keys.takes(key) and values.takes(item) for key, item in value.items())
 
     words = f"a dict of {keys.several} and {values.several}"
     return Kind(test, words, words.replace("a dict", "dicts"))

@@ -14,7 +14,9 @@ T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
 MAX_LISTED = 950  # characters of the names to choose from; chosen: all laws, and the sentence stays below 1100
-MAX_MESSAGE = 1500  # characters of a message, which may hold a long path
+MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
+END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, where the cure is: chosen
+MAX_SHOWN = 60  # characters of a value in a message: chosen
 
 
 class ScenarioError(ValueError):
@@ -22,7 +24,8 @@ class ScenarioError(ValueError):
 
     def __init__(self, message: str):
         long = len(message) > MAX_MESSAGE
-        super().__init__(printable(f"{message[: MAX_MESSAGE - 503]}...{message[-500:]}" if long else message))
+        start = message[: MAX_MESSAGE - END_OF_MESSAGE - len("...")]
+        super().__init__(printable(f"{start}...{message[-END_OF_MESSAGE:]}" if long else message))
 
 
 class ScenarioWarning(UserWarning):
@@ -35,26 +38,26 @@ def printable(text: str) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value's repr on one line of at most 60 characters; its class in <> if the repr fails."""
+    """Return a value's repr on one line of at most MAX_SHOWN characters; its class in <> if the repr fails."""
     try:
         text = " ".join(_brief(value).split())
     except Exception:  # from a __repr__ of the user's; RecursionError in deeply nested lists
         text = f"<{type(value).__name__}>"
-    text = text if len(text) <= 60 else f"{text[:57]}..."
+    text = text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
     return printable(text)
 
 
 def _brief(value: object) -> str:
-    """Return the repr; of long texts, lists and dicts that of their beginning."""
+    """Return the repr of a value, or that of its first MAX_SHOWN items if it is a long text, list or dict."""
     if isinstance(value, str | bytes | list | tuple):
-        value = value[:60]
+        value = value[:MAX_SHOWN]
     elif isinstance(value, dict):
-        value = dict(itertools.islice(value.items(), 60))
+        value = dict(itertools.islice(value.items(), MAX_SHOWN))
     return repr(value)
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
-    """Return the error for a name that is not among `known`, with the nearest that is."""
+    """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all."""
     names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
     listed = one_line(", ".join(names), MAX_LISTED)
@@ -92,7 +95,10 @@ def number(
     most: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """Return `value` as a float in (above, inf) and [least, most], or raise ScenarioError naming `what`."""
+    """Return `value` as a float that is > `above`, >= `least` and <= `most`, or raise ScenarioError naming `what`.
+
+    NaN is refused, and so are infinities unless `infinite`.
+    """
     real = _real(value)
     if real is None:
         raise ScenarioError(f"{what} is {shown(value)}: give a number")
@@ -120,7 +126,7 @@ def whole(what: str, value: object, least: int, most: int) -> int:
 
 
 def _real(value: Any) -> Any:
-    """Return a real number, also from an array without axes; None for all else, flags and durations included."""
+    """Return a real number, also from an array without axes; None for all else, also for flags and durations."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
@@ -148,7 +154,7 @@ def attribute(value: object, name: str) -> Any:
 
 
 def name(what: str, value: object) -> str:
-    """Return `value` if it is a name, 1 to 100 printable characters, else raise ScenarioError naming `what`."""
+    """Return `value` if it is a name, 1 to MAX_NAME printable characters, else raise ScenarioError naming `what`."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
     if len(value) > MAX_NAME:
@@ -159,7 +165,8 @@ def name(what: str, value: object) -> str:
 def users_frame() -> int:
     """Return the stacklevel with which a warning points to the user's line.
 
-    That is the nearest outside this package, and outside `dataclasses`, whose `replace` makes scenarios.
+    The user's line is the nearest caller outside this package and outside `dataclasses`, whose `replace` makes
+    scenarios.
     """
     frame, level = sys._getframe(1), 1
     inner = "smc_mujoco", "dataclasses"

@@ -1,4 +1,4 @@
-"""Optional packages, which an extra installs, as in `pip install 'smc-mujoco[film]'`, and errors if one is missing."""
+"""Optional packages, which an extra such as `pip install 'smc-mujoco[film]'` installs, and errors if one is missing."""
 
 import contextlib
 import importlib.util
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from smc_mujoco.common.errors import ScenarioError
 
-LAST = {"dm": (3, 12)}  # the last Python for which pip can install an extra
+LAST_PYTHON = {"dm": (3, 12)}  # extra -> the last Python for which pip can install it
 
 
 class MissingPackageError(ScenarioError, ImportError):
@@ -16,7 +16,7 @@ class MissingPackageError(ScenarioError, ImportError):
 
 @contextlib.contextmanager
 def extra(name: str, what: str) -> Iterator[None]:
-    """Import packages of an extra, in a with block.
+    """Say how to install an extra if an import in the with block fails.
 
     Args:
       name: the extra, such as "film".
@@ -27,13 +27,13 @@ def extra(name: str, what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (ImportError, AttributeError) as error:  # the second from a package older than what it imports
+    except (ImportError, AttributeError) as error:  # AttributeError: a package is too old for one that imports it
         raise MissingPackageError(f"{what} needs an optional package ({error}): {cure(name)}") from error
 
 
 @contextlib.contextmanager
 def package(name: str, what: str) -> Iterator[None]:
-    """Import a package that belongs to no extra, in a with block.
+    """Say how to install a package that belongs to no extra if an import in the with block fails.
 
     Args:
       name: as pip knows it.
@@ -62,7 +62,7 @@ def missing(name: str, what: str, *packages: str) -> str | None:
 
 def cure(name: str) -> str:
     """Return how to install an extra."""
-    last = LAST.get(name, sys.version_info[:2])
+    last = LAST_PYTHON.get(name, sys.version_info[:2])
     if sys.version_info[:2] > last:
-        return f"take Python {'.'.join(map(str, last))}, the last one that pip can install it on"
+        return f"take Python {'.'.join(map(str, last))}, the last for which pip can install it"
     return f"pip install 'smc-mujoco[{name}]'"

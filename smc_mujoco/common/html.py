@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
-POINTS = 150  # of a curve, each as a pair of its lowest and highest value there
+PIECES = 150  # of a long curve, each drawn by its lowest and its highest value: chosen, one for every 2 px of a panel
 WIDTH, HEIGHT = 300, 96  # px of a panel
 _CELL = "padding:2px 10px;vertical-align:top;text-align:"
-_ROOM = 58, 6, 16, 18  # px at the left, right, top and bottom of a panel
+_MARGINS = 58, 6, 16, 18  # px at the left, right, top and bottom of a panel
 
 
 class Html(str):
@@ -43,10 +43,11 @@ def table(
 
     Args:
       headings: one for each column; empty for a table without headings.
+      rows: a value for each column.
       caption: above the table.
       note: below it.
       numbers: the columns that are aligned to the right.
-      most: number of lines; a further line says how many are left out.
+      most: number of rows that are shown; a last line says how many are left out.
     """
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
@@ -69,7 +70,7 @@ def table(
 
 
 def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str) -> str:
-    """Return the cells of a line."""
+    """Return the cells of a row; `sides` are their alignments."""
     return "".join(
         f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>' for value, side in zip(values, sides, strict=True)
     )
@@ -94,7 +95,7 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
         return Html("")
     low, high = min(float(np.nanmin(c)) for c in every), max(float(np.nanmax(c)) for c in every)
     span = (high - low) or abs(high) or 1.0
-    left, right, top, bottom = _ROOM
+    left, right, top, bottom = _MARGINS
     x = left + (t - t[0]) / (t[-1] - t[0]) * (WIDTH - left - right)
     lines = []
     for curve in curves:
@@ -121,11 +122,14 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
 
 
 def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
-    """Return a curve as a polyline through the lowest and highest values of each piece of it."""
+    """Return a curve as a polyline, or nothing if no value is finite.
+
+    A long curve is drawn through the lowest and the highest value of each of its PIECES.
+    """
     known = np.isfinite(y)
     x, y = x[known], y[known]
-    if len(x) > 2 * POINTS:
-        pieces = np.array_split(np.arange(len(x)), POINTS)
+    if len(x) > 2 * PIECES:
+        pieces = np.array_split(np.arange(len(x)), PIECES)
         ends = [sorted({int(p[0] + np.argmin(y[p])), int(p[0] + np.argmax(y[p]))}) for p in pieces]
         kept = np.array(sorted({0, len(x) - 1, *(k for pair in ends for k in pair)}))
         x, y = x[kept], y[kept]
@@ -137,6 +141,7 @@ def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
     """Return a picture or a film, kept in the page itself and no wider than the page.
 
     Args:
+      content: the bytes of its file.
       kind: its MIME type, such as "video/mp4".
       width: px; None for the content's width.
     """

@@ -1,4 +1,4 @@
-"""Ctrl-C, delayed while something must not stop halfway: libraries as they load, numba as it compiles."""
+"""Ctrl-C, delayed while something must not stop halfway: a library that loads, numba that compiles."""
 
 import contextlib
 import signal

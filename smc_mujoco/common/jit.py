@@ -32,11 +32,11 @@ from smc_mujoco.common.rebuild import rebuild
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST = hashlib.sha256().digest_size
 
-# Numba imports the module of a function that it loads from its cache, and names those that cannot be imported, such as
-# a scene file, by a name of its own, which cannot be imported either.
+# When numba loads a function from its cache, it imports the function's module. If that module cannot be imported, such
+# as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
 sys.modules.setdefault(_dynamic_modname, _dynamic_module)
 
-if hasattr(os, "register_at_fork"):  # else a child would wait for ever for a lock that a thread of its parent held
+if hasattr(os, "register_at_fork"):  # a child would wait for ever for a lock that another thread of its parent holds
     os.register_at_fork(
         before=global_compiler_lock.acquire,
         after_in_parent=global_compiler_lock.release,
@@ -101,7 +101,7 @@ call_int = _calling(32)  # the same for a C function that returns an int: the re
 
 @intrinsic
 def attempt(typingctx, body, arguments):
-    """Return whether body(*arguments) returned, and its result. An exception gives False and does not reach Python."""
+    """Return whether body(*arguments) returned without an exception, and its result. No exception reaches Python."""
     resolved = body.get_call_type(typingctx, tuple(arguments), {})
     returned = resolved.return_type
     for item in returned.types if isinstance(returned, types.BaseTuple) else (returned,):
@@ -144,6 +144,8 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
     Args:
+      signature: numba's types of the result and the arguments.
+      body: the function in Python.
       cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written. A body
         whose closure holds other functions needs a name and a hash of all that it reaches.
     """
@@ -179,35 +181,36 @@ class Cache(FunctionCache):
         self._cache_file = Sealed(locator.get_cache_path(), f"{name}-{base}" if name else base, stamp)
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple:
-        """Return what tells overloads apart: numba's own hash of a closure covers no functions in it."""
+        """Return the key of an overload. Numba's own key hashes a closure without the functions in it."""
         return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write it, unless compiling warned, no other process could load it, or the files cannot be written."""
+        """Write an overload, unless its compilation warned, or no other process could load it. Ignore a full disk."""
         with contextlib.suppress(OSError):
             if not _warned and not data.library.has_dynamic_globals and _complete(data.library):
                 super().save_overload(sig, data)
 
 
 def _complete(library: CPUCodeLibrary) -> bool:
-    """Return whether no address is filled in while code is linked, such as that of a function that calls itself.
+    """Return whether code is complete before it is linked, so that another process can load it.
 
-    Numba does so only in the process that compiles. A process that loads such code from the disk would abort.
+    Numba fills in some addresses while it links, such as that of a function that calls itself, and only in the process
+    that compiles. A process that loads such code from the disk would abort.
     """
     return not any(one.name.startswith(RuntimeLinker.PREFIX) for one in library._final_module.global_variables)
 
 
 class Sealed(IndexDataCacheFile):
-    """Files of numba's cache, each with a hash at its end, of it and of what was compiled.
+    """Files of numba's cache, each sealed: it ends with a hash of its content and of the source that was compiled.
 
-    A file whose hash does not fit counts as missing: it is damaged, or another function's of the same name.
+    A file whose hash does not fit counts as missing: it is damaged, or belongs to another function of the same name.
     """
 
     def _load_index(self) -> dict:
-        return super()._load_index() if self._whole(self._index_path) else {}
+        return super()._load_index() if self._intact(self._index_path) else {}
 
     def _load_data(self, name: str) -> Any:
-        return super()._load_data(name) if self._whole(self._data_path(name)) else None
+        return super()._load_data(name) if self._intact(self._data_path(name)) else None
 
     @contextlib.contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -216,8 +219,8 @@ class Sealed(IndexDataCacheFile):
         with super()._open_for_write(filepath) as file:
             file.write(written.getvalue() + self._seal(written.getvalue()))
 
-    def _whole(self, path: str) -> bool:
-        """Return whether a file of the cache exists, is undamaged and of the same source."""
+    def _intact(self, path: str) -> bool:
+        """Return whether a file of the cache exists, is undamaged, and belongs to the same source."""
         try:
             content = Path(path).read_bytes()
         except OSError:
@@ -240,7 +243,7 @@ class Function:
 
 
 class AtAddress:
-    """Base of laws that are C functions with the callback's signature already.
+    """Base of laws that are C functions, and already have the signature that the callback calls.
 
     Attributes:
       address: of the function, valid as long as this object lives.
@@ -285,6 +288,6 @@ def jit(function: Callable) -> Callable:
             made = rebuild(function, checked, copies)
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
-        # only now, as copies that were cut short lack functions that they call
+        # shared only now: after an exception the copies may lack functions that they call
         _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})
         return made

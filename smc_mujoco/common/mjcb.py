@@ -20,7 +20,7 @@ import mujoco
 CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 
 _lock = threading.RLock()  # held while callbacks are replaced
-_free = threading.RLock()  # held briefly, to compile while no Python callback is installed; nothing waits under it
+_free = threading.RLock()  # held briefly, so that no Python callback is installed meanwhile; its holder never waits
 
 
 def _after_fork() -> None:
@@ -52,8 +52,8 @@ def installed(control: Any) -> Iterator[None]:
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile a spec.
 
-    A Python callback is removed meanwhile. The thread that installed it need not wait, as when a policy makes an
-    environment; other threads wait until its run is over. No thread waits for native callbacks.
+    A Python callback is removed meanwhile. The thread that installed it does not wait, so that a policy can make an
+    environment during a run. Other threads wait until that run is over. No thread waits for native callbacks.
 
     Raises:
       ValueError: MuJoCo cannot compile it.
@@ -66,7 +66,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def _callbacks() -> dict[str, Any]:
-    """Return every installed callback by its name, None for none."""
+    """Return name -> the installed callback, or None."""
     return {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
 
 

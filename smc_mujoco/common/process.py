@@ -12,7 +12,10 @@ class TimedOut(Exception):
 
 
 def _kill(process: subprocess.Popen[str]) -> None:
-    """Kill a process that began a session, and every process in it; on Windows every process that it started."""
+    """Kill a process and every process that it started.
+
+    On POSIX the process must have been started in a session of its own.
+    """
     if hasattr(os, "killpg"):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
@@ -52,7 +55,7 @@ def timed(
     except subprocess.TimeoutExpired:
         raise TimedOut from None
     finally:
-        if process.poll() is None or (process.stdout and not process.stdout.closed):  # it, or what it left behind
+        if process.poll() is None or (process.stdout and not process.stdout.closed):  # it runs, or what it started
             _kill(process)
             process.communicate()
     return subprocess.CompletedProcess(command, process.returncode, *printed)

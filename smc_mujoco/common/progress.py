@@ -8,17 +8,19 @@ from collections.abc import Callable, Iterator
 
 from smc_mujoco.common.html import in_notebook
 
-Report = Callable[[float, float], None]  # called with the work done and the whole work, as estimated so far
+Report = Callable[[float, float], None]  # called with the work done and the whole work, which may be an estimate
+SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
+DRAWING_PERIOD = 0.2  # s between two drawings of a notebook's bar: chosen
 
 
 class Bar:
-    """A progress bar. This one draws nothing; `bar` yields one that does."""
+    """A progress bar that draws nothing. `bar` yields one that draws."""
 
     def advance(self, work: float) -> None:
         """Add work that is done."""
 
     def reached(self, done: float, whole: float) -> None:
-        """Set the work done and the whole work, if the whole is an estimate that changes."""
+        """Set the work done and the whole work, which may change from call to call."""
 
     def says(self, text: str) -> None:
         """Change the text beside the bar."""
@@ -55,7 +57,9 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
     share = MofNCompleteColumn() if counted else TaskProgressColumn()
     columns = TextColumn("{task.description}"), BarColumn(), share, TimeRemainingColumn()
     hidden = not console.is_terminal  # a log file gets no empty lines
-    with Progress(*columns, transient=True, console=console, speed_estimate_period=120, disable=hidden) as progress:
+    with Progress(
+        *columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW, disable=hidden
+    ) as progress:
         task, drawn = progress.add_task(what, total=whole), Bar()
         drawn.advance = lambda work: progress.advance(task, work)
         drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
@@ -64,7 +68,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
 
 
 class NotebookBar(Bar):
-    """A bar in a notebook's cell, which vanishes in the end. It is HTML: rich would need ipywidgets, and warn."""
+    """A bar in a notebook's cell, which vanishes in the end. It is HTML, because rich warns without ipywidgets."""
 
     def __init__(self, what: str, whole: float | None, counted: bool):
         from IPython.display import HTML, display
@@ -93,9 +97,9 @@ class NotebookBar(Bar):
             self.cell.update(self.html(""))
 
     def _draw(self) -> None:
-        """Draw the bar as it is, at most five times a second."""
+        """Draw the bar as it is, unless it was drawn less than DRAWING_PERIOD ago."""
         now = time.monotonic()
-        if self.cell is not None and now - self.drawn >= 0.2:
+        if self.cell is not None and now - self.drawn >= DRAWING_PERIOD:
             self.drawn = now
             self.cell.update(self.html(str(self)))
 
@@ -110,7 +114,13 @@ class NotebookBar(Bar):
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
-    """Return a function that adds a piece of work to the work done so far, and reports the sum."""
+    """Return a function that reports the work done so far, increased by a piece of work in each call.
+
+    Args:
+      report: called with the sum and with `whole`.
+      done: the work done before the first call.
+      whole: the whole work.
+    """
 
     def add(work: float) -> None:
         nonlocal done
@@ -121,7 +131,7 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 
 class Counter:
-    """Count of a study's runs and steps, shown beside a bar: runs done, runs a second."""
+    """Count of a study's runs and steps. Its text, beside a bar, has the runs done and the runs a second."""
 
     def __init__(self, runs: int, steps: int, bar: Bar):
         self.total, self.all_steps, self.bar = runs, steps, bar

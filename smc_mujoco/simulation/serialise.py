@@ -10,7 +10,7 @@ from typing import TypeVar
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
-from smc_mujoco.common.registry import present_place, subclasses
+from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -32,6 +32,24 @@ DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "
 PARTS = ("friction", "contact", "actuator", "sensor")
 OTHER_LAWS = ("smc_mujoco.studies.boards.entries",)  # modules with laws that are not in the catalogue
 T = TypeVar("T")
+
+# Former name of a module, as files of recorded runs have it -> its present name.
+FORMER_PLACES = {
+    "smc_mujoco.actuators": "smc_mujoco.mechanisms.hardware.drives",
+    "smc_mujoco.backlash": "smc_mujoco.mechanisms.hardware.backlash",
+    "smc_mujoco.contact": "smc_mujoco.mechanisms.hardware.contact",
+    "smc_mujoco.friction": "smc_mujoco.mechanisms.hardware.friction",
+    "smc_mujoco.sensors": "smc_mujoco.mechanisms.hardware.encoder",
+    "smc_mujoco.plants": "smc_mujoco.mechanisms.plants",
+    "smc_mujoco.laws": "smc_mujoco.control.laws",
+    "smc_mujoco.surfaces": "smc_mujoco.control.surfaces",
+    "smc_mujoco.estimators": "smc_mujoco.control.estimators",
+    "smc_mujoco.signals": "smc_mujoco.simulation.signals",
+    "smc_mujoco.references": "smc_mujoco.simulation.signals",
+    "smc_mujoco.simulation.references": "smc_mujoco.simulation.signals",
+    "smc_mujoco.studies.paper": "smc_mujoco.studies.papers.gaber",
+    "smc_mujoco.series": "smc_mujoco.simulation.time_series",
+}
 
 
 def describe(scenario: Scenario) -> dict:
@@ -104,7 +122,7 @@ def _restore_plant(data: dict) -> Plant:
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
-    if present_place(module) != find_plant(name).build.__module__:
+    if _present_place(module) != find_plant(name).build.__module__:
         raise ScenarioError(f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it")
     return find_plant(name, **plant)
 
@@ -125,7 +143,7 @@ def _restore_law(data: dict) -> Component:
 
 
 def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
-    home, template = present_place(data["module"]), known.get(data["name"])
+    home, template = _present_place(data["module"]), known.get(data["name"])
     named = known.own.values() if template is None else [template]  # one of the library may have been renamed
     there = (one for one in named if one.function.__module__ == home and {*data["gains"]} <= {*one.gains})
     if template := next(there, None):
@@ -160,7 +178,7 @@ def _signal(signal: Signal) -> dict:
 def _restore_signal(data: dict) -> Signal:
     if "each" in data:
         return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
-    kind, values = _kinds(Signal).get((data["kind"], present_place(data["module"]))), _values(data)
+    kind, values = _kinds(Signal).get((data["kind"], _present_place(data["module"]))), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 
 
@@ -177,7 +195,7 @@ def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...
 
 
 def _restore_part(data: dict) -> Part:
-    kind = _kinds(Part).get((data["kind"], present_place(data["module"])))
+    kind = _kinds(Part).get((data["kind"], _present_place(data["module"])))
     if kind is None:
         raise ScenarioError(f"part {data['kind']!r} is unknown here: first import {data['module']}, which defines it")
     return kind(**_values(data))
@@ -201,3 +219,11 @@ def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
 
 def _home(kind: type) -> tuple[str, str]:
     return kind.__name__, kind.__module__
+
+
+def _present_place(module: str) -> str:
+    """Return the present name of a module that a file names."""
+    for former, present in FORMER_PLACES.items():
+        if module == former or module.startswith(f"{former}."):
+            return present + module.removeprefix(former)
+    return module

@@ -12,7 +12,7 @@ EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])
 
 
 def cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
-    """Return argument of a test, `plant` or `condition` -> the names with which the test runs.
+    """Return `plant` and `condition`, as far as the test has these arguments -> the names with which the test runs.
 
     Args:
       given, named: the marker's arguments by position and by name. Default: every plant of the study, and the condition

@@ -1,7 +1,7 @@
 """Golden metrics: `pytest --smc-update` records them in a JSON file beside the test, and later runs compare with it.
 
-The file of test_laws.py is test_laws.golden.json: test -> metric -> value, tolerance and the unit of both. A test that
-names no tolerance uses those of the file.
+The file of test_laws.py is test_laws.golden.json. It has, for each test and metric, the value, the tolerance, and the
+unit of both. A test that names no tolerance uses those of the file.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ def place(test: Path) -> Path:
 
 
 def record(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Write a response's metrics and their tolerances into the file, under `key`. Arguments as of `compare`.
+    """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`.
 
     Raises:
       ScenarioError: the run failed, a tolerance is not a number of at least 0, or the file cannot be written.
@@ -56,8 +56,11 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
     """Compare a response with the metrics recorded under `key`.
 
     Args:
-      rel: tolerance as a share of the recorded value; None: the tolerance in the file.
-      tolerances: metric -> tolerance in its unit. Without rel only these metrics are compared.
+      file: the golden file.
+      key: of the response in the file: the test's name, and a number if the test compares several.
+      response: what `step_response` returned.
+      rel: tolerance as a share of the recorded value; None for the tolerances in the file.
+      tolerances: metric -> tolerance in its unit. If rel is None, only these metrics are compared.
 
     Raises:
       AssertionError: nothing was recorded, or a metric is outside its tolerance; the message has a table of all
@@ -96,7 +99,7 @@ def _checked(response: object, tolerances: Mapping[str, float]) -> None:
 
 
 def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
-    """Return a metric's tolerance in its unit: the given one, else a share of its value, 0 if that is inf."""
+    """Return a metric's tolerance in its unit: that in `tolerances`, else the share `rel` of its value; 0 for inf."""
     if name in tolerances:
         return number(f"tolerance of {name}", tolerances[name], least=0.0)
     share = max(number("rel", rel, least=0.0) * abs(value), MIN_TOLERANCE)
@@ -104,7 +107,11 @@ def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: fl
 
 
 def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:
-    """Return the value or the tolerance of a metric in the file."""
+    """Return `what`, the value or the tolerance, of a metric in the file.
+
+    Args:
+      known: metric -> its entry, of this key.
+    """
     try:
         return float(known[name][what])
     except (TypeError, KeyError, ValueError):
@@ -131,7 +138,7 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, so that one worker of a parallel session at a time writes into it."""
+    """Lock a folder, so that only one worker of a parallel session at a time writes into it."""
     try:
         import fcntl
     except ImportError:
@@ -148,7 +155,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _locked_on_windows(folder: Path) -> Iterator[None]:
-    """Lock a folder by the first byte of a file among the temporary ones, as Windows locks no folders."""
+    """Lock a folder on Windows, which locks no folders: lock the first byte of a temporary file named after it."""
     import msvcrt  # pyright: ignore[reportMissingImports]
 
     name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""Limits that a test sets on metrics, and the message, with a table, for those that are violated."""
+"""Limits that a test sets on metrics, and the message with a table of them if one is violated."""
 
 import functools
 import math
@@ -25,7 +25,11 @@ class Limit(NamedTuple):
 def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     """Return the Limit of a value that may be at most `limit`, or in the range `limit` = (least, most).
 
-    A limit cycle that a run does not have keeps every limit of its amplitude, see `Metric.absent`.
+    A metric of a limit cycle is NaN for a run without one. Its limit is then compared with `Metric.absent`.
+
+    Args:
+      metric: its name.
+      value: of the metric, in `unit`.
 
     Raises:
       ScenarioError: the limit is neither a number nor a pair.

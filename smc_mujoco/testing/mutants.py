@@ -1,9 +1,10 @@
-"""Whether an audit can fail: claims under mutants of the laws that they are about.
+"""Whether an audit can fail: the claims of a paper, measured on broken laws, the mutants.
 
     assert survivors("./my_paper") == {}      # in a test: each claim that holds is lost by some mutant of its first law
 
-A law with the wrong sign, without gain, without memory, or as a relay is not what a paper writes about. A claim that
-each of them keeps measures something else. A claim that no mutant can lose says why, in its field `immune`.
+A mutant is the law that a claim is about with the wrong sign, without gain, without memory, or as a relay. A paper does
+not write about such a law, so a claim that holds under every mutant measures something else. If no mutant can lose a
+claim, the claim's field `immune` says why.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -39,15 +40,16 @@ def survivors(
     threads: int | None = None,
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, str]:
-    """Return claim -> why no mutant of its first law takes anything from it; none of them should be there.
+    """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
 
-    A claim is lost if fewer of its sentences hold than with the law as it is, or if its function cannot measure the
-    mutant. A claim that is refuted has nothing to lose: then its numbers must change. Claims with `immune` are not
-    asked.
+    A mutant loses a claim if fewer of the claim's sentences hold than under the law itself, or if the claim's function
+    cannot measure the mutant. A refuted claim has nothing to lose: there the numbers must change. Claims with `immune`
+    are skipped.
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
-      report: called with the number of claims done, under a set of gains and a mutant; `evaluations` in all.
+      report: called with the number of evaluations done since its last call; the sum is `evaluations`. An evaluation is
+        one claim, set of gains and mutant. Those of a claim that is lost already count as done.
     """
     found = as_paper(paper)
     asked = {entry.id: entry for entry in wanted(found, only) if not entry.immune}
@@ -55,7 +57,7 @@ def survivors(
     names = sets(found, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
-        """Yield claim, set of gains and evidence; None where a function cannot measure a law that is broken."""
+        """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
         shared: dict[str, Result] = {}
         replaced = {law: MUTANTS[mutant]} if mutant else None
         for name in names:
@@ -69,14 +71,14 @@ def survivors(
                     yield entry.id, name, None
                 report(1)
 
-    true = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
-    holding = {id: any(any(sentences(true[id, name] or [], left[id].quantifier)) for name in names) for id in left}
+    intact = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
+    holding = {id: any(any(sentences(intact[id, name] or [], left[id].quantifier)) for name in names) for id in left}
     for mutant in MUTANTS:
         report((len(asked) - len(left)) * len(names))
         for law in sorted({first_law(entry) for entry in left.values()}):
             about = [entry for entry in left.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
-                if id in left and lost(left[id], true[id, name] or [], evidence, holding[id]):
+                if id in left and lost(left[id], intact[id, name] or [], evidence, holding[id]):
                     del left[id]
     return {id: KEPT if holding[id] else BLIND for id in left}
 
@@ -87,7 +89,7 @@ def evaluations(
     gains: str | Sequence[str] | None = None,
     quick: bool = True,
 ) -> int:
-    """Return how often `survivors` reports, for a progress bar."""
+    """Return the number of evaluations that `survivors` reports, for a progress bar."""
     found = as_paper(paper)
     asked = [entry for entry in wanted(found, only) if not entry.immune]
     return len(asked) * len(sets(found, gains, quick)) * (1 + len(MUTANTS))
@@ -100,14 +102,20 @@ def first_law(entry: Entry) -> str:
       ScenarioError: the claim names no law.
     """
     if not entry.laws:
-        raise ScenarioError(f"claim {entry.id} names no law: write laws, the one it is about first, or immune")
+        raise ScenarioError(f"claim {entry.id} names no law: write laws, first the one that it is about, or immune")
     return entry.laws[0]
 
 
-def lost(entry: Entry, true: Evidence, mutant: Evidence | None, holding: bool) -> bool:
-    """Return whether a mutant loses a claim that holds in part, or changes the numbers of one that does not."""
+def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
+    """Return whether a mutant loses a claim.
+
+    Args:
+      intact: evidence under the law itself.
+      mutant: evidence under the mutant; None if it cannot be measured.
+      holding: whether some sentence of the claim holds under the law itself. If none does, the numbers are compared.
+    """
     if mutant is None:
         return True
     if holding:
-        return sum(sentences(mutant, entry.quantifier)) < sum(sentences(true, entry.quantifier))
-    return [repr(one.value) for one in mutant] != [repr(one.value) for one in true]  # NaN is like NaN
+        return sum(sentences(mutant, entry.quantifier)) < sum(sentences(intact, entry.quantifier))
+    return [repr(one.value) for one in mutant] != [repr(one.value) for one in intact]  # repr: NaN equals NaN

@@ -19,7 +19,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.papers.gaber import scenarios
 from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
-IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics
+IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a response
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -34,7 +34,7 @@ class StepResponse:
     Attributes:
       trace: the Trace of the run.
       step: height of the step, rad or m.
-      condition: the condition, and the scenario fields that the test gave, as text; "" for none.
+      condition: the condition and the scenario fields that the test gave, as text; "" for the nominal condition alone.
     """
 
     trace: Trace
@@ -62,12 +62,12 @@ class StepResponse:
 
     @functools.cached_property
     def scores(self) -> Mapping[str, Mapping[str, float]]:
-        """Every metric of each group of channels, by the group's name; raises like `metrics`."""
+        """Group of channels -> metric -> value. Raises as `metrics`."""
         return scores(self.trace)
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
-        """`metrics`, and if there are several groups of channels the metrics of each, named as in "free peak"."""
+        """`metrics`, and those of each group of channels if there are several, with names such as "free peak"."""
         groups = self.scores.items()
         each = {self._label(group, name): value for group, values in groups for name, value in values.items()}
         return dict(self.metrics) | each
@@ -96,28 +96,29 @@ class StepResponse:
         return f"StepResponse({self}: {how})"
 
     def value(self, name: str) -> tuple[float, str]:
-        """Return one of the `values`, and its unit."""
+        """Return the value and the unit of one of `values`."""
         group, _, metric = name.rpartition(" ")
         driven = groups(self.scenario)[0]
         of = next((each for each in groups(self.scenario) if each.name == group), driven)
         return self.values[name], CATALOGUE[metric].unit_for(of.unit, of.effort)
 
     def _unknown(self, name: str) -> ScenarioError:
+        """Return the error for a metric that does not exist, or that the plant does not have."""
         if name in CATALOGUE:
             return ScenarioError(CATALOGUE[name].refusal(self.scenario.plant))
         return unknown("metric", name, CATALOGUE)
 
     def _label(self, group: str, metric: str) -> str:
-        """Return the name of a group's metric in tables: the plain name if `metrics` has it, else with the group."""
+        """Return the name of a group's metric in tables: the metric's name if `metrics` has it, else "GROUP METRIC"."""
         alone = len(groups(self.scenario.plant)) == 1
         return metric if alone or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
 
     def applies(self, name: str) -> bool:
-        """Return whether a metric is meaningful for this run. Some are for realistic mechanisms only."""
+        """Return whether a metric has a meaning for this run. Some have one for realistic mechanisms only."""
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
     def named(self, names: Iterable[str]) -> None:
-        """Raise ScenarioError for names that are not among the `values` of this run, also if it failed."""
+        """Raise ScenarioError for a name that is not among the `values` of this run, even if the run failed."""
         plant = self.scenario.plant
         known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
         known += [self._label(each.name, m.name) for each in groups(plant) for m in CATALOGUE.values() if m.fits(each)]
@@ -145,7 +146,7 @@ class StepResponse:
         judge([bound(name, *self.value(name), limit) for name, limit in limits.items()], "limit", "not", self)
 
     def table(self) -> str:
-        """Return a table of the metrics that are meaningful for this run, as text."""
+        """Return a table, as text, of the metrics that have a meaning for this run."""
         if self.failure is not None:
             return f"failed: {self.failure}"
         return table(
@@ -160,7 +161,7 @@ def respond(
     condition: str | Condition = "nominal",
     fields: Mapping[str, object] | None = None,
 ) -> StepResponse:
-    """Run a law from rest at 0, or at the plant's own rest, to a step of the reference at t = 0.
+    """Run a law from rest to a step of the reference at t = 0. Rest is at 0, or at `plant.rest` if the plant has it.
 
     Args:
       plant, law: as in a Scenario.

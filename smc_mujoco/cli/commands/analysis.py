@@ -1,4 +1,4 @@
-"""smc-mujoco tune, margins, basin: one question about a law, answered by many runs."""
+"""smc-mujoco tune, margins, basin, chatter: one question about laws on a plant, answered by many runs."""
 
 import dataclasses
 from pathlib import Path
@@ -30,7 +30,7 @@ def tune(
     chattering: Annotated[
         float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
     ] = None,
-    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b, in place of the seven above.")] = None,
+    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b, in place of those seven.")] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
@@ -38,10 +38,10 @@ def tune(
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
-    Every law has the same bound on u, the same objective and the same number of sets tried. Each gain is searched over
-    the same number of decades about a scale that follows from its unit and the plant. The objective is error times
-    time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise, delay, a sine and a constant
-    disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
+    Every law has the same bound on u, the same objective and the same number of sets of gains to try. Each gain is
+    searched over the same number of decades about a scale that follows from its unit and the plant. The objective is
+    error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise, delay, a sine
+    and a constant disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
 
     Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
     """
@@ -112,9 +112,9 @@ def margins(
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one, noise is the
     standard deviation of the position (that of the velocity is 5/s times as large), and the delay of the command is in
-    s. The column theory is the limit of the loop linearised at rest, for laws that have one: for example the delay at
-    which rest becomes unstable. A law may tolerate more, with a small steady oscillation. The module
-    smc_mujoco.analysis.margins describes the search and its limits.
+    s. The column theory has the limit that the loop has when it is linearised at rest, for example the delay at which
+    rest becomes unstable; not every law can be linearised. A law may tolerate more, with a small steady oscillation.
+    The module smc_mujoco.analysis.margins describes the search and its limits.
 
     Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
     """
@@ -162,9 +162,10 @@ def basin(
 ) -> None:
     """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest at 0.
 
-    Positions reach half a turn either way, or on a rail twice the study's start. Velocities reach three times that
-    number per second. All channels of a network have the same start. A run ends as soon as its outcome is decided, by
-    the rule in smc_mujoco.analysis.region_of_attraction.
+    Positions reach from half a turn on one side to half a turn on the other; on a rail, twice as far as the plant's own
+    start. Velocities reach three times the number of the largest position, per second. All channels of a network have
+    the same start. A run ends as soon as its outcome is decided, by the rule in
+    smc_mujoco.analysis.region_of_attraction.
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """
@@ -228,7 +229,7 @@ def chatter(
         float | None,
         typer.Option(min=1e-3, help="Take the largest gains whose predicted frequency, Hz, stays below this."),
     ] = None,
-    duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs in which it is measured, s.")] = 8.0,
+    duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")] = 8.0,
     out: Annotated[
         Path | None, typer.Option(help="Also draw Nyquist plots and runs, as OUT.svg and OUT.png, or OUT.pdf.")
     ] = None,
@@ -237,15 +238,16 @@ def chatter(
 ) -> None:
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
-    With a law that switches and an actuator that lags, the loop oscillates without end. The frequency and the amplitude
-    follow from the law's describing function N and the linearised mechanism's response L: N L = 1. "±" is how far
-    amplitude or frequency may be off, because the cycle may be locked to the control samples, which shifts the instant
-    at which the law switches, and because of the harmonics in s; "third" is the share of the third. If there
-    are several driven channels, "coupling" is how far another one moves under this one's command, relative to its own
-    motion: where that is not small, they oscillate together, and the prediction, for one channel alone, fails.
+    If a law switches and the actuator lags, the loop oscillates without end. Frequency and amplitude follow from the
+    law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far
+    the predicted amplitude or frequency may be off. There are two reasons: s has harmonics, and the cycle may be locked
+    to the control samples, which shifts the instant at which the law switches. The column "third" is the share of the
+    third harmonic. If the plant has several driven channels, the column "coupling" is how far this channel's command
+    moves another channel, relative to its own motion. The prediction is for one channel alone, so it fails if that is
+    not small, because the channels then oscillate together.
 
-    With --amplitude or --frequency the gains of each law are made larger or smaller, in proportion, until the
-    prediction is what was asked for, and the constant disturbance that they tolerate is measured.
+    With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction is what you ask
+    for. Then the constant disturbance that they tolerate is measured.
 
     Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
     """

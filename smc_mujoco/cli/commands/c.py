@@ -22,21 +22,22 @@ def check_c(
         typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order, if the file does not define them."),
     ] = "",
     memory: Annotated[
-        int | None, typer.Option(min=1, help="Numbers of memory; default what the file says, or 8.")
+        int | None, typer.Option(min=1, help="How many numbers its memory has; default as the file says, or 8.")
     ] = None,
     symbol: Annotated[str, typer.Option(help="Name of the function.")] = "smc_law",
     flag: Annotated[
         list[str] | None, typer.Option(help="A compiler flag, as --flag=-Iinclude; may be repeated.")
     ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds for each of compiler, set-up and trial.")] = 10.0,
+    timeout: Annotated[float, typer.Option(help="Seconds that compiler, set-up and trial may take, each.")] = 10.0,
 ) -> None:
     """Compile a control law in C, try it in a separate process, and say in one sentence what is wrong with it.
 
-    The trial runs the law on a double integrator under noise, with and without model and surface, for 10 s and at later
-    times, and calls it at very large errors. It finds crashes, endless loops, NaN, gains without a name, writes beyond
-    the law's memory, state kept elsewhere (such as static data), and a changed rounding mode or flush-to-zero. It then
-    runs a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2.
-    smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export-c` writes.
+    The trial runs the law on a double integrator under noise, with and without model and surface, for 10 s. It also
+    calls the law at later times and with very large errors. It finds crashes, endless loops, NaN, gains without a name,
+    writes beyond the law's memory, state kept elsewhere (such as static data), and a changed rounding mode or
+    flush-to-zero. It then runs a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding
+    ends in exit code 2. smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export-c`
+    writes.
 
     The process is not a sandbox: the law can open files and connections, like any program that you start.
 

@@ -17,7 +17,7 @@ T = TypeVar("T")
 def list_() -> None:
     """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study.
 
-    What another installed package adds has the name of that package behind it, in brackets.
+    The line about an entry of another installed package ends with the name of that package, in brackets.
     """
     with held_back():
         from smc_mujoco.cli import law_pages, tables
@@ -27,7 +27,7 @@ def list_() -> None:
         from smc_mujoco.studies.papers.gaber import scenarios
 
     def first_line(doc: str | None) -> str:
-        return (doc or "").strip().partition("\n")[0].rstrip(":")  # a formula may follow
+        return (doc or "").strip().partition("\n")[0].rstrip(":")  # a colon where a formula follows
 
     def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
         lines = {name: first_line(doc(entry)) for name, entry in known.items()}

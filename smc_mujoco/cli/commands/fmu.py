@@ -29,16 +29,16 @@ def export_fmu(
     u_max: Annotated[float, typer.Option("--u-max", help="Bound on |u|, N or N m.")] = math.inf,
     model: Annotated[
         str | None,
-        typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as the law."),
+        typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as needed."),
     ] = None,
     joint: Annotated[str, typer.Option(metavar="hinge|slide", help="Units: rad and N m, or m and N.")] = "hinge",
     binary: Annotated[bool, typer.Option(help="Whether to compile a binary for this machine.")] = True,
-    out: Annotated[Path | None, typer.Option(help="The file; default the law's name with .fmu.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The file to write; default the law's name with .fmu.")] = None,
 ) -> None:
     """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0 for Co-Simulation.
 
-    The file contains C source code, and a binary for this machine, without Python. Its inputs are x, v (unless an
-    estimator replaces it) and the reference r, dr and, if the law reads it, ddr; its outputs are u and s. All gains are
+    The file contains C source code and a binary for this machine; it needs no Python. Its inputs are x, v (unless an
+    estimator replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s. All gains are
     tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
     it gives the bits of `smc-mujoco run`.
 
@@ -52,12 +52,12 @@ def export_fmu(
         from smc_mujoco.simulation.fmu.export import export_fmu as export
 
     chosen = find(law, **parsed_gains(gains, "--gains"))
-    of = {
+    parts = {
         "surface": surface and options.component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
         "velocity": velocity
         and options.component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
     }
-    path = export(chosen, out, **of, control_period=period, u_max=u_max, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
+    path = export(chosen, out, **parts, control_period=period, u_max=u_max, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
     print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
 
 
@@ -66,29 +66,34 @@ def check_fmu(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="An .fmu file of FMI 2.0 or 3.0 for Co-Simulation.")],
     variables: Annotated[
         str,
-        typer.Option(metavar="OURS=THEIRS,...", help="What its variables mean, as x=theta,u=torque; default by name."),
+        typer.Option(
+            metavar="NAME=VARIABLE,...",
+            help="Its variables for x, v, r, u, ..., as x=theta,u=torque; default by their names.",
+        ),
     ] = "",
-    constants: Annotated[str, typer.Option(metavar="THEIRS=VALUE,...", help="Inputs that are held, as enable=1.")] = "",
-    period: Annotated[float | None, typer.Option(help="Seconds between its steps; default its own.")] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds for the trial.")] = 30.0,
+    constants: Annotated[
+        str, typer.Option(metavar="VARIABLE=VALUE,...", help="Inputs that keep one value, as enable=1.")
+    ] = "",
+    period: Annotated[float | None, typer.Option(help="Seconds between its steps; default its own period.")] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds that the trial may take.")] = 30.0,
 ) -> None:
-    """Try a controller in an FMU in a separate process, and say what it measures, commands and can be tuned by.
+    """Try a controller in an FMU in a separate process, and show its inputs, outputs, period and gains.
 
     The trial runs it for 500 steps on a double integrator. A failure, a crash, an endless step or a command that is not
-    finite ends in one sentence and exit code 2. An FMU that passes is a law: smc.law_from_fmu(FILE). It needs FMPy, pip
-    install 'smc-mujoco[fmu]'.
+    finite ends in one sentence and exit code 2. An FMU that passes can be used as a law: smc.law_from_fmu(FILE). The
+    command needs FMPy: `pip install 'smc-mujoco[fmu]'`.
 
     Example: smc-mujoco check-fmu controller.fmu --variables x=theta,v=omega,u=torque --constants enable=1
     """
     with held_back():
         from smc_mujoco.simulation.fmu.load import check
 
-    held = {}
+    values = {}
     for name, text in options.pairs(constants or None, "--constants", "enable=1").items():
         try:
-            held[name] = float(text)
+            values[name] = float(text)
         except ValueError:
             raise ScenarioError(f"--constants: {name} is {text!r}: give a number, as {name}=0") from None
-    meant = options.pairs(variables or None, "--variables", "x=theta,u=torque")
-    for line in check(file, timeout, variables=meant, constants=held, period=period):
+    meanings = options.pairs(variables or None, "--variables", "x=theta,u=torque")
+    for line in check(file, timeout, variables=meanings, constants=values, period=period):
         print(line)

@@ -23,25 +23,24 @@ def live(
     ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(metavar="LAW|FILE.py", help="A law of your own, beside those of the library; may be repeated."),
+        typer.Option(metavar="LAW|FILE.py", help="Your own law, in addition to the library's; may be repeated."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="The folder.")] = Path("live"),
-    serve: Annotated[bool, typer.Option(help="Serve the folder on this machine afterwards, until Ctrl-C.")] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Where to serve; 0 takes a free port.")] = PORT,
+    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("live"),
+    serve: Annotated[bool, typer.Option(help="Whether to serve the page on this machine, until Ctrl-C.")] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of --serve; 0 takes a free one.")] = PORT,
 ) -> None:
     """Build a web page in which MuJoCo runs: choose laws, move sliders, push the machine, compare two laws.
 
-    The page is a folder of files. Every web server can serve it, also without network, as
-    `python -m http.server --directory live` does; it needs nothing of this package then. The browser simulates the
-    package's own models under its own laws, translated to JavaScript, with the same sampling, delay, noise and
-    integrator: its traces are those of `smc-mujoco run` within rounding. The address of the page holds the setting, so
-    that a link shares it.
+    The page is a folder of files. Any web server can serve it without this package and without network, for example
+    `python -m http.server --directory live`. The browser simulates the models of the package under its laws, translated
+    to JavaScript, with the same sampling, delay, noise and integrator. Its traces are those of `smc-mujoco run` within
+    rounding. The address of the page holds all that you set, so that a link shares it.
 
     `--law` takes a Python file with laws made by @smc.law_function, a law with gains such as "pid(kp=50, ki=1)", or a
     .json file that `smc-mujoco tune` wrote.
 
-    The first build fetches MuJoCo for browsers and three.js with npm (10 MB), which Node.js or `pip install
-    'smc-mujoco[live]'` brings.
+    The first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so has
+    `pip install 'smc-mujoco[live]'`.
 
     Example: smc-mujoco live duffing cart_pole --law my_law.py --serve
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, find, shown
 
 if TYPE_CHECKING:
     from smc_mujoco.cli.terminal import Terminal
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 Columns = Annotated[
     str | None,
-    typer.Option(help="Names of columns where they differ from the rig's, as theta=arm_angle,plant_input=voltage."),
+    typer.Option(
+        metavar="NAME=COLUMN,...",
+        help="Columns of the files that have other names than the rig's, as theta=arm_angle,plant_input=voltage.",
+    ),
 ]
 Conditions = Annotated[
     list[str] | None,
@@ -66,7 +69,7 @@ OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or a .json file that `smc-mu
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
-    """Return the names in a,b, or the default if there is no text.
+    """Return the names in a text such as "a,b", or the default if there is no text.
 
     Raises:
       ScenarioError: a text without a name.
@@ -80,7 +83,7 @@ def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
 
 
 def json_file(json: Path | None) -> "tuple[Path | None, Terminal]":
-    """Return where the option --json has a result written, and the console; "-" has it printed."""
+    """Return where a command is to write the result for --json, and its console, which prints the result for "-"."""
     from smc_mujoco.cli.terminal import Terminal
 
     if str(json) != "-":
@@ -90,20 +93,26 @@ def json_file(json: Path | None) -> "tuple[Path | None, Terminal]":
 
 
 def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
-    """Return name -> text of an option such as theta=arm_angle,t=time; `example` is one of its kind."""
-    from smc_mujoco.common.errors import ScenarioError
+    """Return name -> value from the text of an option, such as "theta=arm_angle,t=time"; {} for None.
 
+    Args:
+      option: its name in an error.
+      example: a correct text in an error.
+
+    Raises:
+      ScenarioError: a pair lacks its name or its value.
+    """
     found = {}
     for pair in names(text):
-        ours, equals, theirs = pair.partition("=")
-        if not (ours and equals and theirs):
+        name, _, value = (part.strip() for part in pair.partition("="))
+        if not (name and value):
             raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
-        found[ours.strip()] = theirs.strip()
+        found[name] = value
     return found
 
 
 def columns(text: str | None) -> dict[str, str]:
-    """Return the rig's name of a column -> the file's, from theta=arm_angle,t=time."""
+    """Return the rig's name of a column -> the file's, from the option --columns."""
     return pairs(text, "columns", "theta=arm_angle,t=time")
 
 
@@ -135,8 +144,6 @@ def component(kind: str, text: str, known: "Mapping[str, Template]", example: st
     Raises:
       ScenarioError: any other text, an unknown name or gain.
     """
-    from smc_mujoco.common.errors import ScenarioError, find, shown
-
     try:
         call = ast.parse(text if "(" in text else f"{text}()", mode="eval").body
         if not isinstance(call, ast.Call) or call.args:
@@ -148,12 +155,11 @@ def component(kind: str, text: str, known: "Mapping[str, Template]", example: st
 
 
 def laws_of(text: str) -> "list[Law]":
-    """Return the laws of a Python file, made by @smc.law_function; or the one law that another text means, see `law`.
+    """Return the laws of a Python file, made by @smc.law_function, with default gains; for other texts see `law`.
 
     Raises:
       ScenarioError: there is no such file, it fails, or there is no law in it.
     """
-    from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.control.component import Template
     from smc_mujoco.control.law import known_laws
     from smc_mujoco.control.law import law as find
@@ -174,7 +180,7 @@ def laws_of(text: str) -> "list[Law]":
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
-    """Return the source of the laws' gains in words: a set, unless every law is given with its own gains."""
+    """Return where the laws' gains are from, in words: from the set `gains`, unless every law has its own."""
     return f"gains {gains!r}" if any(isinstance(one, str) for one in laws) else "gains as given"
 
 
@@ -184,7 +190,6 @@ def plant(text: str) -> "str | Plant":
     Raises:
       ScenarioError: a model without joints, or one that cannot be a plant.
     """
-    from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
     path, _, joints = text.rpartition(":") if ".xml:" in text else (text, "", "")
@@ -201,7 +206,6 @@ def conditions(known: Sequence[str], own: Sequence[str] | None) -> "list[named.C
     Raises:
       ScenarioError: an unknown name, or a text or file that cannot be read.
     """
-    from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
     chosen = [find_condition(name) for name in known]
@@ -222,12 +226,13 @@ def starts(x0: float | None, spread: float | None) -> "Starts | None":
 
 
 def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
-    """Return a drive or gear from lag:0.01, or several from dcmotor+lag:0.01. Numbers are in the order of its fields.
+    """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01".
+
+    The numbers of a part are in the order of its fields.
 
     Raises:
       ScenarioError: an unknown part, or numbers that it does not take.
     """
-    from smc_mujoco.common.errors import ScenarioError, find, shown
     from smc_mujoco.common.registry import subclasses
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
     from smc_mujoco.mechanisms.hardware.drives import Drive

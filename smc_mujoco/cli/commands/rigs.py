@@ -1,4 +1,4 @@
-"""smc-mujoco identify, replay: quantities of a rig from records of it, and records beside their twins."""
+"""smc-mujoco identify, replay: a rig's quantities from its records, and records beside their twins."""
 
 from pathlib import Path
 from typing import Annotated
@@ -31,10 +31,11 @@ def identify(
 ) -> None:
     """Find the quantities of a machine from records of it.
 
-    The rig's references, controller, encoder and delay are replayed, and the quantities with the least squares of the
-    residuals are printed, with their standard errors, what the records cannot tell, and the fit of each record before
-    and after: 100 (1 - |y - yhat| / |y - mean y|) percent. A record has a column for each signal, with a first line of
-    names in CSV; angles in rad, time in s, at the rate of the rig's controller.
+    The rig's references, controller, encoder and delay are replayed, and the quantities are chosen that give the least
+    sum of squared residuals. The command prints them with their standard errors, says what the records cannot tell, and
+    gives the fit of each record before and after: 100 (1 - |y - yhat| / |y - mean y|) percent. A record has a column
+    for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The first line of a CSV
+    file has the names of the columns.
 
     Example: smc-mujoco identify emps run1.csv run2.csv --columns x=position,r=reference,u=voltage
     """
@@ -77,24 +78,24 @@ def replay(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],
     columns: options.Columns = None,
     quantities: Annotated[
-        str | None, typer.Option(help="Published sets of quantities that repeat it too, as a,b; default none.")
+        str | None, typer.Option(help="Published sets of quantities whose twins are shown too, as a,b; default none.")
     ] = None,
     start: Annotated[
-        float | None, typer.Option(min=0.0, help="Where the film starts, s; default where the rig's replays do.")
+        float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw columns and residuals, as FIGURE.svg and FIGURE.png.")
+        Path | None, typer.Option(help="Also draw the columns and their residuals, as FIGURE.svg and .png.")
     ] = None,
-    film: Annotated[Path | None, typer.Option(help="Also film them side by side, to a .mp4 file.")] = None,
+    film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
 ) -> None:
     """Repeat a record of a real machine by its twin, and show both side by side.
 
-    The twin starts from the measured state. Where the machine's controller is known, only references come from the
-    record and the loop is closed; else the recorded command is repeated. The table has the fit of the whole record,
-    100 (1 - |y - yhat| / |y - mean y|) percent, beside that of a machine that does nothing.
+    The twin starts from the measured state. If the machine's controller is known, the loop is closed and only the
+    references are those of the record; else the twin repeats the recorded command. The table has the fit of the whole
+    record, 100 (1 - |y - yhat| / |y - mean y|) percent, and that of a machine that does nothing.
 
     Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
     """

@@ -1,4 +1,4 @@
-"""smc-mujoco run, show, view: the runs of a scene, and one of them."""
+"""smc-mujoco run, show, view: the runs of a scene, a saved trace, and a run in a window."""
 
 import dataclasses
 import itertools
@@ -45,7 +45,7 @@ def run(
         str | None,
         typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat or parquet, beside its .npz."),
     ] = None,
-    timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
+    timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 

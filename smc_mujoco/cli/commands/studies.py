@@ -1,4 +1,4 @@
-"""smc-mujoco which, bench, claims, papers, report: many questions, answered by a study."""
+"""smc-mujoco which, bench, board, claims, papers, report: questions that many runs of many laws answer."""
 
 from pathlib import Path
 from typing import Annotated
@@ -32,14 +32,12 @@ def which(
     ] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help="Starts and noises of the finals; default 24, or 16. With fewer no law is better."),
+        typer.Option(min=1, help="Starts and noises of the finals; default 24, --quick 16. With fewer no law can win."),
     ] = None,
-    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, or 3.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
-    out: Annotated[Path, typer.Option(help="Folder for gains and runs, which another call takes from there.")] = Path(
-        "which"
-    ),
+    out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
@@ -109,7 +107,7 @@ def bench(
     spread: options.Spread = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help="Number of starts and noises; default 20. Fewer than 16 cannot name a winner."),
+        typer.Option(min=1, help="Number of starts and noises; default 20. With fewer than 16 no law can win."),
     ] = None,
     gains: options.Gains = "tuned",
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10.")] = None,
@@ -121,7 +119,7 @@ def bench(
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that are in the folder.")] = False,
     rig: Annotated[
         str | None,
-        typer.Option(help="In place of plants and conditions: a real machine, over its ensemble of parameter sets."),
+        typer.Option(help="A real machine, with its parameter sets, in place of plants and conditions."),
     ] = None,
     threads: options.Threads = None,
 ) -> None:
@@ -250,12 +248,12 @@ def claims(
         Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
     ] = None,
     json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document instead of tables, as --json - of other commands.")
+        bool, typer.Option("--json", help="Print one JSON document instead of tables, like --json - elsewhere.")
     ] = False,
     out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
     evidence: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.json", help="Also write claim, runs, numbers, threshold and verdict, sealed."),
+        typer.Option(metavar="FILE.json", help="Also write claims, runs, numbers, thresholds and verdicts, sealed."),
     ] = None,
     badge: Annotated[
         Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
@@ -264,7 +262,7 @@ def claims(
         bool,
         typer.Option(
             "--mutants",
-            help="See that the audit can fail: list claims that broken laws keep.",
+            help="Check that the audit can fail: list claims that no broken law loses.",
         ),
     ] = False,
     threads: options.Threads = None,
@@ -275,8 +273,8 @@ def claims(
     otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
     claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
 
-    The evidence is a file that a second audit with the same versions writes again to the last bit: the hashes of each
-    claim's runs, their numbers, thresholds and verdicts, and a seal.
+    The file of --evidence has the hashes of each claim's runs, their numbers, thresholds and verdicts, and a seal. A
+    second audit with the same versions writes the same file, to the last bit.
 
     Example: smc-mujoco claims 3 18 --gains tuned
 
@@ -297,7 +295,7 @@ def claims(
     sets = None if gains is None else options.names(gains)
     known = None if table is None else Table.read(table)
     if evidence and known:
-        raise ScenarioError("--evidence is of runs that the audit makes itself: leave out --table")
+        raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
     for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
@@ -347,7 +345,7 @@ def papers(
         typer.Option(metavar="FILE.json", help="Check the seal of a file that `smc-mujoco claims --evidence` wrote."),
     ] = None,
 ) -> None:
-    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin one of your own, or check evidence.
+    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin your own, or check evidence.
 
     A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
 
@@ -373,10 +371,10 @@ def papers(
 
 @errors_as_sentences()
 def report(
-    quick: Annotated[bool, typer.Option("--quick", help="A small report in two minutes: less of everything.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of every cell of the grid; fewer than 16 cannot name a winner.")
+        int | None, typer.Option(min=1, help="Seeds of every cell of the grid. With fewer than 16 no law can win.")
     ] = None,
     records: Annotated[
         Path | None,
@@ -394,10 +392,9 @@ def report(
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
 
-    It has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction; real
-    machines; films.
-    The file OUT/report.html needs no network and no other file; the data are in the same folder. You can stop the
-    command at any time, and continue by starting it again.
+    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction;
+    real machines; films. The file OUT/report.html needs no network and no other file; the data are in the same folder.
+    You can stop the command at any time, and continue by starting it again.
 
     With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html, evidence.json, badge.svg
     and checks.svg.
@@ -412,7 +409,7 @@ def report(
         from smc_mujoco.studies.report import report as make
 
     if paper and (seeds or records or laws):
-        raise ScenarioError("--seeds, --laws and --records are of the study: leave them out with --paper")
+        raise ScenarioError("--seeds, --laws and --records belong to the study: leave them out with --paper")
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:

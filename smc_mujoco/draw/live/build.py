@@ -1,4 +1,4 @@
-"""The live page as a folder: its own files, the facts, laws and the like in JavaScript, and the packages from npm."""
+"""The live page as a folder: the files of page/, facts.json, the components in JavaScript, and packages from npm."""
 
 import contextlib
 import json
@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.plant import Plant
 
 PAGE = Path(__file__).parent / "page"
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")  # the paper's three plants with one joint
-MARK = "facts.json"  # a folder with it is a live page, which may be replaced
+FACTS = "facts.json"  # a folder with this file is a live page, which may be replaced
 
 
 def live(
@@ -33,12 +33,13 @@ def live(
     """Build the live page: plants and laws in a browser, where MuJoCo simulates them and the reader moves the sliders.
 
     The folder works on every web server, also without network, such as `python -m http.server --directory live`. The
-    first call fetches MuJoCo for browsers and three.js with npm, which `pip install 'smc-mujoco[live]'` brings.
+    first call fetches MuJoCo for browsers and three.js with npm. Node.js has npm, and so has the extra: pip install
+    'smc-mujoco[live]'.
 
     Args:
-      plants: names of plants with one motor.
-      laws: your own laws, beside those of the library.
-      out: the folder.
+      plants: plants of the library with one motor, or their names.
+      laws: your own laws, in addition to those of the library.
+      out: the folder to write.
 
     Returns:
       The path of its index.html.
@@ -52,24 +53,24 @@ def live(
     functions = {("law", law.name): to_js(law) for law in own}
     offered = list(own)
     for one in _library(chosen):
-        with contextlib.suppress(ScenarioError):  # of one that no browser runs, such as a law in C
+        with contextlib.suppress(ScenarioError):  # raised for one that has no translation, such as a law in C
             if (one.kind, one.name) not in functions:
                 functions[one.kind, one.name] = to_js(one)
                 offered.append(one)
     page = known.facts(chosen, offered, own)
-    folder = _free(Path(out))
+    folder = _writable(Path(out))
     vendor = npm.fetched()
     shutil.copytree(PAGE, folder, dirs_exist_ok=True)
     shutil.copytree(vendor, folder / "vendor", dirs_exist_ok=True)
     (folder / "components.js").write_text(_script(functions), encoding="utf-8")
-    (folder / MARK).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
+    (folder / FACTS).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
     return folder / "index.html"
 
 
 def _library(chosen: Sequence[Plant]) -> list[Component]:
     """Return the library's laws that suit one of the plants, its surfaces and its velocity estimators.
 
-    Without the surfaces that read an acceleration, which are for actuators with a lag.
+    Surfaces that read an acceleration are left out, because they are for actuators with a lag.
     """
     laws = [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
     surfaces = [template() for template in surface.catalogue().values() if "a" not in reads(template)]
@@ -77,7 +78,11 @@ def _library(chosen: Sequence[Plant]) -> list[Component]:
 
 
 def _script(functions: Mapping[tuple[str, str], str]) -> str:
-    """Return a module that exports laws, surfaces and estimators: each an object of functions by name."""
+    """Return a module that exports laws, surfaces and estimators, each an object of functions by name.
+
+    Args:
+      functions: kind and name -> JavaScript.
+    """
     lines = []
     for kind in ("law", "surface", "estimator"):
         entries = [f"{json.dumps(name)}: {text},\n" for (of, name), text in functions.items() if of == kind]
@@ -93,12 +98,12 @@ def _own(law: object) -> Component:
     return checked_name(made)
 
 
-def _free(folder: Path) -> Path:
-    """Return a folder that is new, empty or a live page.
+def _writable(folder: Path) -> Path:
+    """Return the folder if it is new, empty or a live page.
 
     Raises:
-      ScenarioError: other files are in it.
+      ScenarioError: it is a file, or a folder with other files in it.
     """
-    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / MARK).is_file())):
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file())):
         raise ScenarioError(f"cannot write the live page to {folder}: something else is there, choose another folder")
     return folder

@@ -1,6 +1,6 @@
-"""What the live page knows of plants, laws, surfaces and velocity estimators, as data for facts.json.
+"""facts.json of the live page: what the page knows of plants, laws, surfaces and velocity estimators.
 
-Labels, formulas, colours, gains and their ranges come from the catalogues; the numbers of a model from the plant. The
+Labels, formulas, colours, gains and their ranges come from the catalogues, the numbers of a model from the plant. The
 page loads the plant's MJCF and sets the same fields of the model as a run does.
 """
 
@@ -33,9 +33,10 @@ from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
 
 MODEL = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
-AROUND = 10.0  # factor on either side of a gain whose range tuning does not know: chosen
-ACRONYM = 3  # letters: such a name is one, as PID
-START = ("observer_free", "classical")  # the laws that the page opens with: the paper's, and the first of all
+FACTOR = 10.0  # a slider reaches from gain / FACTOR to gain * FACTOR where tuning has no range for the gain: chosen
+ACRONYM = 3  # letters of a name, at most, that is written in capitals, such as PID
+START = ("observer_free", "classical")  # laws with which the page opens: the paper's, and classical sliding mode
+WHITE = 0.35  # share of white in a law's colour on a dark page, as in the report
 
 
 def plants() -> list[str]:
@@ -44,7 +45,7 @@ def plants() -> list[str]:
 
 
 def _why_not(plant: Plant) -> str:
-    """Return why the page cannot have a plant, or ""."""
+    """Return why the page cannot have a plant, worded to follow its name; "" if it can."""
     if plant.driven != 1:
         return f"has {plant.driven} motors"
     if not plant.smooth:
@@ -69,9 +70,12 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
 
 
 def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
-    """Return what the page knows of these plants and of the components that it offers, the user's own laws among them.
+    """Return facts.json as a dict.
 
-    The numbers of a step are the engine's: how long it is, where its last stage is, and which state has diverged.
+    Args:
+      chosen: the plants of the page.
+      offered: laws, surfaces and velocity estimators, with the user's own laws.
+      own: the user's own laws.
     """
     kinds = {kind: [one for one in offered if one.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
@@ -121,7 +125,12 @@ def _law(law: Component) -> dict[str, Any]:
 
 
 def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence[Component]) -> dict[str, Any]:
-    """Return the facts about a plant, with the gains of the laws that are offered on it, the user's own first."""
+    """Return the facts about a plant, with gains and ranges of the components that are offered on it.
+
+    Args:
+      kinds: kind of component -> all that the page offers.
+      own: the user's laws. They keep their gains, and the page opens with them.
+    """
     model = mujoco.MjModel.from_xml_path(str(_mjcf(plant)))
     joints = [model.joint(int(joint)) for joint in joint_ids(model)]
     resolved = defaults.Scenario(plant=plant, law="none").resolved
@@ -158,7 +167,7 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence
 
 
 def _opening(own: Sequence[str], offered: Sequence[str]) -> list[str]:
-    """Return the laws that the page opens with: the user's own, then START, or whatever there is; at most two."""
+    """Return the names of at most two laws with which the page opens: the user's, then START, else the first ones."""
     found = dict.fromkeys([*own, *(name for name in START if name in offered)])
     return list(found or dict.fromkeys(name for name in offered if name != "none"))[:2]
 
@@ -174,7 +183,7 @@ def _included(chosen: Sequence[Plant]) -> list[str]:
 
 
 def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
-    """Return the conditions that have a slider: name, label, unit, range, value. The ranges are chosen."""
+    """Return the conditions that have a slider: name, label, unit, range, value and step. The ranges are chosen."""
     started = max(range(plant.n), key=lambda i: abs(s.x0[i]))
     reach, bound, unit, effort = abs(s.x0[started]), s.limits[0], plant.units[started], plant.efforts[0]
     far = min(2.0 * reach, defaults.MAX_ANGLE if unit == "rad" else math.inf)
@@ -197,8 +206,8 @@ def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
 
 
 def _lighter(colour: str) -> str:
-    """Return a law's colour for a dark page, as in the report: 65 % of it, the rest white."""
-    return "#" + "".join(f"{round(0.65 * part + 0.35 * 255):02X}" for part in style.rgb(colour))
+    """Return a law's colour for a dark page: mixed with white."""
+    return "#" + "".join(f"{round((1.0 - WHITE) * part + WHITE * 255):02X}" for part in style.rgb(colour))
 
 
 def _equation(plant: Plant) -> str:
@@ -209,9 +218,9 @@ def _equation(plant: Plant) -> str:
 
 
 def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]:
-    """Return field -> its flat values with the plant's parameters, and those with twice its mass.
+    """Return field -> its flat values with the plant's parameters, and those with twice the mass.
 
-    All fields are linear in the mass, so that the page can take any factor on it.
+    All fields are linear in the mass, so the page can compute them for any mass.
     """
     found: dict[str, list[list[float]]] = {}
     for factor in (1.0, 2.0):
@@ -221,7 +230,7 @@ def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]
 
 
 def _written(model: mujoco.MjModel, plant: Plant, factor: float) -> dict[str, np.ndarray]:
-    """Return field -> its values with a factor on the plant's mass."""
+    """Return field -> its values if the plant's mass is multiplied by a factor."""
     found: dict[str, np.ndarray] = {}
     for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
         values = found.setdefault(name, array(model, name).astype(float).copy())
@@ -263,7 +272,7 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
 
 
 def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
-    """Return a part's write into a field, by places in the flat field."""
+    """Return what a part writes into a field of the model: the places in the flat field, and a value for each."""
     values = array(model, field.name)
     places = np.arange(values.size).reshape(values.shape)[field.at]
     return {
@@ -275,7 +284,7 @@ def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
 
 
 def _gains(law: Component, plant: Plant, own: bool) -> dict[str, float]:
-    """Return a law's gains on a plant: those of the library's laws tuned, if they can be."""
+    """Return a law's gains on a plant: its own, or tuned ones for a law of the library that has them."""
     values = dict(law.gains)
     if not own:
         with contextlib.suppress(ScenarioError):
@@ -284,21 +293,21 @@ def _gains(law: Component, plant: Plant, own: bool) -> dict[str, float]:
 
 
 def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[str, list[float]]:
-    """Return gain -> the ends of its slider, for the gains of a component that are to choose."""
+    """Return gain -> least and largest value of its slider, for the gains of a component that are to be chosen."""
     known: Mapping[str, tuple[float, float]] = {}
     with contextlib.suppress(ScenarioError):
         scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=one.requires_model)
-        if one.kind != "estimator":  # whose scales are those of noise and sampling, not the plant's
+        if one.kind != "estimator":  # the gains of an estimator follow from noise and sampling, not from the plant
             known = search_space.box(one, scales)
     ranges = {}
     for name, value in values.items():
         if name in known:
             ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
-        elif 0.0 < value < float("inf") and _free(one, name):
-            ranges[name] = [value / AROUND, value * AROUND]
+        elif 0.0 < value < math.inf and _to_choose(one, name):
+            ranges[name] = [value / FACTOR, value * FACTOR]
     return ranges
 
 
-def _free(one: Component, name: str) -> bool:
-    """Return whether a gain is one to choose, and not an initial value, an exponent or the like."""
+def _to_choose(one: Component, name: str) -> bool:
+    """Return whether a gain is to be chosen. An initial value or an exponent, for example, is not."""
     return one.template is None or not one.template.gains[name].held

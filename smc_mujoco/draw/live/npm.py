@@ -1,4 +1,4 @@
-"""The packages of the live page from npm: MuJoCo for browsers, its developers' own build, and three.js.
+"""The packages of the live page from npm: MuJoCo for browsers, as built by MuJoCo's developers, and three.js.
 
 packages/package-lock.json pins their versions and hashes. npm fetches them once from the registry that the environment
 configures, into a cache outside of the repository.
@@ -19,7 +19,7 @@ from smc_mujoco.common.process import TimedOut, timed
 
 PINNED = Path(__file__).parent / "packages"
 # File of a package -> its name in vendor/.
-NEEDED = {
+FILES = {
     "@mujoco/mujoco/mujoco.js": "mujoco.js",
     "@mujoco/mujoco/mujoco.wasm": "mujoco.wasm",
     "three/build/three.module.js": "three.module.js",
@@ -34,14 +34,14 @@ TIMEOUT = 600.0  # s
 
 
 def cached() -> Path:
-    """Return the folder of the cache for the pinned packages, which may not exist yet."""
+    """Return the folder of the cache for the pinned versions. It may not exist yet."""
     pins = hashlib.sha256((PINNED / "package-lock.json").read_bytes()).hexdigest()[:16]
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(home) / "smc_mujoco" / f"live-{pins}"
 
 
 def fetched() -> Path:
-    """Return a folder with the files that the page needs and their licences, after fetching them if necessary.
+    """Return a folder with FILES and their licences. Fetch them if they are not in the cache.
 
     Raises:
       ScenarioError: there is no npm, or it cannot fetch the packages.
@@ -57,7 +57,7 @@ def fetched() -> Path:
             shutil.copy(file, scratch)
         _install(command, scratch)
         made.mkdir()
-        for source, ours in NEEDED.items():
+        for source, ours in FILES.items():
             shutil.copy(scratch / "node_modules" / source, made / ours)
         (made / LICENCES).write_text(_licences(scratch / "node_modules"), encoding="utf-8")
         try:
@@ -85,7 +85,11 @@ def npm() -> list[str]:
 
 
 def _install(command: list[str], folder: Path) -> None:
-    """Install the pinned packages in a folder."""
+    """Install the pinned packages into a folder.
+
+    Raises:
+      ScenarioError: npm fails, or does not end within TIMEOUT.
+    """
     try:
         done = timed([*command, "ci", *FLAGS], TIMEOUT, cwd=folder)
     except TimedOut:

@@ -10,7 +10,7 @@ const PARTS = ["law", "surface", "velocity"]; // of a controller
 // The velocity estimator where none is chosen: an encoder measures no velocity.
 export const estimatorFor = (counts) => (counts ? "filtered_difference" : "measured");
 
-// Return the scenario for what the reader has chosen; `facts` are the numbers that the package wrote.
+// Return the scenario that the reader has chosen, with defaults for what is undefined. `facts` is facts.json.
 export function scenario(facts, chosen) {
   const plant = facts.plants[chosen.plant];
   const law = facts.laws[chosen.law];
@@ -50,7 +50,7 @@ class Component {
     this.memories = Array.from({ length: this.channels }, () => new Float64Array(this.known.memory));
   }
 
-  // Go on with the memory of another one, if that is of the same kind.
+  // Take over the memory of another component if it has the same name.
   resume(other) {
     if (other?.name === this.name) this.memories = other.memories.map((memory) => memory.slice());
   }
@@ -82,7 +82,7 @@ export class Simulation {
     this.velocity = made("estimators", s.velocity);
     this.model = this.compile(vfs, true);
     this.data = new mujoco.MjData(this.model);
-    // what a law may know: the nominal mechanism, without friction and with the nominal mass
+    // the nominal mechanism, which a law may read: without friction, and with the nominal mass
     this.nominal = this.law.known.reads_model ? this.compile(vfs, false) : null;
     this.nominalData = this.nominal && new mujoco.MjData(this.nominal);
     this.reset();
@@ -93,15 +93,16 @@ export class Simulation {
     for (const each of [this.data, this.model, this.nominalData, this.nominal]) each?.delete();
   }
 
-  compile(vfs, mechanism) {
+  // Return the model of the real mechanism, with the chosen mass and friction, or of the nominal one.
+  compile(vfs, real) {
     const { mujoco, plant, s } = this;
     const model = mujoco.MjModel.from_xml_string(plant.mjcf, vfs);
     const array = (name) => (name.startsWith("opt.") ? model.opt[name.slice(4)] : model[name]);
-    const mass = mechanism ? s.mass : 1;
-    for (const [name, [values, more]] of Object.entries(plant.fields)) {
-      array(name).set(values.map((value, i) => value + (mass - 1) * (more[i] - value)));
+    const mass = real ? s.mass : 1;
+    for (const [name, [values, twice]] of Object.entries(plant.fields)) { // at the nominal mass, and at twice that
+      array(name).set(values.map((value, i) => value + (mass - 1) * (twice[i] - value)));
     }
-    if (mechanism && s.friction > 0) {
+    if (real && s.friction > 0) {
       for (const { name, at, value, adds } of plant.friction) {
         const values = array(name);
         at.forEach((i, k) => (values[i] = adds ? values[i] + s.friction * value[k] : value[k]));
@@ -123,17 +124,17 @@ export class Simulation {
     plant.channels.forEach((channel, i) => (this.data.qpos[channel.qpos] = s.x0[i]));
     mujoco.mj_forward(this.model, this.data);
     this.step = 0; // physics steps done
-    this.failed = null; // why and when, once it has
-    this.push = new Float64Array(this.model.nv); // generalised force of the reader's hand
+    this.failed = null; // {why, time} once the run has failed
+    this.push = new Float64Array(this.model.nv); // generalised force of the reader's push
     for (const part of PARTS) this[part]?.reset();
-    this.commands = new Float64Array(Math.floor(s.delay_steps / s.steps) + 2); // a ring
+    this.commands = new Float64Array(Math.floor(s.delay_steps / s.steps) + 2); // delay buffer: command k at k % length
     this.y = {};
     this.out = [0, 0];
     this.latest = { t: 0, x: [...s.x0], v: plant.channels.map(() => 0), u: 0, s: 0, r: s.reference, d: 0 };
     this.views = null;
   }
 
-  // Go on from the state of another simulation of the same plant.
+  // Continue from the state of another simulation of the same plant.
   resume(other) {
     this.data.qpos.set(other.data.qpos);
     this.data.qvel.set(other.data.qvel);
@@ -151,7 +152,7 @@ export class Simulation {
     return k * this.s.control_period + (this.step % this.s.steps) * this.s.physics_step;
   }
 
-  // MuJoCo's arrays. They are views of its memory, and void when that grows.
+  // MuJoCo's arrays. They are views of its memory, which become empty when that memory grows.
   get arrays() {
     if (!this.views || this.views.qpos.length === 0) {
       const { qpos, qvel, qacc, ctrl, qfrc_applied } = this.data;
@@ -164,7 +165,7 @@ export class Simulation {
     return this.views;
   }
 
-  // Do one physics step. Return the sample that was taken at its start, if one was, else null.
+  // Do one physics step. Return the control sample at its start, or null if there was none.
   advance() {
     if (this.failed) return null;
     const { s, plant } = this;
@@ -181,6 +182,7 @@ export class Simulation {
     return sampled ? this.latest : null;
   }
 
+  // End the run, and return null, which `advance` returns.
   fail(why) {
     this.failed = { why, time: this.time };
     return null;
@@ -213,7 +215,7 @@ export class Simulation {
     return Number.isFinite(out[0]) && Number.isFinite(out[1]) && Math.abs(u) < this.facts.max_control;
   }
 
-  // What the controller sees of x and v of all channels at sample k: position, velocity and acceleration.
+  // Return what the controller measures or estimates at sample k: {x, v, a}, each an array over the channels.
   measure(x, v, k) {
     const { s, plant, out } = this;
     const noisy = s.noise.position !== 0 || s.noise.velocity !== 0;
@@ -238,7 +240,7 @@ export class Simulation {
     return seen;
   }
 
-  // The sliding variable, if the first channel were at x and v at present.
+  // Return the sliding variable that the law would have now if the first channel were at x and v.
   slidingAt(x, v) {
     const { s, out } = this;
     const y = { ...this.y, x, v, e: x - s.reference, de: v, has_surface: 0, s: 0, v_eq: 0 };
@@ -250,7 +252,7 @@ export class Simulation {
     return out[1];
   }
 
-  // The nominal f and g of x'' = f + g u in each channel: the accelerations without a command, and what one adds.
+  // Return the nominal f and g of x'' = f + g u: the channels' accelerations for u = 0, and what u = 1 adds to them.
   equation(seen) {
     const { plant } = this;
     if (!this.nominal) return [plant.channels.map(() => 0), plant.channels.map(() => 1)];
@@ -268,7 +270,7 @@ export class Simulation {
     return [f, accelerations(1).map((value, i) => value - f[i])];
   }
 
-  // Apply the disturbance at a fraction of the physics step, beside the reader's push. Return it.
+  // Apply the reader's push, and the disturbance at a fraction of the physics step. Return the disturbance.
   disturb(fraction) {
     const { s, plant } = this;
     const k = Math.floor(this.step / s.steps);
@@ -280,7 +282,8 @@ export class Simulation {
     return d;
   }
 
-  // A step of MuJoCo's RK4 with the disturbance at each stage: mj_step has no callback in a browser.
+  // Do a step of MuJoCo's RK4, with the disturbance at the time of each stage. mj_step would hold it for the whole step,
+  // because it has no callback in a browser.
   rungeKutta() {
     const { mujoco, model, data, s } = this;
     const h = s.physics_step;
@@ -308,7 +311,8 @@ export class Simulation {
   }
 }
 
-// Simulate a scenario of a duration, s. Return {t, u, s, x: [...channels], v: [...]}, an array of samples each.
+// Simulate a scenario for a duration, s. Return {t, u, s, d, x: [...], v: [...], failed}: t, u, s, d and each channel of
+// x and v are arrays of samples.
 export function trace(mujoco, vfs, facts, functions, chosen, duration) {
   const run = new Simulation(mujoco, vfs, facts, functions, chosen);
   const samples = Math.floor(duration / run.s.control_period + 1e-6);
@@ -325,7 +329,8 @@ export function trace(mujoco, vfs, facts, functions, chosen, duration) {
   return found;
 }
 
-// Two standard normal numbers: block k of numpy's Philox4x64-10 with key (seed, channel), by Box and Muller.
+// Return two standard normal numbers: block k of numpy's Philox4x64-10 with key (seed, channel), by the Box-Muller
+// transform. The same numbers are the noise of smc_mujoco's runs.
 export function normals(seed, channel, k) {
   let [c0, c1, c2, c3] = [BigInt(k), 0n, 0n, 0n];
   let [key0, key1] = [BigInt(seed), BigInt(channel)];

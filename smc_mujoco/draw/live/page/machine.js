@@ -3,20 +3,22 @@
 import * as THREE from "./vendor/three.module.js";
 
 const [PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX] = [0, 1, 2, 3, 4, 5, 6];
-const POSES = 9; // of a swing, which the picture leaves room for
-const MARGIN = 1.06; // of the picture around the machine
+const POSES = 9; // of the machine over its range, all of which the picture shows: chosen
+const MARGIN = 1.06; // size of the picture, relative to what it shows: chosen
 const TILES = 80; // along an edge of the floor
 const SEAM = 2; // px between two machines
-// How the picture is made, from the finest to the fastest: px of the canvas per px of the page, and shadows.
+// Qualities of the picture, from the finest to the fastest: px of the canvas per px of the page, and shadows. Chosen.
 const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.75, shadows: false }];
-const SLOW = 24; // frames a second, below which the next grade is taken
-const PATIENCE = 1.5; // s
+const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
+const PATIENCE = 1.5; // s over which frames are counted: chosen
+const STIFFNESS = 12; // of the spring by which a pointer pulls, in u_max per extent of the plant squared: chosen
+const REACH = 0.25; // of the plant's extent: a spring longer than that pulls no harder: chosen
 
 function css(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-// Whether WebGL is computed by the processor, as in a virtual machine without a GPU.
+// Return whether WebGL is computed by the processor, as in a virtual machine without a GPU.
 function software() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const about = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -25,7 +27,7 @@ function software() {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
-// The shape of a geom; null for one that is not drawn.
+// Return the geometry of a geom; null for one that is not drawn.
 function shape(model, i) {
   const [a, b, c] = model.geom_size.subarray(3 * i, 3 * i + 3);
   const upright = (geometry) => geometry.rotateX(Math.PI / 2); // three's cylinders stand along y
@@ -40,7 +42,7 @@ function shape(model, i) {
   }
 }
 
-// A height field with walls in front and behind.
+// Return the geometry of a height field, with walls in front and behind.
 function heights(model, id) {
   const [rx, ry, top, base] = model.hfield_size.subarray(4 * id, 4 * id + 4);
   const [rows, columns, first] = [model.hfield_nrow[id], model.hfield_ncol[id], model.hfield_adr[id]];
@@ -69,7 +71,7 @@ function heights(model, id) {
   return geometry;
 }
 
-// The floor's tiles, in the colours of the page.
+// Return a texture of the floor's tiles, in the colours of the page.
 function tiles() {
   const [canvas, size] = [document.createElement("canvas"), 128];
   canvas.width = canvas.height = size;
@@ -159,7 +161,7 @@ class Machine {
     this.place(this.meshes);
   }
 
-  // Free what the graphics card holds.
+  // Free the memory of the graphics card.
   dispose() {
     this.scene.traverse((each) => {
       each.skeleton?.dispose();
@@ -172,11 +174,11 @@ class Machine {
     }
   }
 
-  // The set: floor, grid and lights, in the colours of the page.
+  // Add floor, tiles and lights to the scene, in the colours of the page.
   light() {
     const { scene } = this;
     const { extent, center } = this.simulation.plant;
-    // without shadows the floor has no tiles and no light, which take most of the time of a picture without a GPU
+    // the second material is for grades without shadows: tiles and light take most of a picture's time without a GPU
     this.floors = [new THREE.MeshLambertMaterial({ map: tiles() }), new THREE.MeshBasicMaterial({ color: css("--floor") })];
     const floor = this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), this.floors[0]);
     const tile = extent > 1 ? 0.5 : 0.1; // m
@@ -212,7 +214,7 @@ class Machine {
     }
   }
 
-  // Where the model's camera sees the machine, at rest and as it swings: bounds of x/z and y/z.
+  // Return the bounds of x/z and y/z, in the camera's frame, of the machine in POSES over its range.
   bounds(camera) {
     const { simulation: { mujoco, model, data, plant, s } } = this;
     const kept = data.qpos.slice();
@@ -263,12 +265,12 @@ export class Stage {
   setGrade(grade) {
     this.grade = grade;
     this.renderer.shadowMap.enabled = GRADES[grade].shadows;
-    this.since = null; // when the grade's first frame was
+    this.since = null; // time of the first frame that is counted, ms
     this.frames = 0;
     this.furnish();
   }
 
-  // Give the machines what belongs to the grade.
+  // Give the machines' floors and materials the look of the grade.
   furnish() {
     for (const machine of this.machines ?? []) {
       machine.floor.material = machine.floors[GRADES[this.grade].shadows ? 0 : 1];
@@ -276,7 +278,7 @@ export class Stage {
     }
   }
 
-  // Take the next grade if the frames come too slowly; `now` in ms.
+  // Use the next faster grade if the frames come too slowly; `now` in ms.
   watch(now) {
     this.since ??= now;
     this.frames += 1;
@@ -306,12 +308,12 @@ export class Stage {
     this.near = simulations[0].plant.extent / 50;
   }
 
-  // Replace the simulations of the machines.
+  // Replace the simulations that the machines show.
   swap(simulations) {
     this.machines.forEach((machine, i) => (machine.simulation = simulations[i]));
   }
 
-  // The parts of the canvas, in px from its upper left corner.
+  // Return the part of the canvas that each machine has, in px from the upper left corner.
   parts() {
     const [width, height, n] = [this.canvas.clientWidth, this.canvas.clientHeight, this.machines.length];
     const seams = SEAM * (n - 1);
@@ -319,7 +321,7 @@ export class Stage {
     return this.machines.map((_, i) => ({ x: this.beside ? i * (w + SEAM) : 0, y: this.beside ? 0 : i * (h + SEAM), width: w, height: h }));
   }
 
-  // Choose the camera's opening so that the machine fills a part.
+  // Set the camera's projection so that the machine fills a part of the canvas.
   open(part) {
     const { left, right, bottom, top } = this.seen;
     let [halfX, halfY] = [((right - left) / 2) * MARGIN, ((top - bottom) / 2) * MARGIN];
@@ -351,7 +353,7 @@ export class Stage {
     });
   }
 
-  // The ray of a pointer, and the machine that it is over.
+  // Set the ray of a pointer. Return the index of the machine under it, or of the grabbed one; null for none.
   aim(event) {
     const box = this.canvas.getBoundingClientRect();
     const [px, py] = [event.clientX - box.left, event.clientY - box.top];
@@ -365,7 +367,7 @@ export class Stage {
     return i;
   }
 
-  // Where a geom of machine i is on the canvas, px.
+  // Return where a geom of machine i is on the canvas, px.
   onScreen(i, name) {
     const { mujoco, model, data } = this.machines[i].simulation;
     const geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM.value, name);
@@ -388,6 +390,7 @@ export class Stage {
     return true;
   }
 
+  // Move the target of the grabbed point to the pointer, in the plane that faces the camera.
   drag(event) {
     if (!this.held || this.aim(event) === null) return;
     const normal = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 2);
@@ -400,7 +403,7 @@ export class Stage {
     this.held = null;
   }
 
-  // The generalised force with which the pointer pulls each simulation: that of a spring to the grabbed point.
+  // Return the generalised force by which the pointer pulls each simulation, through a spring to the grabbed point.
   pulls() {
     const forces = this.machines.map(({ simulation }) => new Float64Array(simulation.model.nv));
     if (!this.held) return forces;
@@ -408,7 +411,7 @@ export class Stage {
     const { model, data, s, plant: { extent } } = this.machines[index].simulation;
     const point = local.clone().applyMatrix4(mesh.matrix);
     const pull = target.clone().sub(point);
-    pull.multiplyScalar((12 * s.u_max) / extent ** 2 / Math.max(1, (4 * pull.length()) / extent) * Math.min(1, extent));
+    pull.multiplyScalar((STIFFNESS * s.u_max) / extent ** 2 / Math.max(1, pull.length() / (REACH * extent)) * Math.min(1, extent));
     for (let body = mesh.userData.body; body > 0; body = model.body_parentid[body]) {
       for (let j = model.body_jntadr[body], n = model.body_jntnum[body]; n > 0; j++, n--) {
         const axis = new THREE.Vector3(...data.xaxis.subarray(3 * j, 3 * j + 3));
@@ -420,6 +423,7 @@ export class Stage {
     return forces;
   }
 
+  // Draw the arrow from the grabbed point of a machine to the pointer, or hide it.
   pointArrow(machine) {
     const { arrow } = machine;
     const held = this.held && this.machines[this.held.index] === machine ? this.held : null;

@@ -1,4 +1,4 @@
-// The page: what the reader chooses, its simulations, pictures and plots.
+// The page: the reader's choice, its simulations, pictures and plots.
 
 import loadMujoco from "./vendor/mujoco.js";
 import { Simulation, estimatorFor, trace } from "./engine.js";
@@ -6,10 +6,10 @@ import * as functions from "./components.js"; // laws, surfaces, estimators
 import { Stage } from "./machine.js";
 import { History, overTime, phasePlane } from "./plots.js";
 
-const SECONDS = 10; // of the plots
-const SLOWEST = 0.1; // s: a frame that took longer slows the simulation down instead
-const GRADES = 1000; // of a slider
-const WORDS = { NaN, Infinity, "-Infinity": -Infinity };
+const SECONDS = 10; // that the plots show: chosen
+const MAX_FRAME = 0.1; // s: after a frame that took longer, only this much time is simulated
+const TICKS = 1000; // along a slider
+const WORDS = { NaN, Infinity, "-Infinity": -Infinity }; // words in facts.json for numbers that JSON lacks
 const SIDES = ["a", "b"];
 const PARTS = { surface: "surfaces", velocity: "estimators" }; // of a controller beside its law -> where their facts are
 const COUNTS = [64, 256, 1024, 4096, 16384]; // of an encoder, per revolution or metre: what the page offers
@@ -23,21 +23,23 @@ let facts, mujoco, vfs, stage;
 let chosen;
 let running = [];
 let playing = true;
-let pressed = 0; // of the arrow keys: -1, 0 or 1
-let owed = 0; // s of simulated time
+let pressed = 0; // direction of the arrow key that is held: -1, 0 for none, or 1
+let owed = 0; // s that are still to be simulated
 
 const plantFacts = () => facts.plants[chosen.plant];
 const sides = () => SIDES.filter((side) => chosen[side].law);
 const controller = (law) => ({ law, gains: {}, surface: null, velocity: null });
 
-// ---- what is chosen, as an address and as a scenario
+// ---- the reader's choice, as an address and as a scenario
 
+// Return the choice with which the page shows a plant at first.
 function opening(plant) {
   const { start, conditions } = facts.plants[plant];
   const numbers = Object.fromEntries(conditions.map(({ name, value }) => [name, value]));
   return { plant, ...numbers, counts: 0, a: controller(start[0]), b: controller(start[1] ?? "") };
 }
 
+// Return the choice that the page's address holds. What it lacks, or has wrong, is that of `opening`.
 function fromAddress() {
   const given = new URLSearchParams(location.hash.slice(1));
   const plant = given.get("plant") in facts.plants ? given.get("plant") : Object.keys(facts.plants)[0];
@@ -68,6 +70,7 @@ function fromAddress() {
   return made;
 }
 
+// Put the choice into the page's address.
 function toAddress() {
   const words = new URLSearchParams({ plant: chosen.plant });
   for (const side of SIDES) {
@@ -86,7 +89,7 @@ function toAddress() {
   history.replaceState(null, "", `#${words}`);
 }
 
-// The scenario of one side, as the engine takes it.
+// Return the scenario of one side for the engine.
 function scenarioOf(side) {
   const { plant, start, reference, mass, friction, delay, noise, amplitude, omega, period, bound, counts } = chosen;
   const { law, gains, model, surface, velocity } = chosen[side];
@@ -101,32 +104,32 @@ function scenarioOf(side) {
 
 // ---- simulations
 
-const made = (side) => new Simulation(mujoco, vfs, facts, functions, scenarioOf(side));
+const simulationOf = (side) => new Simulation(mujoco, vfs, facts, functions, scenarioOf(side));
 
 function colours() {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   const names = sides().map((side) => chosen[side].law);
   const known = names.map((name) => facts.laws[name][dark ? "colour_dark" : "colour"]);
-  // one law twice, with other gains: the second in a neutral colour
+  // if both sides have the same law, the second has a neutral colour
   return known.map((colour, i) => (i && names[i] === names[0] ? css("--muted") : colour));
 }
 
-// Begin anew with what is chosen.
+// Start the simulations of the choice, in place of those that run.
 function restart() {
   for (const { simulation } of running) simulation.delete();
   const palette = colours();
-  running = sides().map((side, i) => ({ side, simulation: made(side), colour: palette[i] }));
+  running = sides().map((side, i) => ({ side, simulation: simulationOf(side), colour: palette[i] }));
   for (const each of running) each.history = new History(each.simulation.s.control_period, SECONDS);
   stage.show(running.map(({ simulation }) => simulation), palette);
   owed = 0;
-  named();
+  writeNames();
   say("");
 }
 
-// Go on from the present state with other conditions.
+// Continue from the present state under the changed choice.
 function change() {
   for (const each of running) {
-    const simulation = made(each.side);
+    const simulation = simulationOf(each.side);
     simulation.resume(each.simulation);
     each.simulation.delete();
     if (simulation.s.control_period !== each.simulation.s.control_period) {
@@ -139,6 +142,7 @@ function change() {
   stage.swap(running.map(({ simulation }) => simulation));
 }
 
+// Put every simulation back to its initial state.
 function reset() {
   for (const each of running) {
     each.simulation.reset();
@@ -148,7 +152,7 @@ function reset() {
   say("");
 }
 
-// Simulate `seconds` of every simulation.
+// Advance every simulation by `seconds`.
 function simulate(seconds) {
   owed += seconds;
   const pulls = stage.pulls();
@@ -172,7 +176,7 @@ function simulate(seconds) {
   }
 }
 
-// The curve s = 0 of a simulation in the phase plane, at present: a function of x and of the least and largest v, which
+// Return the present curve s = 0 of a simulation in the phase plane: a function of x and of the least and largest v. It
 // returns v, or NaN where s does not change its sign.
 function surfaceOf({ simulation }) {
   return (x, [low, high]) => {
@@ -197,7 +201,7 @@ let frames = [];
 function frame(now) {
   const elapsed = before === null ? 0 : (now - before) / 1000;
   before = now;
-  if (playing && !document.hidden) simulate(Math.min(elapsed, SLOWEST) * parseFloat($("speed").value));
+  if (playing && !document.hidden) simulate(Math.min(elapsed, MAX_FRAME) * parseFloat($("speed").value));
   stage.draw();
   stage.watch(now);
   plot();
@@ -228,7 +232,7 @@ function plot() {
 
 const GREEK = { lam: "λ", alpha: "α", beta: "β", gamma: "γ", delta: "δ", mu: "μ", phi: "φ", eps: "ε", omega: "ω" };
 
-// A formula in plain letters, with Greek ones, exponents and primes.
+// Return a formula with Greek letters, exponents, primes and subscripts instead of plain text.
 function pretty(text) {
   return text
     .replace(/\b([A-Za-z]+)(?![\w(])/g, (word) => (Object.hasOwn(GREEK, word) ? GREEK[word] : word))
@@ -240,7 +244,8 @@ function say(text) {
   if ($("status").textContent !== text) $("status").textContent = text;
 }
 
-function named() {
+// Write the names of plant, laws and quantities.
+function writeNames() {
   const { label, equation, channels, effort } = plantFacts();
   const [{ unit }, free] = channels;
   $("plant").value = chosen.plant;
@@ -268,6 +273,7 @@ function named() {
 
 // ---- controls
 
+// Return a new element. An attribute such as onclick is a listener.
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -279,41 +285,42 @@ function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-const four = (value) => parseFloat(value.toPrecision(4));
+const fourDigits = (value) => parseFloat(value.toPrecision(4));
 
-// A number with a slider: `logarithmic` where its range spans more than a decade.
+// Return a slider with a number field beside it. `put` is called with each new number. The slider is logarithmic if its
+// range spans more than a decade and has no step.
 function slider({ name, label, unit, least, most, value, step }, put) {
   const logarithmic = least > 0 && most / least > 10 && !step;
-  const toGrade = (number) => logarithmic
-    ? (GRADES * Math.log(number / least)) / Math.log(most / least)
-    : (GRADES * (number - least)) / (most - least);
-  const fromGrade = (grade) => {
-    const part = grade / GRADES;
+  const toTick = (number) => logarithmic
+    ? (TICKS * Math.log(number / least)) / Math.log(most / least)
+    : (TICKS * (number - least)) / (most - least);
+  const fromTick = (tick) => {
+    const part = tick / TICKS;
     const number = logarithmic ? least * (most / least) ** part : least + part * (most - least);
-    return step ? parseFloat((Math.round(number / step) * step).toFixed(6)) : four(number);
+    return step ? parseFloat((Math.round(number / step) * step).toFixed(6)) : fourDigits(number);
   };
   const clipped = (number) => Math.min(Math.max(number, least), most);
   const text = unit ? `${label}, ${unit}` : label;
-  const range = element("input", { type: "range", min: 0, max: GRADES, step: "any", "aria-label": text, "data-name": name });
+  const range = element("input", { type: "range", min: 0, max: TICKS, step: "any", "aria-label": text, "data-name": name });
   const exact = element("input", { type: "number", step: "any", "aria-label": `${text}, exactly`, "data-exact": name });
   const show = (number) => {
-    range.value = toGrade(clipped(number));
+    range.value = toTick(clipped(number));
     range.setAttribute("aria-valuetext", `${number} ${unit ?? ""}`.trim());
   };
   show(value);
   exact.value = value;
   range.addEventListener("input", () => {
-    const number = fromGrade(parseFloat(range.value));
+    const number = fromTick(parseFloat(range.value));
     exact.value = number;
     range.setAttribute("aria-valuetext", `${number} ${unit ?? ""}`.trim());
     put(number);
   });
-  range.addEventListener("keydown", (event) => { // a step of a hundredth of the range, not of a grade
+  range.addEventListener("keydown", (event) => { // an arrow key moves by a hundredth of the range, not by a tick
     const sign = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (!sign) return;
     event.preventDefault();
     const before = parseFloat(exact.value);
-    let number = fromGrade(Math.min(Math.max(parseFloat(range.value) + (sign * GRADES) / 100, 0), GRADES));
+    let number = fromTick(Math.min(Math.max(parseFloat(range.value) + (sign * TICKS) / 100, 0), TICKS));
     if (step && number === before) number = clipped(parseFloat((before + sign * step).toFixed(6)));
     exact.value = number;
     show(number);
@@ -322,7 +329,7 @@ function slider({ name, label, unit, least, most, value, step }, put) {
   exact.addEventListener("change", () => {
     const number = clipped(parseFloat(exact.value));
     if (Number.isNaN(number)) {
-      exact.value = fromGrade(parseFloat(range.value));
+      exact.value = fromTick(parseFloat(range.value));
       return;
     }
     exact.value = number;
@@ -488,7 +495,7 @@ function listen() {
     });
   }
   canvas.addEventListener("touchstart", (event) => stage.held && event.preventDefault(), { passive: false });
-  // whether a key belongs to what has the focus: all keys to a field, the space bar to a button, too
+  // whether the focused element uses a key itself: a field uses all keys, a button or a link the space bar
   const taken = ({ target, key }) => target.closest("input, select") || (key === " " && target.closest("button, a"));
   document.addEventListener("keydown", (event) => {
     if (taken(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -503,7 +510,7 @@ function listen() {
     if (key === "ArrowLeft" || key === "ArrowRight") pressed = 0;
   });
   window.addEventListener("blur", () => (pressed = 0));
-  window.addEventListener("resize", named);
+  window.addEventListener("resize", writeNames);
   window.addEventListener("hashchange", () => {
     chosen = fromAddress();
     forms();
@@ -528,7 +535,7 @@ async function begin() {
   restart();
   listen();
   $("loading").hidden = true;
-  // for tests, and for the curious in the console
+  // for tests, and for use in the browser's console
   window.live = {
     facts,
     running: () => running,

@@ -1,10 +1,10 @@
 // Plots of the last seconds of a few simulations, on canvases.
 
-const ROOM = { left: 46, right: 8, top: 4, bottom: 18 }; // px around the axes
+const MARGINS = { left: 46, right: 8, top: 4, bottom: 18 }; // px around the axes
 const CURVE = 60; // parts of the curve s = 0
 const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
 
-// The last `seconds` of a simulation's samples, in rings.
+// The last `seconds` of a simulation's samples, in circular buffers. `period` is the control period, s.
 export class History {
   constructor(period, seconds) {
     this.size = Math.ceil(seconds / period) + 1;
@@ -19,13 +19,14 @@ export class History {
     this.count += 1;
   }
 
-  // Call f(i) for the place of each sample, the oldest first.
+  // Call f(i) with the index of each sample, the oldest first.
   each(f) {
     for (let k = Math.max(0, this.count - this.size); k < this.count; k++) f(k % this.size);
   }
 }
 
-function prepared(canvas) {
+// Clear a canvas, and give it the resolution of the screen. Return its pen and its size, px of the page.
+function cleared(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -39,20 +40,21 @@ function prepared(canvas) {
   return { pen, width, height };
 }
 
-// A round step that divides a range into about `count` parts.
+// Return a round step (1, 2 or 5 times a power of 10) that divides a range into about `count` parts.
 function stepOf(range, count) {
   const rough = range / count;
   const power = 10 ** Math.floor(Math.log10(rough));
   return power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
 }
 
-function digits(step) {
+// Return how many decimals tell the multiples of a step apart.
+function decimals(step) {
   return Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
 }
 
-const shortly = (value, step) => (step >= 1e4 || step < 1e-3 ? value.toExponential(0) : value.toFixed(digits(step))).replace("-", "−");
+const label = (value, step) => (step >= 1e4 || step < 1e-3 ? value.toExponential(0) : value.toFixed(decimals(step))).replace("-", "−");
 
-// The range of some numbers with room around it, at least `least` wide.
+// Return a range with some room around it, at least `least` wide.
 function padded(low, high, least) {
   if (!(high >= low)) [low, high] = [-1, 1];
   const middle = (low + high) / 2;
@@ -60,10 +62,11 @@ function padded(low, high, least) {
   return [middle - half, middle + half];
 }
 
+// Draw the grid and its labels. Return the functions from values to px.
 function axes({ pen, width, height }, colours, [x0, x1], [y0, y1], xUnit) {
   const place = {
-    x: (x) => ROOM.left + ((x - x0) / (x1 - x0)) * (width - ROOM.left - ROOM.right),
-    y: (y) => height - ROOM.bottom - ((y - y0) / (y1 - y0)) * (height - ROOM.top - ROOM.bottom),
+    x: (x) => MARGINS.left + ((x - x0) / (x1 - x0)) * (width - MARGINS.left - MARGINS.right),
+    y: (y) => height - MARGINS.bottom - ((y - y0) / (y1 - y0)) * (height - MARGINS.top - MARGINS.bottom),
   };
   pen.lineWidth = 1;
   pen.strokeStyle = colours.grid;
@@ -75,15 +78,15 @@ function axes({ pen, width, height }, colours, [x0, x1], [y0, y1], xUnit) {
   pen.textAlign = "right";
   pen.textBaseline = "middle";
   ruled(y0, y1, yStep, (y) => {
-    line(pen, [[ROOM.left, place.y(y)], [width - ROOM.right, place.y(y)]]);
-    pen.fillText(shortly(y, yStep), ROOM.left - 5, place.y(y));
+    line(pen, [[MARGINS.left, place.y(y)], [width - MARGINS.right, place.y(y)]]);
+    pen.fillText(label(y, yStep), MARGINS.left - 5, place.y(y));
   });
   const xStep = stepOf(x1 - x0, Math.max(2, width / 90));
   pen.textBaseline = "top";
   ruled(x0, x1, xStep, (x) => {
-    line(pen, [[place.x(x), ROOM.top], [place.x(x), height - ROOM.bottom]]);
-    pen.textAlign = place.x(x) > width - ROOM.right - 16 ? "right" : "center";
-    pen.fillText(`${shortly(x, xStep)}${xUnit}`, place.x(x), height - ROOM.bottom + 4);
+    line(pen, [[place.x(x), MARGINS.top], [place.x(x), height - MARGINS.bottom]]);
+    pen.textAlign = place.x(x) > width - MARGINS.right - 16 ? "right" : "center";
+    pen.fillText(`${label(x, xStep)}${xUnit}`, place.x(x), height - MARGINS.bottom + 4);
   });
   return place;
 }
@@ -118,10 +121,10 @@ function curve(pen, place, history, name) {
   pen.stroke();
 }
 
-// Draw signals of the histories over time, those after the first pale. `levels` are values with a dashed line; `least` is
-// the least height.
+// Draw signals of the histories over time, those after the first one pale. There is a dashed line at each of `levels`.
+// The axis spans at least `least`.
 export function overTime(canvas, colours, series, names, { now, seconds, levels = [], least }) {
-  const on = prepared(canvas);
+  const on = cleared(canvas);
   let [low, high] = [Infinity, -Infinity];
   for (const { history } of series) {
     for (const name of names) {
@@ -137,11 +140,11 @@ export function overTime(canvas, colours, series, names, { now, seconds, levels 
   const { pen, width, height } = on;
   pen.save();
   pen.beginPath();
-  pen.rect(ROOM.left, 0, width - ROOM.left - ROOM.right, height - ROOM.bottom);
+  pen.rect(MARGINS.left, 0, width - MARGINS.left - MARGINS.right, height - MARGINS.bottom);
   pen.clip();
   pen.strokeStyle = colours.bound;
   pen.setLineDash([5, 4]);
-  for (const level of levels) line(pen, [[ROOM.left, place.y(level)], [width, place.y(level)]]);
+  for (const level of levels) line(pen, [[MARGINS.left, place.y(level)], [width, place.y(level)]]);
   pen.setLineDash([]);
   for (const { history, colour } of series) {
     names.forEach((name, j) => {
@@ -156,7 +159,7 @@ export function overTime(canvas, colours, series, names, { now, seconds, levels 
 
 // Draw the phase plane: v over x of the histories, and the curve s = 0 of each, from its function `surface`.
 export function phasePlane(canvas, colours, series, { reference, least, unit }) {
-  const on = prepared(canvas);
+  const on = cleared(canvas);
   const range = { x: [Infinity, -Infinity], v: [Infinity, -Infinity] };
   for (const { history } of series) {
     history.each((i) => {
@@ -174,7 +177,7 @@ export function phasePlane(canvas, colours, series, { reference, least, unit }) 
   const { pen, width, height } = on;
   pen.save();
   pen.beginPath();
-  pen.rect(ROOM.left, 0, width - ROOM.left - ROOM.right, height - ROOM.bottom);
+  pen.rect(MARGINS.left, 0, width - MARGINS.left - MARGINS.right, height - MARGINS.bottom);
   pen.clip();
   pen.lineWidth = 1.6;
   for (const { colour, surface } of series) {
