@@ -50,7 +50,7 @@ def test_a_panel_keeps_the_extremes_of_a_long_curve_and_stays_inside():
     y[17] = -3.0
     (curve,) = points(html.panel(t, [y], "x (m)"))
     assert 100 < len(curve) <= 2 * html.PIECES + 2
-    left, right, top, bottom = html._ROOM
+    left, right, top, bottom = html._MARGINS
     assert curve[:, 1].min() == top  # 7.0
     assert curve[:, 1].max() == html.HEIGHT - bottom  # -3.0
     assert curve[0, 0] == left
