@@ -16,7 +16,7 @@ import copy
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -49,6 +49,7 @@ FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
 T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
 LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq"))
 Q, DQ, FQ, GQ = (FIELDS[name] for name in ("q", "dq", "fq", "gq"))
+FREE_MASS = 0.0, 1.0, 0.0, 0.0  # f and g at rest, and the derivatives of f with x and v
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,7 +85,9 @@ class Loop:
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise()
-        self._answer = functools.lru_cache(maxsize=64)(self._solve)  # all amplitudes of a frequency have one answer
+        # all amplitudes of a frequency have one answer, and its samples one clock
+        self._answer = functools.lru_cache(maxsize=64)(self._solve)
+        self._clock = functools.lru_cache(maxsize=4)(self._timed)
 
     def _linearise(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
@@ -160,18 +163,20 @@ class Loop:
         count = 0.0 if s.sensor is None else s.sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
-        h, f = s.control_period, self.model[self.channel]
         x = np.where(np.arange(2 * RESTING) < RESTING, 0.0, count)
-        y = np.zeros((len(x), len(FIELDS)))
-        y[:, T], y[:, DT], y[:, LIMIT] = h * np.arange(len(x)), h, self.scenario.limits[self.channel]
-        y[:, MODEL], y[:, X], y[:, E], y[:, F], y[:, G] = s.model == "nominal", x, x, f[0] + f[2] * x, f[1]
-        out = self.controller(np.column_stack([np.full(len(x), h), x, np.zeros(len(x))]), y, self.controller.memories())
-        return float(np.abs(out[:, 1]).max())
+        _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
+        return float(np.abs(sliding).max())
+
+    def _controlled(self, h: float, motion: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Return u and s for x and v of the channel, and of the joint that it moves, every h seconds."""
+        s = self.scenario.resolved
+        fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model == "nominal"}
+        return self.controller(0, fixed, motion, list(self.model.values()), self.controller.memories())
 
     def gain(self, amplitude: float, omega: float, finest: int = FINEST) -> complex:
         """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
-        angles, u, _ = self._drive([amplitude], omega, finest)
-        return self._over(_harmonic(u, angles), amplitude, omega)
+        _, u, _ = self._drive([amplitude], omega, finest)
+        return self._over(_first(u, self._clock(omega, finest, 0.0).against), amplitude, omega)
 
     def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
         """Return how far the phase of `gain` may be off at least and at most, rad: least <= 0 <= most.
@@ -248,35 +253,48 @@ class Loop:
         functions of it have no mean. `finest` is the largest number of samples of a period, and `position` the time of
         the first sample, in control periods.
         """
-        s, turn = self.scenario.resolved, math.tau / omega
-        h = max(s.control_period, turn / finest)
+        clock = self._clock(omega, finest, position)
+        motion = []
+        for joint in (self.channel, *(() if self.partner is None else (self.partner,))):
+            x, v = np.zeros((2, len(clock.turns)))
+            for n, amplitude in enumerate(amplitudes, 1):
+                answer, e = self._answer(n * omega), amplitude * (clock.turns if n == 1 else clock.turns**n)
+                at = answer[self.rows[self.channel]]
+                x += (answer[self.rows[joint]] / at * e).real
+                v += (answer[self.nv + self.rows[joint]] / at * e).real  # not exactly the rate of x, in MuJoCo
+            motion += [x, v]
+        u, s = self._controlled(clock.h, motion)
+        limit = self.scenario.limits[self.channel]
+        return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
+
+    def _timed(self, omega: float, finest: int, position: float) -> "Clock":
+        """Return the times of a drive's samples."""
+        turn = math.tau / omega
+        h = max(self.scenario.resolved.control_period, turn / finest)
         periods = min(max(math.ceil(SAMPLES * finest * h / turn), PERIODS[0]), PERIODS[1])
         count = math.ceil(periods * turn / h)
-        y, turns = np.zeros((count, len(FIELDS))), np.exp(1j * omega * h * (np.arange(count) + position))
+        first = int(SETTLING * count)
+        angles = omega * (h * np.arange(first, count) + h * position)
+        turns = np.exp(1j * omega * h * (np.arange(count) + position))
+        return Clock(h, turns, first, angles, np.exp(-1j * angles))
 
-        def along(i: int) -> tuple[np.ndarray, np.ndarray]:
-            """Return position and velocity of a channel. MuJoCo's velocity is not exactly the rate of its position."""
-            x, v = np.zeros(count), np.zeros(count)
-            for n, amplitude in enumerate(amplitudes, 1):
-                answer, e = self._answer(n * omega), amplitude * turns**n
-                at = answer[self.rows[self.channel]]
-                x += (answer[self.rows[i]] / at * e).real
-                v += (answer[self.nv + self.rows[i]] / at * e).real
-            return x, v
 
-        y[:, T], y[:, DT], y[:, LIMIT] = h * np.arange(count), h, self.scenario.limits[self.channel]
-        y[:, MODEL] = s.model == "nominal"
-        x, v = along(self.channel)
-        f, g, fx, fv = self.model[self.channel]
-        y[:, X], y[:, E], y[:, V], y[:, DE] = x, x, v, v
-        y[:, F], y[:, G] = f + fx * x + fv * v, g
-        if self.partner is not None:
-            q, dq = along(self.partner)
-            f, g, fx, fv = self.model[self.partner]
-            y[:, Q], y[:, DQ], y[:, FQ], y[:, GQ] = q, dq, f + fx * q + fv * dq, g
-        out = self.controller(np.column_stack([np.full(count, h), x, v]), y, self.controller.memories())
-        first, limit = int(SETTLING * count), y[0, LIMIT]
-        return omega * (y[first:, T] + h * position), np.clip(out[first:, 0], -limit, limit), out[first:, 1]
+@dataclasses.dataclass(frozen=True)
+class Clock:
+    """The times of a drive's samples.
+
+    Attributes:
+      h: from one sample to the next, s.
+      turns: exp(j omega t) of all samples, complex, (K,).
+      first: number of samples in which memories settle.
+      angles: omega t of the others, rad, and `against`, exp(-j omega t), complex.
+    """
+
+    h: float
+    turns: np.ndarray
+    first: int
+    angles: np.ndarray
+    against: np.ndarray
 
 
 class Controller:
@@ -295,17 +313,36 @@ class Controller:
         """Return memories as they are at the start of a run."""
         return [np.zeros(one.memory if one else 1) for one in self.parts]
 
-    def __call__(self, readings: np.ndarray, y: np.ndarray, memories: list[np.ndarray]) -> np.ndarray:
-        """Return u and s, (K, 2), for readings (K, 3) and measurements (K, fields), which it completes."""
-        out = np.empty((len(y), 2))
+    def __call__(
+        self,
+        first: int,
+        fixed: Mapping[int, float],
+        motion: Sequence[np.ndarray],
+        models: Sequence[tuple[float, ...]],
+        memories: list[np.ndarray],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return u and s, each (K,), for samples of a motion.
+
+        Args:
+          first: number of the first sample, counted from time 0.
+          fixed: field of a measurement -> its value in all samples; `DT` is the time from one to the next, s.
+          motion: x and v of the channel, each (K,), rad or m and per s; then those of the joint that it moves, if any.
+          models: of the channel and of that joint: f and g at rest, and the derivatives of f with x and v.
+          memories: of estimator, surface and law. They change.
+        """
+        x, v, q, dq = motion if len(motion) == 4 else (*motion, np.empty(0), np.empty(0))
+        start, of_joint = np.zeros(len(FIELDS)), models[1] if len(motion) == 4 else (0.0,) * 4
+        for field, value in fixed.items():
+            start[field] = value
+        out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
-        if not _run(self.addresses, g0, g1, g2, m0, m1, m2, readings, y, out):
+        model = np.array([models[0], of_joint])
+        done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
+        if done < 0:
             raise ScenarioError("the law raised an exception in the harmonic balance")
-        if not np.isfinite(out[:, 0]).all():
-            bad = int(np.argmin(np.isfinite(out[:, 0])))
-            x, v = y[bad, X], y[bad, V]
-            raise ScenarioError(f"the law returned {out[bad, 0]:g} at x = {x:g}, v = {v:g}: correct the law")
-        return out
+        if done < len(x):
+            raise ScenarioError(f"the law returned {out[done, 0]:g} at x = {y[X]:g}, v = {y[V]:g}: correct the law")
+        return out[:, 0], out[:, 1]
 
 
 def describing_function(
@@ -336,10 +373,8 @@ def describing_function(
     for first in range(0, 2 * samples, CHUNK):
         at = np.arange(first, min(first + CHUNK, 2 * samples))
         turns = np.exp(1j * math.tau * (at + 0.5) / samples)
-        y, x, v = np.zeros((len(at), len(FIELDS))), amplitude * turns.real, -amplitude * omega * turns.imag
-        y[:, T], y[:, DT], y[:, LIMIT], y[:, G] = h * at, h, math.inf, 1.0
-        y[:, X], y[:, E], y[:, V], y[:, DE] = x, x, v, v
-        u = controller(np.column_stack([np.full(len(at), h), x, v]), y, memories)[:, 0]
+        motion = [amplitude * turns.real, -amplitude * omega * turns.imag]
+        u, _ = controller(first, {DT: h, LIMIT: math.inf}, motion, [FREE_MASS], memories)
         total += (u[at >= samples] / turns[at >= samples]).sum()
     return complex(total) * 2.0 / samples / amplitude
 
@@ -381,8 +416,12 @@ def _nominal(plant, i, p, x, v):
 
 def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
     """Return the complex amplitude of sin(angle) in samples, through a Hann window, which leaves out other waves."""
-    weights = _window(len(values)) * values
-    return complex(2j * (weights @ np.exp(-1j * angles)))
+    return _first(values, np.exp(-1j * angles))
+
+
+def _first(values: np.ndarray, against: np.ndarray) -> complex:
+    """Return the complex amplitude of sin(angle) in samples, where exp(-j angle) is known."""
+    return complex(2j * ((_window(len(values)) * values) @ against))
 
 
 @functools.lru_cache(maxsize=64)
@@ -393,25 +432,36 @@ def _window(count: int) -> np.ndarray:
 
 
 @njit(error_model="numpy")
-def _run(addresses, g0, g1, g2, m0, m1, m2, readings, y, out):
-    """Call estimator, surface and law for each row of measurements, (K, fields). Return whether none raised."""
-    estimate, sliding = np.empty(2), np.empty(2)
-    at_reading, at_y, at_out = readings.ctypes.data, y.ctypes.data, out.ctypes.data
+def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out):
+    """Call estimator, surface and law for each sample.
+
+    Return the number of samples that were finite: fewer than there are if the law returned no number, in the
+    measurement y; -1 if one of the three raised.
+    """
+    estimate, sliding, reading = np.empty(2), np.empty(2), np.empty(3)
+    at_reading, at_y, at_out = reading.ctypes.data, y.ctypes.data, out.ctypes.data
     at_estimate, at_sliding = estimate.ctypes.data, sliding.ctypes.data
     gains = g0.ctypes.data, g1.ctypes.data, g2.ctypes.data
     memories = m0.ctypes.data, m1.ctypes.data, m2.ctypes.data
-    for k in range(len(y)):
-        row, here = y[k], at_y + k * y.strides[0]
-        if call(addresses[0], at_reading + k * readings.strides[0], gains[0], memories[0], at_estimate) != 0:
-            return False
-        row[DE] += estimate[0] - row[V]
-        row[V], row[A] = estimate[0], estimate[1]
-        if math.isnan(estimate[1]):
-            row[A] = 0.0
+    for k in range(len(x)):
+        for i in range(len(start)):
+            y[i] = start[i]
+        y[T], y[X], y[E] = start[DT] * (first + k), x[k], x[k]
+        y[F], y[G] = model[0, 0] + model[0, 2] * x[k] + model[0, 3] * v[k], model[0, 1]
+        if len(q):
+            y[Q], y[DQ] = q[k], dq[k]
+            y[FQ], y[GQ] = model[1, 0] + model[1, 2] * q[k] + model[1, 3] * dq[k], model[1, 1]
+        reading[0], reading[1], reading[2] = start[DT], x[k], v[k]
+        if call(addresses[0], at_reading, gains[0], memories[0], at_estimate) != 0:
+            return -1
+        y[V], y[DE] = estimate[0], v[k] + (estimate[0] - v[k])
+        y[A] = 0.0 if math.isnan(estimate[1]) else estimate[1]
         if addresses[1] != 0:
-            if call(addresses[1], here, gains[1], memories[1], at_sliding) != 0:
-                return False
-            row[HAS_SURFACE], row[S], row[V_EQ] = 1.0, sliding[0], sliding[1]
-        if call(addresses[2], here, gains[2], memories[2], at_out + 16 * k) != 0:
-            return False
-    return True
+            if call(addresses[1], at_y, gains[1], memories[1], at_sliding) != 0:
+                return -1
+            y[HAS_SURFACE], y[S], y[V_EQ] = 1.0, sliding[0], sliding[1]
+        if call(addresses[2], at_y, gains[2], memories[2], at_out + 16 * k) != 0:
+            return -1
+        if not math.isfinite(out[k, 0]):
+            return k
+    return len(x)
