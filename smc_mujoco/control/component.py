@@ -192,6 +192,11 @@ def _value(name: str, value: object, **limits: Any) -> Value:
     return number(name, value, **limits)
 
 
+def _each(value: Value) -> tuple[float, ...]:
+    """Return the numbers of a gain."""
+    return value if isinstance(value, tuple) else (value,)
+
+
 def _template_at(module: str, name: str) -> "Template | None":
     """Return the Template with a dotted name in a module, or None."""
     value: object = sys.modules.get(module)
@@ -285,14 +290,14 @@ class Template:
         Warns:
           GainWarning: gains violate a condition of the theorem.
         """
-        values: dict[str, Value] = dict(self.defaults)
+        values: dict[str, Value] = {**self.defaults}
         for key, value in gains.items():
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
             gain = self.gains[key]
             above = 0.0 if gain.positive else -math.inf
             least = 0.0 if gain.nonnegative else -math.inf
-            infinite = math.isinf(gain.default)
+            infinite = any(math.isinf(one) for one in _each(gain.default))
             values[key] = _value(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
@@ -376,7 +381,7 @@ def _gains(gains: object) -> dict[str, Gain]:
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
-        checked[key] = dataclasses.replace(gain, default=number(f"default of gain {key}", gain.default, infinite=True))
+        checked[key] = dataclasses.replace(gain, default=_value(f"default of gain {key}", gain.default, infinite=True))
     for key, gain in checked.items():
         if gain.over is not None and gain.over not in checked:
             raise unknown(f"gain that {key} is divided by", gain.over, checked)

@@ -48,7 +48,7 @@ class Gain:
     """A gain of a law, a surface or an estimator.
 
     Attributes:
-      default: value if none is given.
+      default: value if none is given. A law of many joints in C may have a tuple, with one for each joint.
       unit: a function of all gains, read by attribute, if an exponent among them decides the unit. None: a number
         without a unit, or an unknown unit; tuning refuses to search it.
       positive: whether it must be greater than 0.

@@ -495,6 +495,12 @@ def check_channels(s: Resolved) -> None:
             )
     if not s.law.joint:
         return
+    joints = getattr(s.law.function, "joints", s.plant.n)  # of C code
+    if joints != s.plant.n:
+        raise ScenarioError(
+            f"law {s.law.name!r} is C code for {joints} joints, and {s.plant.name} has {s.plant.n}: write it for "
+            f"{s.plant.n}, with SMC_JOINTS, or --joints of export-c"
+        )
     if s.plant.free:
         raise ScenarioError(
             f"law {s.law.name!r} is of many joints and commands them all, and {s.plant.name} has {s.plant.free} "

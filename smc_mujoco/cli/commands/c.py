@@ -36,8 +36,8 @@ def check_c(
     calls the law at later times and with very large errors. It finds crashes, endless loops, NaN, gains without a name,
     writes beyond the law's memory, state kept elsewhere (such as static data), and a changed rounding mode or
     flush-to-zero. It then runs a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding
-    ends in exit code 2. smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export-c`
-    writes.
+    ends in exit code 2. smc_law.h describes the signature, smc_joint_law.h that of a law of many joints; one of them is
+    at the top of every file that `smc-mujoco export-c` writes.
 
     The process is not a sandbox: the law can open files and connections, like any program that you start.
 
@@ -63,6 +63,7 @@ def export_c(
     numbers: Annotated[
         str, typer.Option("--type", metavar="double|float|q15", help="Type of numbers; q15 for observer_free only.")
     ] = "double",
+    joints: options.Joints = None,
 ) -> None:
     """Write a law as one file of C99 without dependencies, for firmware or for smc.law_from_c.
 
@@ -71,6 +72,9 @@ def export_c(
     double precision it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same
     bits.
 
+    A law of many joints is written for a number of joints. Its gains may have one value for each joint, as in
+    --gains "k=8 20 15,c=5".
+
     Example: smc-mujoco export-c observer_free --gains lam=6,k1=3 --type float > observer_free.c
     """
     with held_back():
@@ -78,4 +82,6 @@ def export_c(
         from smc_mujoco.control.c.load import parsed_gains
         from smc_mujoco.control.law import law as find
 
-    print(law_to_c(find(law, **parsed_gains(gains, "--gains")), numbers), end="")
+    with options.joints_as_option():
+        text = law_to_c(find(law, **parsed_gains(gains, "--gains")), numbers, joints)
+    print(text, end="")

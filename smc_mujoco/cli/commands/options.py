@@ -1,9 +1,10 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
 import ast
+import contextlib
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,6 +47,9 @@ Condition = Annotated[
     ),
 ]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
+Joints = Annotated[
+    int | None, typer.Option(help="Number of joints of a law of many joints; default that of the values of a gain.")
+]
 Json = Annotated[
     Path | None,
     typer.Option(
@@ -66,6 +70,15 @@ X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or
 
 SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or a .json file that `smc-mujoco tune` wrote."
+
+
+@contextlib.contextmanager
+def joints_as_option() -> Iterator[None]:
+    """Write the argument joints= as the option --joints in sentences of errors."""
+    try:
+        yield
+    except ScenarioError as error:
+        raise ScenarioError(re.sub(r"\bjoints=", "--joints ", str(error))) from None
 
 
 def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:

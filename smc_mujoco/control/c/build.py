@@ -18,9 +18,9 @@ from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 HERE = Path(__file__).parent
-HEADER = HERE / "smc_law.h"
+HEADER, JOINT_HEADER = HERE / "smc_law.h", HERE / "smc_joint_law.h"
 INPUTS = len(Measurement._fields)  # numbers in a measurement
-PROTOTYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+PROTOTYPE = "int smc_law(const {} *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no fused multiply-add.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 # A library uses its own functions and data even if the C library has the same names, such as remove, y0, timezone.
@@ -138,13 +138,16 @@ def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, i
     return functions.get("smc_mujoco_entry", functions.get(symbol, 0)), data
 
 
-def undefined(source: str, symbol: str) -> str:
+def undefined(source: Path, symbol: str) -> str:
     """Return the error message for a file without the law's function."""
-    return f"{source} has no function {symbol}: define {_prototype(symbol)}"
+    return f"{source.name} has no function {symbol}: define {_prototype(source, symbol)}"
 
 
-def _prototype(symbol: str) -> str:
-    return PROTOTYPE.replace("smc_law(", f"{symbol}(")
+def _prototype(source: Path, symbol: str) -> str:
+    """Return the declaration that a law must have, by the header that its file includes."""
+    joint = source.suffix == ".c" and JOINT_HEADER.name in source.read_text(encoding="utf-8", errors="replace")
+    prototype = PROTOTYPE.format("smc_joint_measurement" if joint else "smc_measurement")
+    return prototype.replace("smc_law(", f"{symbol}(")
 
 
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
@@ -152,12 +155,15 @@ def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     error, name = ERROR.search(output), source.name
     what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
     if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", output):
-        return undefined(name, symbol)
+        return undefined(source, symbol)
     if error is None or error["line"] is None:  # from the linker or the command itself
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
         return f"{name} does not compile, {command} says: {telling[0].strip()}; fix it, or give other flags="
-    if f"'{symbol}'" in what or file == "glue.c":
-        return f"{name} has another {symbol} than smc_mujoco calls: it must be {_prototype(symbol)}"
+    if f"'{symbol}'" in what or file in ("glue.c", "joint_glue.h"):
+        return f"{name} has another {symbol} than smc_mujoco calls: it must be {_prototype(source, symbol)}"
+    if what.startswith("#error"):
+        wanted = what.removeprefix("#error").strip(' "')
+        return f"{name} does not compile: {wanted}"
     where = f"line {error['line']}" if file == name else f"{error['file']}, line {error['line']}"
     return f"{name} does not compile: {where}, {what}; fix it"

@@ -3,16 +3,23 @@
  * macros among them, there is no header of C's own here, and every name begins with smc_.
  */
 #include SMC_SOURCE
+#ifdef SMC_JOINT_LAW_H /* a law of many joints */
+#include "joint_glue.h"
+#else
 #include "smc_law.h"
+enum { SMC_EACH = 1 }; /* numbers of each gain, of each slot of memory, of u and of s */
+typedef smc_measurement smc_seen;
+/* a struct of other fields than smc_law.h's is an error here */
+typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
+#endif
 
 #define SMC_BEYOND (1LL << 40) /* sandbox.py: wrote beyond its memory; one more: beyond out; two: changed arithmetic */
 
 extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
+extern const int smc_mujoco_joints;
 long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out);
 
 int smc_mujoco_gains = 0, smc_mujoco_memory = 0;
-/* a struct of other fields than smc_law.h's is an error here */
-typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
 
 /* How this thread rounds, flushes and traps, where we can ask and restore it: after the law it is as it was before. */
 #if defined(__SSE__) && defined(__GNUC__)
@@ -34,43 +41,74 @@ static unsigned smc_mujoco_arithmetic(void) { return 0u; }
 static void smc_mujoco_restore(unsigned smc_was) { (void)smc_was; }
 #endif
 
+/* Calls the law with numbers of its own type, between guards that show whether it writes beyond them. */
+static long long smc_mujoco_convert(const smc_seen *smc_y, const double *smc_gains, double *smc_memory, double *smc_out)
+{
+    int (*const smc_called)(const smc_seen *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;
+    enum { SMC_PLAY = 16, SMC_OUT = 2 * SMC_EACH }; /* numbers around the law's own */
+    const int smc_many = smc_mujoco_gains * SMC_EACH, smc_slots = smc_mujoco_memory * SMC_EACH;
+    const smc_real smc_guard = (smc_real)-7.25;
+    smc_real smc_g[smc_many + SMC_PLAY], smc_fenced[smc_slots + 2 * SMC_PLAY], smc_found[SMC_OUT + 2 * SMC_PLAY];
+    smc_real *const smc_m = smc_fenced + SMC_PLAY, *const smc_o = smc_found + SMC_PLAY;
+    long long smc_code;
+    int smc_i;
+    for (smc_i = 0; smc_i < smc_many; smc_i++) smc_g[smc_i] = (smc_real)smc_gains[smc_i];
+    for (smc_i = 0; smc_i < smc_slots; smc_i++) smc_m[smc_i] = (smc_real)smc_memory[smc_i];
+    for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
+        smc_g[smc_many + smc_i] = (smc_real)smc_out[0];
+        smc_fenced[smc_i] = smc_m[smc_slots + smc_i] = smc_found[smc_i] = smc_o[SMC_OUT + smc_i] = smc_guard;
+    }
+    for (smc_i = 0; smc_i < SMC_OUT; smc_i++) smc_o[smc_i] = (smc_real)smc_out[smc_i];
+    smc_code = smc_called(smc_y, smc_g, smc_m, smc_o);
+    for (smc_i = 0; smc_i < smc_slots; smc_i++) smc_memory[smc_i] = (double)smc_m[smc_i];
+    for (smc_i = 0; smc_i < SMC_OUT; smc_i++) smc_out[smc_i] = (double)smc_o[smc_i];
+    for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
+        if (smc_found[smc_i] != smc_guard || smc_o[SMC_OUT + smc_i] != smc_guard) smc_code = SMC_BEYOND + 1;
+        if (smc_fenced[smc_i] != smc_guard || smc_m[smc_slots + smc_i] != smc_guard) return SMC_BEYOND;
+    }
+    return smc_code;
+}
+
+static long long smc_mujoco_with(const smc_seen *smc_y, const double *smc_gains, double *smc_memory, double *smc_out)
+{
+    int (*const smc_called)(const smc_seen *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;
+    if (sizeof(smc_real) != sizeof(double)) return smc_mujoco_convert(smc_y, smc_gains, smc_memory, smc_out);
+    return smc_called(smc_y, (const void *)smc_gains, (void *)smc_memory, (void *)smc_out);
+}
+
+#ifdef SMC_JOINT_LAW_H
+const int smc_mujoco_joints = SMC_JOINTS;
+
 static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
-    int (*const smc_called)(const smc_measurement *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;
-    int smc_i;
-    smc_out[0] = smc_out[1] = __builtin_nan(""); /* what a law leaves out ends its run */
-    if (sizeof(smc_real) == sizeof(double)) {
-        return smc_called((const void *)smc_in, (const void *)smc_gains, (void *)smc_memory, (void *)smc_out);
-    } else {
-        enum { SMC_PLAY = 16 }; /* numbers around the law's own, to see whether it writes there */
-        const smc_real smc_guard = (smc_real)-7.25;
-        smc_real smc_g[smc_mujoco_gains + SMC_PLAY], smc_fenced[smc_mujoco_memory + 2 * SMC_PLAY];
-        smc_real smc_given[SMC_INPUTS], smc_found[2 + 2 * SMC_PLAY];
-        smc_real *const smc_m = smc_fenced + SMC_PLAY, *const smc_o = smc_found + SMC_PLAY;
-        long long smc_code;
-        for (smc_i = 0; smc_i < SMC_INPUTS; smc_i++) smc_given[smc_i] = (smc_real)smc_in[smc_i];
-        for (smc_i = 0; smc_i < smc_mujoco_gains; smc_i++) smc_g[smc_i] = (smc_real)smc_gains[smc_i];
-        for (smc_i = 0; smc_i < smc_mujoco_memory; smc_i++) smc_m[smc_i] = (smc_real)smc_memory[smc_i];
-        for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
-            smc_g[smc_mujoco_gains + smc_i] = (smc_real)smc_out[0];
-            smc_fenced[smc_i] = smc_m[smc_mujoco_memory + smc_i] = smc_found[smc_i] = smc_o[2 + smc_i] = smc_guard;
-        }
-        smc_o[0] = smc_o[1] = (smc_real)smc_out[0];
-        smc_code = smc_called((const void *)smc_given, smc_g, smc_m, smc_o);
-        for (smc_i = 0; smc_i < smc_mujoco_memory; smc_i++) smc_memory[smc_i] = (double)smc_m[smc_i];
-        smc_out[0] = (double)smc_o[0], smc_out[1] = (double)smc_o[1];
-        for (smc_i = 0; smc_i < SMC_PLAY; smc_i++) {
-            if (smc_found[smc_i] != smc_guard || smc_o[2 + smc_i] != smc_guard) smc_code = SMC_BEYOND + 1;
-            if (smc_fenced[smc_i] != smc_guard || smc_m[smc_mujoco_memory + smc_i] != smc_guard) return SMC_BEYOND;
-        }
-        return smc_code;
-    }
+    smc_seen smc_y;
+    smc_mujoco_plant smc_plant;
+    long long smc_code;
+    smc_mujoco_see(smc_in, &smc_plant, &smc_y);
+    smc_code = smc_mujoco_with(&smc_y, smc_gains, smc_memory, smc_out);
+    return smc_plant.without_tip ? SMC_BEYOND + 3 : smc_code;
 }
+#else
+const int smc_mujoco_joints = 0;
+
+static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
+{
+    smc_real smc_given[SMC_INPUTS];
+    int smc_i;
+    if (sizeof(smc_real) == sizeof(double))
+        return smc_mujoco_with((const void *)smc_in, smc_gains, smc_memory, smc_out);
+    for (smc_i = 0; smc_i < SMC_INPUTS; smc_i++) smc_given[smc_i] = (smc_real)smc_in[smc_i];
+    return smc_mujoco_with((const void *)smc_given, smc_gains, smc_memory, smc_out);
+}
+#endif
 
 long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
     const unsigned smc_was = smc_mujoco_arithmetic();
-    const long long smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
+    long long smc_code;
+    int smc_i;
+    for (smc_i = 0; smc_i < 2 * SMC_EACH; smc_i++) smc_out[smc_i] = __builtin_nan(""); /* left out, it ends the run */
+    smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
     if (smc_mujoco_arithmetic() == smc_was) return smc_code;
     smc_mujoco_restore(smc_was);
     return SMC_BEYOND + 2;

@@ -1,13 +1,15 @@
 """Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
 
-`smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`, which calls the law
-the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Loading,
-smc_setup and, on request, the law itself are tried in a separate process first, because they can hang or crash.
+`smc_law.h` and, for laws of many joints, `smc_joint_law.h`, beside this file, describe the C function. A file is
+compiled together with `glue.c`, which calls the law the way the callback does, so a law of another type is a compiler
+error. A shared library is called directly. Loading, smc_setup and, on request, the law itself are tried in a separate
+process first, because they can hang or crash.
 """
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import ctypes
+import dataclasses
 import functools
 import hashlib
 import math
@@ -25,19 +27,25 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.c import build, sandbox
-from smc_mujoco.control.component import Template, template
+from smc_mujoco.control.component import Template, Value, at, template, written
+from smc_mujoco.control.joint_law import VECTORS, JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
 
 LIBRARIES = (".so", ".dylib")
 MAX_TIMEOUT = 86_400.0  # s
 DEFAULT_MEMORY = 8
+JOINT_FIELDS = JointMeasurement._fields[4 : 4 + VECTORS]  # the vectors from x to limit
 
 
 class CLaw(AtAddress):
     """A law in C: called by its address in the callback, and through ctypes in the reference loop.
 
     Two laws are equal if their machine code is, and so file, headers, flags and compiler.
+
+    Attributes:
+      joints: for how many joints it is; 0 for a law of one channel.
+      sizes: number of gains and of memory slots.
     """
 
     def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
@@ -46,21 +54,39 @@ class CLaw(AtAddress):
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
         self._function, self.library = sandbox.entry(str(file), symbol)
         self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
-        if not hasattr(self.library, "smc_mujoco_entry"):
+        glued = hasattr(self.library, "smc_mujoco_entry")
+        self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value if glued else 0
+        if not glued:
             self._trampoline = _trampoline(self.address)
             self.address = self._trampoline.address
-        self.sizes = 0, 1  # number of gains and of memory slots
+        self.sizes = 0, 1
         self.__name__ = re.sub(r"\W", "_", path.stem)
         self.__module__, self.__doc__ = path.name, doc
 
-    def __call__(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
-        """Return u and s. Raise ArithmeticError if the C function returns anything but 0."""
-        out = sandbox.doubles([math.nan] * 2)
+    def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
+        """Return u and s, two vectors of a law of many joints.
+
+        Args:
+          y: a Measurement, or a JointMeasurement.
+
+        Raises:
+          ArithmeticError: the C function returned anything but 0.
+        """
+        if not self.joints:
+            u, s = self._out(y, gains, memory, 2)
+            return u, s
+        asked, each = Asked(y, self.joints), [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
+        out = self._out(asked.numbers, each, memory, 2 * len(y.x))
+        return np.array(out[: self.joints]), np.array(out[self.joints :])
+
+    def _out(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int) -> list[float]:
+        """Call the C function, and return the numbers of its out[]."""
+        out = sandbox.doubles([math.nan] * count)
         code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
         if code != 0:
             what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
             raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
-        return out[0], out[1]
+        return out[:]
 
     def set_up(self, gains: int, memory: int, name: str | None) -> None:
         """Call smc_setup, and set the name and the number of gains and of memory slots."""
@@ -85,6 +111,34 @@ class CLaw(AtAddress):
     def __reduce__(self):
         """Pickle the machine code: another process runs this law even if its file has changed."""
         return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
+
+
+class Asked:
+    """The numbers of a JointMeasurement, with which C code can call `coriolis` and `jacobian` of Python.
+
+    They are valid as long as this object lives.
+    """
+
+    def __init__(self, y: JointMeasurement, joints: int):
+        def coriolis(w: Any, own: Any, memory: Any, out: Any) -> int:
+            return written_to(out, y.dynamics.coriolis(np.array(w[:joints])))
+
+        def jacobian(nothing: Any, own: Any, memory: Any, out: Any) -> int:
+            try:
+                return written_to(out, y.dynamics.jacobian())
+            except ValueError:
+                return 1
+
+        def written_to(out: Any, values: np.ndarray) -> int:
+            for i, value in enumerate(values.ravel().tolist()):
+                out[i] = value
+            return 0
+
+        self._functions = sandbox.ON_REQUEST(coriolis), sandbox.ON_REQUEST(jacobian)
+        places = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self._functions]
+        self._table = sandbox.doubles([*places, 0.0, 1.0])
+        head = [y.t, y.dt, y.model, float(ctypes.addressof(self._table)), float(joints)]
+        self.numbers = [*head, *(number for vector in y[4:] for number in np.ravel(vector).tolist())]
 
 
 @functools.cache
@@ -134,7 +188,8 @@ def law_from_c(
 
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
-        `smc_law.h`, which the file may include, describes the function.
+        `smc_law.h`, which the file may include, describes the function. A file that includes `smc_joint_law.h` is a law
+        of SMC_JOINTS joints.
       gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
         change its defaults.
       memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.
@@ -166,11 +221,17 @@ def law_from_c(
     library = _library(source, symbol, flags, timeout)
     about = _about(library, gains, memory, degree, modelled)
     if isolate:
-        sandbox.call(library, Measurement._fields, about.values, about.memory, about.modelled)
+        _try(library, about)
     law = CLaw(library.path, symbol, library.file, _first_comment(library.path))
     law.set_up(len(about.gains), about.memory, name)
-    gains, memory, degree, modelled = about
-    return template("law", gains, memory, positive, nonnegative, degree, None, plants, requires_model=modelled)(law)
+    words = {"requires_model": about.modelled, "joint": bool(about.joints)}
+    return template("law", about.gains, about.memory, positive, nonnegative, about.degree, None, plants, **words)(law)
+
+
+def _try(library: sandbox.Library, about: "About") -> list[str]:
+    """Call a law in a separate process, as `sandbox.call` does."""
+    fields = JOINT_FIELDS if about.joints else Measurement._fields
+    return sandbox.call(library, fields, about.values, about.memory, about.modelled, about.joints)
 
 
 def check(
@@ -188,11 +249,10 @@ def check(
     library = _library(source, symbol, (*build.WARNINGS, *flags) if source.suffix == ".c" else flags, timeout)
     about = _about(library, gains, memory, None, None)
     yield from library.warnings
-    yield from sandbox.call(library, Measurement._fields, about.values, about.memory, about.modelled)
-    gains_text = (
-        ", ".join(f"{name} = {value:g}" for name, value in zip(about.gains, about.values, strict=True)) or "none"
-    )
-    yield f"{source.name}: {symbol} passes; gains {gains_text}; memory {about.memory}"
+    yield from _try(library, about)
+    gains_text = ", ".join(f"{name} = {written(default(gain))}" for name, gain in about.gains.items()) or "none"
+    joints = f"{about.joints} joints; " * bool(about.joints)
+    yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
 
 
 def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: float) -> sandbox.Library:
@@ -224,17 +284,23 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
 
 
 class About(NamedTuple):
-    """Properties of a law in C."""
+    """Properties of a law in C; `joints` is 0 for a law of one channel."""
 
-    gains: dict[str, float | Gain]
+    gains: dict[str, Any]  # of float and Gain
     memory: int
     degree: int
     modelled: bool
+    joints: int
 
     @property
     def values(self) -> list[float]:
-        """Defaults of the gains."""
-        return [gain.default if isinstance(gain, Gain) else gain for gain in self.gains.values()]
+        """Defaults of the gains, one number a gain for each joint."""
+        return [at(default(gain), i) for gain in self.gains.values() for i in range(max(1, self.joints))]
+
+
+def default(gain: float | Gain) -> Value:
+    """Return the default of a gain."""
+    return gain.default if isinstance(gain, Gain) else gain
 
 
 def _about(
@@ -248,33 +314,45 @@ def _about(
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     facts, file, gains = sandbox.load(library), library.path.name, dict(gains or {})
+    joints = facts.get("smc_mujoco_joints", 0)
+    if "smc_law_shared" in facts and not facts["glue"]:
+        raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")
     if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
         raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
     if (text := facts.get("smc_law_gains")) is not None:
-        own = parsed_gains(text, f"{file}'s smc_law_gains")
+        own = parsed_gains(text, what := f"{file}'s smc_law_gains")
+        for name, value in own.items():
+            if isinstance(value, tuple) and len(value) != joints:
+                each = f", or {joints}" * bool(joints)
+                raise ScenarioError(f"{what} is {shown(text)}: give {name} one number{each}")
         for name in gains:
             errors.find(f"gain of {file}", name, own)
         gains = own | gains
+    for name in filter(None, facts.get("smc_law_shared", "").split(",")):
+        gain = errors.find(f"shared gain of {file}", name, gains)
+        gains[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)
     return About(
         gains,
         whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
         whole("degree", (facts.get("smc_law_degree") or 1) if degree is None else degree, 1, 3),
         bool(facts.get("smc_law_modelled")) if modelled is None else modelled,
+        joints,
     )
 
 
-def parsed_gains(text: str, what: str) -> dict[str, float]:
-    """Return the gains in a text such as "lam=6,k1=3". `what` names the text in errors."""
-    parsed: dict[str, float] = {}
+def parsed_gains(text: str, what: str) -> dict[str, Any]:
+    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
+    parsed: dict[str, Value] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
         name, equals, value = (word.strip() for word in part.partition("="))
         if name in parsed:
             raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
         try:
-            parsed[name] = float(value)
+            values = tuple(map(float, value.split()))
         except ValueError:
-            parsed[name] = math.nan
-        if not (equals and name.isidentifier()) or math.isnan(parsed[name]):
+            values = ()
+        parsed[name] = values[0] if len(values) == 1 else values
+        if not (equals and name.isidentifier() and values) or any(map(math.isnan, values)):
             raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
     return parsed
 

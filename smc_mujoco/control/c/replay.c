@@ -3,6 +3,7 @@
  * memory. Without arguments it does nothing, which shows that sanitizers work here.
  */
 #include <dlfcn.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,13 @@ typedef long long smc_entry(const double *, const double *, double *, double *);
 
 const char *__asan_default_options(void);
 const char *__asan_default_options(void) { return "detect_leaks=0"; }
+
+/* For C(x, v) w and the Jacobian of a law of many joints: all 0. */
+static long long nothing(const double *in, const double *own, double *memory, double *out)
+{
+    (void)in, (void)own, (void)memory, (void)out;
+    return 0;
+}
 
 /* Numbers on the heap, where a step beyond them is seen. */
 static double *numbers(size_t count) { return calloc(count, sizeof(double)); }
@@ -26,14 +34,19 @@ int main(int count, char **word)
     void *library, *found;
     int (*setup)(void);
     smc_entry *law;
-    double *gains, *memory, *y = numbers(SMC_INPUTS), *out = numbers(2);
-    size_t many, size;
+    double *gains, *memory, *y, *out, asked[4] = {0.0, 0.0, 0.0, 1.0};
+    size_t many, size, inputs, each, joints;
     FILE *file;
 
     if (count < 5) return 0;
     library = dlopen(word[1], RTLD_NOW | RTLD_LOCAL);
     if (!library) return failed(dlerror());
-    many = strtoul(word[3], NULL, 10), size = strtoul(word[4], NULL, 10);
+    joints = (size_t)*(const int *)dlsym(library, "smc_mujoco_joints");
+    each = joints ? joints : 1;
+    inputs = joints ? 5 + 11 * joints + joints * joints : SMC_INPUTS;
+    y = numbers(inputs), out = numbers(2 * each);
+    asked[0] = asked[1] = (double)(intptr_t)nothing;
+    many = each * strtoul(word[3], NULL, 10), size = each * strtoul(word[4], NULL, 10);
     gains = numbers(many), memory = numbers(size);
     file = fopen(word[2], "rb");
     if (!file || fread(gains, sizeof(double), many, file) != many) return failed("no gains");
@@ -41,11 +54,12 @@ int main(int count, char **word)
         memcpy(&setup, &found, sizeof found);
         if (setup()) return failed("smc_setup failed");
     }
-    *(int *)dlsym(library, "smc_mujoco_gains") = (int)many;
-    *(int *)dlsym(library, "smc_mujoco_memory") = (int)size;
+    *(int *)dlsym(library, "smc_mujoco_gains") = (int)(many / each);
+    *(int *)dlsym(library, "smc_mujoco_memory") = (int)(size / each);
     found = dlsym(library, "smc_mujoco_entry");
     memcpy(&law, &found, sizeof found);
-    while (fread(y, sizeof(double), SMC_INPUTS, file) == SMC_INPUTS) {
+    while (fread(y, sizeof(double), inputs, file) == inputs) {
+        if (joints) y[3] = (double)(intptr_t)asked;
         if (y[0] == 0.0) memset(memory, 0, size * sizeof(double)); /* a run begins */
         law(y, gains, memory, out);
     }

@@ -23,18 +23,22 @@ STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest r
 LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
 MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
 GUARD, GUARDS = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
+COUPLING = 0.1  # elements of M off its diagonal
 MORE_GAINS = 16  # additional gains, which detect a law that reads them
 BEYOND = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
 ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thread
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
-    BEYOND + 1: ("writes beyond the two numbers of out", "write out[0] and out[1] alone"),
+    BEYOND + 1: ("writes beyond the numbers of out", "write u and s alone, out[0] and out[1] of one channel"),
+    BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
     ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
 SHARED = "which all channels and simulations share, on several threads"
-NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled")
+NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
+TEXTS = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
+ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
 
 # Signal -> its usual cause in a law. The causes of other signals are reads, writes and divisions.
 SIGNALS = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
@@ -73,14 +77,17 @@ def load(library: Library) -> dict[str, Any]:
     return _run(library, None)
 
 
-def call(library: Library, fields: Sequence[str], gains: Sequence[float], memory: int, modelled: bool) -> list[str]:
+def call(
+    library: Library, fields: Sequence[str], gains: Sequence[float], memory: int, modelled: bool, joints: int = 0
+) -> list[str]:
     """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
 
     Args:
-      fields: names of the numbers in a measurement.
-      gains: values of the gains.
+      fields: names of the numbers in a measurement; of a law of many joints, of its vectors.
+      gains: values of the gains, of many joints for each joint.
       memory: number of state variables.
       modelled: whether the law needs the nominal model.
+      joints: of a law of many joints; 0 for one channel.
 
     Raises:
       ScenarioError: as in `load`.
@@ -91,9 +98,10 @@ def call(library: Library, fields: Sequence[str], gains: Sequence[float], memory
     anchor, data = build.static_data(library.file, library.symbol)
     if not data:
         unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
-    order = {"fields": fields, "gains": gains, "memory": memory, "modelled": modelled}
+    order = {"fields": fields, "gains": gains, "memory": memory, "modelled": modelled, "joints": joints}
     _run(library, order | {"calls": str(calls), "anchor": anchor, "data": data})
-    if why := _sanitize(library, calls, len(gains), memory):
+    each = max(1, joints)
+    if why := _sanitize(library, calls, len(gains) // each, memory):
         unseen.append(f"{name} is tried without address and undefined-behaviour sanitizers: {why}")
     calls.unlink()
     return unseen
@@ -121,7 +129,7 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
     if kind == Fault.__name__:
         raise ScenarioError(f"{file}: {why}")
     if library.symbol in why and ("undefined symbol" in why or "not found" in why):
-        raise ScenarioError(build.undefined(file, library.symbol))
+        raise ScenarioError(build.undefined(library.path, library.symbol))
     if why:
         why = " ".join(why.split())
         raise ScenarioError(f"{file} cannot be loaded ({why}): build it for this machine, with all it needs")
@@ -187,9 +195,10 @@ def entry(path: str, symbol: str):
 def facts(library) -> dict[str, str | int]:
     """Return the constants of smc_law.h that a library defines, and whether it contains the glue."""
     constants: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
-    if hasattr(library, "smc_law_gains"):
-        text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "smc_law_gains")))
-        constants["smc_law_gains"] = text.decode(errors="replace")
+    for name in TEXTS:
+        if hasattr(library, name):
+            text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, name)))
+            constants[name] = text.decode(errors="replace")
     return constants | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
 
 
@@ -247,23 +256,49 @@ class Fenced:
         return self.guards() != self.before
 
 
+class Requests:
+    """What a law of many joints may ask in a trial: C(x, v) w = w / 10, and a tip that three joints move.
+
+    Attributes:
+      address: of the addresses of both functions, of their parameters, and the force per unit of u.
+    """
+
+    def __init__(self, joints: int):
+        def coriolis(w, own, memory, out):
+            for i in range(joints):
+                out[i] = 0.1 * w[i]
+            return 0
+
+        def jacobian(nothing, own, memory, out):
+            for i in range(3 * joints):
+                out[i] = float(i // joints == i % joints)
+            return 0
+
+        self.functions = ON_REQUEST(coriolis), ON_REQUEST(jacobian)
+        addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
+        self.table = doubles([*addresses, 0.0, 1.0])
+        self.address = ctypes.addressof(self.table)
+
+
 class Trial:
-    """Runs of a law on a double integrator x'' = u, and calls far outside of them.
+    """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
     Args:
       law, library: as returned by `entry`.
-      order: fields, gains, memory and modelled as in `call`; "data" and "anchor", the static data and the law's address
-        in the file.
+      order: fields, gains, memory, modelled and joints as in `call`; "data" and "anchor", the static data and the law's
+        address in the file.
       calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
     """
 
     def __init__(self, law, library, order, calls):
         self.law, self.library, self.calls = law, library, calls
         self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
+        self.joints, self.each = order["joints"], max(1, order["joints"])
+        self.on_request = Requests(self.joints)
         base = ctypes.cast(law, ctypes.c_void_p).value - order["anchor"]
         self.data = [(name, base + place, size) for name, place, size in order["data"]]
         self.data_before = self.static_data()
-        self.y, self.out = Fenced([0.0] * len(self.fields)), Fenced([0.0] * 2)
+        self.y, self.out = Fenced(self.measurement([{}] * self.each)), Fenced([0.0] * (2 * self.each))
         self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
         self.gains_before = bytes(self.gains.whole)
         calls.write(bytes(self.gains.own))
@@ -273,57 +308,68 @@ class Trial:
         """Make every kind of run, and calls at very large errors, at which a law may return an error."""
         steps = LONG_STEPS
         for model in (1.0,) if self.modelled else (0.0, 1.0):
-            for surfaced in (0.0, 1.0):
+            for surfaced in (0.0,) if self.joints else (0.0, 1.0):
                 self.run(model, surfaced, 1.0 - 2.0 * surfaced, steps)
                 steps = STEPS
         for e in (-1e6, -1e3, 0.0, 1e3, 1e6):
             for de in (-1e6, 0.0, 1e6):
                 far = {"dt": 1e-3, "x": e, "v": de, "e": e, "de": de, "g": 1.0, "limit": 6.0, "model": 1.0}
-                self.call(self.measurement(**far), Fenced([0.0] * self.size))
+                self.call(self.measurement([far] * self.each), self.state())
         self.check_static_data()
 
-    def run(self, model: float, surfaced: float, x: float, steps: int) -> None:
+    def run(self, model: float, surfaced: float, x0: float, steps: int) -> None:
         """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
-        v, dt, memory = 0.0, 1e-3, Fenced([0.0] * self.size)
+        xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.each)], [0.0] * self.each, 1e-3, self.state()
         for k in range(steps + LATER_STEPS):
-            t = dt * (k if k < steps else steps * GROWTH ** (k - steps))
+            t, seen = dt * (k if k < steps else steps * GROWTH ** (k - steps)), []
             r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
-            e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
-            seen = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
-            seen |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
-            if surfaced:
-                seen |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
-            y, before = self.measurement(**seen), bytes(memory.own)
-            code, u, s = self.call(y, memory)
-            if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
-                self.check_gains(y, before)
-                what = code or f"u = {u}, s = {s}"
-                raise Fault(f"returned {what} at t = {t:g}, e = {e:g}, de = {de:g}: fix it, or the gains")
+            for x, v in zip(xs, vs, strict=True):
+                e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
+                one = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
+                one |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
+                if surfaced:
+                    one |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
+                seen.append(one)
+            y, before = self.measurement(seen), bytes(memory.own)
+            code, us, ss = self.call(y, memory)
+            for i, (one, u, s) in enumerate(zip(seen, us, ss, strict=True)):
+                if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
+                    self.check_gains(y, before)
+                    what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
+                    where = f"t = {t:g}, e = {one['e']:g}, de = {one['de']:g}"
+                    raise Fault(f"returned {what}{joint} at {where}: fix it, or the gains")
             if k % 50 == 0:
                 self.check_static_data()
-                if repr(self.law_at(y, self.state(before))) != repr((code, u, s)):
+                if repr(self.law_at(y, self.state(before))) != repr((code, us, ss)):
                     raise Fault(f"gave two answers to one measurement, as from state {SHARED}: keep it in memory")
-            v += dt * min(max(u, -6.0), 6.0)
-            x += dt * v
-            if abs(x) > MAX_POSITION:
-                x, v = math.copysign(MAX_POSITION, x), 0.0
+            for i, u in enumerate(us):
+                vs[i] += dt * min(max(u, -6.0), 6.0)
+                xs[i] += dt * vs[i]
+                if abs(xs[i]) > MAX_POSITION:
+                    xs[i], vs[i] = math.copysign(MAX_POSITION, xs[i]), 0.0
 
-    def measurement(self, **seen: float) -> list[float]:
-        """Return the numbers of a measurement in their order. Those left out are 0."""
-        return [seen.get(name, 0.0) for name in self.fields]
+    def measurement(self, seen: list[dict[str, float]]) -> list[float]:
+        """Return the numbers of a measurement in their order, from those of each channel. Those left out are 0."""
+        if not self.joints:
+            return [seen[0].get(name, 0.0) for name in self.fields]
+        head = [*(seen[0].get(name, 0.0) for name in ("t", "dt", "model")), float(self.on_request.address), self.joints]
+        vectors = [one.get(name, 0.0) for name in self.fields for one in seen]
+        M = [1.0 if i == j else COUPLING for i in range(self.joints) for j in range(self.joints)]
+        return [*head, *vectors, *M, *[0.0] * (2 * self.joints)]
 
-    def state(self, saved: bytes) -> Fenced:
-        """Return a memory with saved content."""
-        return Fenced(struct.unpack(f"{self.size}d", saved))
+    def state(self, saved: bytes = b"") -> Fenced:
+        """Return a memory of zeros, or with saved content."""
+        count = self.size * self.each
+        return Fenced(struct.unpack(f"{count}d", saved) if saved else [0.0] * count)
 
-    def call(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
+    def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
         """Call the law, and record the call for the sanitizers."""
         self.calls.write(struct.pack(f"{len(y)}d", *y))
         return self.law_at(y, memory)
 
-    def law_at(self, y: list[float], memory: Fenced) -> tuple[int, float, float]:
+    def law_at(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
         """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
-        self.y.own[:], self.out.own[:] = y, [math.nan, math.nan]
+        self.y.own[:], self.out.own[:] = y, [math.nan] * len(self.out.own)
         y_before = bytes(self.y.whole)
         code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
         if memory.crossed():
@@ -337,7 +383,7 @@ class Trial:
             raise Fault(f"{what.format(self.size)}: {cure}")
         if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != y_before:
             raise Fault("changes its gains or its measurement: keep what changes in memory")
-        return code, self.out.own[0], self.out.own[1]
+        return code, self.out.own[: self.each], self.out.own[self.each :]
 
     def static_data(self) -> dict[str, bytes]:
         """Return the current content of the static data."""
@@ -352,8 +398,8 @@ class Trial:
 
     def check_gains(self, y: list[float], before: bytes) -> None:
         """Raise Fault if u becomes finite when additional gains are finite."""
-        count, out = len(self.gains.own), Fenced([math.nan, math.nan])
-        more = Fenced([*self.gains.own, *[1.0] * MORE_GAINS])
+        count, out = len(self.gains.own) // self.each, Fenced([math.nan] * (2 * self.each))
+        more = Fenced([*self.gains.own, *[1.0] * (MORE_GAINS * self.each)])
         set_sizes(self.library, count + MORE_GAINS, self.size)
         code = self.law(Fenced(y).own, more.own, self.state(before).own, out.own)
         set_sizes(self.library, count, self.size)
@@ -380,7 +426,7 @@ def attempt(order, progress) -> None:
     done("smc_setup")
     if trial := order["trial"]:
         print(symbol, file=progress)
-        set_sizes(library, len(trial["gains"]), trial["memory"])
+        set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
         with Path(trial["calls"]).open("wb") as calls:
             try:
                 Trial(law, library, trial, calls).all()

@@ -89,6 +89,7 @@ class Value(NamedTuple):
     text: str
     kind: str
     level: int = ATOM
+    home: str = ""  # of an array: a pointer to its numbers, if they lie in a row
 
     def within(self, level: int) -> str:
         """Return the text as an operand of an operator of precedence `level`."""
@@ -98,7 +99,7 @@ class Value(NamedTuple):
 def translate(component: Component, single: bool) -> tuple[int, str]:
     """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
 
-    The function's name is smc_law, smc_surface or smc_estimator.
+    The function's name is smc_law, smc_surface or smc_estimator. A law of many joints goes to `joint_translate`.
 
     Args:
       single: whether smc_real is float.
@@ -106,8 +107,13 @@ def translate(component: Component, single: bool) -> tuple[int, str]:
     Raises:
       Untranslatable: a piece of Python, which is quoted, has no translation.
     """
-    program = Program(component, single)
-    functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
+    return text_of(Program(component, single))
+
+
+def text_of(program: "Program") -> tuple[int, str]:
+    """Return the number of memory slots and the C of a program."""
+    function = program.component.function
+    functions = [program.make(program, function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
     for name, text in reversed(program.functions.items()):
         if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
@@ -120,7 +126,7 @@ class Program:
 
     def __init__(self, component: Component, single: bool):
         self.component, self.gains, self.single = component, component.gains, single
-        self.symbol = f"smc_{component.kind}"
+        self.symbol, self.make = f"smc_{component.kind}", Function
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
         self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, kinds; None while in progress
@@ -182,7 +188,7 @@ class Program:
         key = (written, tuple(kinds), tuple(constants.items()))
         if key not in self.translated:
             self.translated[key] = None
-            translated = Function(self, function, kinds, constants)
+            translated = self.make(self, function, kinds, constants)
             name = self.unique_name(plain(tree.name))
             self.translated[key] = name, translated.results
             self.functions[name] = translated.text(name)
@@ -233,9 +239,10 @@ class Function:
 
         A variable is declared by its first assignment, or at the top if that is inside a block or by a pointer.
         """
-        types = {self.c_name(n): TYPES[kind] for n, kind in self.kinds.items() if n not in self.parameters}
+        numbers = {n: TYPES[kind] for n, kind in self.kinds.items() if kind in TYPES and n not in self.parameters}
+        types = {self.c_name(n): of for n, of in numbers.items()}
         unread = [self.c_name(n) for n in self.kinds if n not in self.read]
-        top = [f"{types.pop(n)} {n} = 0;" for n in unread if n in types]
+        top = [*self.arrays(), *(f"{types.pop(n)} {n} = 0;" for n in unread if n in types)]
         top += [f"(void){n};" for n in unread]  # compilers warn of unused variables
         lines, depth = list[str](), 1
         for line in self.lines:
@@ -249,6 +256,10 @@ class Function:
             )
             depth += line.endswith("{")
         return "\n".join([self.head(name), "{", *(f"    {line}" for line in top), *lines, "}"])
+
+    def arrays(self) -> Iterable[str]:
+        """Return the declarations of the function's arrays."""
+        return ()
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon."""
@@ -281,7 +292,7 @@ class Function:
                 case ast.AnnAssign(target=target, value=ast.expr() as value):
                     yield from self.assign(target, value)
                 case ast.AugAssign():
-                    yield self.augment(node)
+                    yield from self.augment(node)
                 case ast.If():
                     yield from self.branch(node)
                 case ast.For(target=ast.Name(id=name), orelse=[]):
@@ -358,13 +369,14 @@ class Function:
         self.assigned.add(name)
         return self.c_name(name)
 
-    def augment(self, node: ast.AugAssign) -> str:
+    def augment(self, node: ast.AugAssign) -> Iterator[str]:
         """Translate target op= value."""
-        result = self.numeric(ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value))
+        result = self.numeric(whole_expression(node))
         target = self.destination(node.target, result.kind)
         if type(node.op) in OPERATORS and result.kind not in WHOLE_KINDS:
-            return f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
-        return f"{target} = {result.text};"
+            yield f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
+        else:
+            yield f"{target} = {result.text};"
 
     def branch(self, node: ast.If, word: str = "if") -> Iterator[str]:
         """Translate if, elif and else."""
@@ -636,6 +648,11 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     return written, tree
 
 
+def whole_expression(node: ast.AugAssign) -> ast.BinOp:
+    """Return the value that target op= value assigns, target op value."""
+    return ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value)
+
+
 def names_in(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names in some code."""
     return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
@@ -680,9 +697,15 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
 
 def wider(one: str, other: str) -> str:
     """Return the kind of an operation on two kinds, in C and in numba. An integer and a single give a real."""
-    if "single" in (one, other) and (one in WHOLE_KINDS or other in WHOLE_KINDS):
-        return "real"
-    return max(one, other, key=KINDS.index)
+    first, _, shape = one.partition("[")
+    second, _, other_shape = other.partition("[")
+    if shape != other_shape:
+        raise refuse(None, "a name for a number and an array, or for arrays of two shapes,")
+    if "single" in (first, second) and (first in WHOLE_KINDS or second in WHOLE_KINDS):
+        kind = "real"
+    else:
+        kind = max(first, second, key=KINDS.index)
+    return kind + one[len(first) :]
 
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:

@@ -21,7 +21,7 @@ from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import ended, replacing
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.c import build
-from smc_mujoco.control.c.export import of_one_channel
+from smc_mujoco.control.c.export import writable
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -127,7 +127,8 @@ def _controller(
     model: str | None,
 ) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
-    law, surface, estimator = of_one_channel(law), coerce.surface(surface), coerce.velocity(velocity)
+    surface, estimator = coerce.surface(surface), coerce.velocity(velocity)
+    law = writable(law)
     if law.joint:
         raise ScenarioError(f"law {law.name!r} is of many joints: an FMU has a law of one channel")
     if surface is not None:
