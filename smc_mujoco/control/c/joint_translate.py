@@ -105,6 +105,7 @@ class ArrayFunction(Function):
         self.check_sharing()
 
     def arrays(self) -> Iterable[str]:
+        """Return the declarations of the function's arrays."""
         kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n not in self.parameters}
         return [declared(kind, name) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
 
@@ -115,6 +116,7 @@ class ArrayFunction(Function):
         return super().text(name)
 
     def head(self, name: str) -> str:
+        """Return the declaration without a semicolon. Arrays are pointers."""
         pointers = ARGUMENTS | {"y": "const smc_joint_measurement *"}
         arguments = []
         for parameter in self.parameters:
@@ -131,6 +133,7 @@ class ArrayFunction(Function):
     # statements
 
     def block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
+        """Yield the lines of some statements, each after the lines that have moved before it."""
         if body is self.tree.body:
             self.before, self.temporaries, self.counts = list[str](), dict[str, str](), itertools.count(1)
         for line in super().block(body):
@@ -139,6 +142,7 @@ class ArrayFunction(Function):
             yield line
 
     def assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
+        """Assign a number or an array to one target, or to a tuple of them."""
         if isinstance(target, ast.Tuple | ast.List):
             yield from super().assign(target, value)
             return
@@ -149,17 +153,20 @@ class ArrayFunction(Function):
             yield f"{self.destination(target, number.kind)} = {number.text};"
 
     def augment(self, node: ast.AugAssign) -> Iterator[str]:
+        """Translate target op= value, element by element if the target is an array."""
         if not self.is_array(node.target):
             yield from super().augment(node)
             return
         yield from self.store(node.target, self.numeric(whole_expression(node)))
 
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
+        """Compute all values before the first assignment. Arrays are refused."""
         if any(shape(self.numeric(value).kind) for value in values):
             raise refuse(values[0], "arrays that change places at once")
         yield from super().at_once(targets, values)
 
     def unpack(self, targets: Sequence[ast.expr], call: ast.Call) -> Iterator[str]:
+        """Assign the results of a function that has several."""
         values = [self.argument(a) for a in call.args]
         kinds, beginning = self.program.function(self.callee(call), values, call.args)
         if len(kinds) != len(targets):
@@ -177,6 +184,7 @@ class ArrayFunction(Function):
             yield from self.store(target, found)
 
     def loop(self, node: ast.For, variable: str) -> Iterator[str]:
+        """Translate for i in range(...) and for element in array."""
         if isinstance(node.iter, ast.Name) and len(shape(self.kinds.get(node.iter.id, ""))) == 1:
             array, i = self.value(node.iter), self.index()
             yield f"for (int32_t {i} = 0; {i} < {shape(array.kind)[0]}; {i}++) {{"
@@ -187,6 +195,7 @@ class ArrayFunction(Function):
             yield from super().loop(node, variable)
 
     def returned(self, value: ast.expr) -> Iterator[str]:
+        """Translate return."""
         values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
         self.results = self.results or [v.kind for v in values]
         if len(values) != len(self.results):
@@ -248,6 +257,7 @@ class ArrayFunction(Function):
         return call
 
     def destination(self, target: ast.expr, kind: str) -> str:
+        """Return a target in C, to which a value of a kind is assigned."""
         if isinstance(target, ast.Subscript):
             place = self.changeable(target)
             if shape(place.kind) or place.kind != "real":
@@ -374,6 +384,7 @@ class ArrayFunction(Function):
         return kept._replace(text=kept.home)
 
     def truth(self, node: ast.expr) -> str:
+        """Translate an expression as a condition."""
         value = self.staying(self.outside, self.numeric, node)
         if shape(value.kind):
             raise refuse(node, "an array as a condition")
