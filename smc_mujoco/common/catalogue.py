@@ -167,6 +167,10 @@ class Catalogue(Mapping[str, T_co]):
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
         return Catalogue({**self.own, **other.own}, both)
 
+    def taken(self, name: str) -> bool:
+        """Return whether an entry has this name. One whose module is being imported is just being made."""
+        return name in self.own or any(not _being_imported(one.point.module) for one in self.added.get(name, ()))
+
     def package(self, name: str) -> str:
         """Return the name of the package that an entry is from, or "" if it is the library's."""
         return "" if name in self.own or name not in self.added else self.added[name][0].package

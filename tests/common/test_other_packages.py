@@ -183,6 +183,27 @@ def test_a_package_brings_the_gains_of_its_law(install):
     assert gain_sets.law("duffing", "tuned_law").gains["k"] == 7.0
 
 
+def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):
+    """It has the name of its entry, which nobody else may give to a model."""
+    xml = (EXAMPLE / "my_smc_package/models/sprung_cart.xml").read_text()
+    given = 'gantry = smc.plant_from(PATH, channels=["slide"], name="gantry")\n'
+    default = 'trolley = smc.plant_from(PATH.with_name("trolley.xml"), channels=["slide"])\n'
+    folder = install(
+        "cranes",
+        {"plants": {"gantry": "cranes_plants:gantry", "trolley": "cranes_plants:trolley"}},
+        cranes_plants="import smc_mujoco as smc\nfrom pathlib import Path\n"
+        f"PATH = Path(__file__).with_name('gantry.xml')\n{given}{default}",
+    )
+    for name in ("gantry", "trolley"):
+        (folder / f"{name}.xml").write_text(xml)
+    assert smc.plant("gantry").name == "gantry"
+    assert smc.plant("trolley").name == "trolley"
+    trace = smc.run(smc.Scenario(plant="gantry", law="classical", duration=0.02))
+    assert smc.load(trace.save(tmp_path / "a.npz")).scenario.plant.name == "gantry"
+    with pytest.raises(smc.ScenarioError, match="name is 'gantry': give one that is none of smc.plants()"):
+        smc.plant_from(folder / "gantry.xml", channels=["slide"], name="gantry")
+
+
 def test_a_study_hashes_a_package_s_plant_once(install, tmp_path, monkeypatch):
     """Writing its model as XML takes longer than a short run."""
     install(

@@ -213,14 +213,14 @@ def own_plant(
 
 
 def named(label: str) -> str:
-    """Return the file's name without .xml as a plant's name; with .xml if the library has a plant of that name."""
+    """Return the file's name without .xml as a plant's name; with .xml if there is a plant of that name."""
     name = label.removesuffix(".xml")
-    return name if name not in catalogue() else label
+    return label if catalogue().taken(name) else name
 
 
 def check_name(name: str | None) -> None:
-    """Raise ScenarioError for the name of a plant of the library, because laws and gains refer to plants by name."""
-    if name is not None and errors.name("name", name) in catalogue():
+    """Raise ScenarioError for the name of another plant, because laws and gains refer to plants by name."""
+    if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
 
 
