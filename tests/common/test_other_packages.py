@@ -200,7 +200,7 @@ def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):
     assert smc.plant("trolley").name == "trolley"
     trace = smc.run(smc.Scenario(plant="gantry", law="classical", duration=0.02))
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario.plant.name == "gantry"
-    with pytest.raises(smc.ScenarioError, match="name is 'gantry': give one that is none of smc.plants()"):
+    with pytest.raises(smc.ScenarioError, match="name is 'gantry': give one that is none"):
         smc.plant_from(folder / "gantry.xml", channels=["slide"], name="gantry")
 
 
