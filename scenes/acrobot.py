@@ -31,7 +31,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Acrobot",
+    title="Acrobot with dry friction",
     conditions={
         "friction": {"no friction": run(0.0), "0.01 N m": run(0.01), "0.02 N m": run(0.02), "0.08 N m": run(0.08)},
     },

@@ -28,7 +28,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Cart-pole",
+    title="Cart-pole with dry friction",
     conditions={
         "friction": {"no friction": run(0.0), "friction 0.005": run(0.005), "friction 0.02": run(0.02)},
     },

@@ -23,7 +23,7 @@ scene = smc.Scene(
         name: smc.paper.comparison("inverted_pendulum", duration=3.0, changes={"actuator": actuator})
         for name, actuator in {
             "ideal": None,
-            "motor": smc.DCMotor(),
+            "24 V supply": smc.DCMotor(),
             "cogging": smc.DCMotor(cogging=0.01),
             "3 V supply": smc.DCMotor(voltage=3.0),
             "lag 10 ms": smc.Lag(0.01),

@@ -34,7 +34,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Pendubot",
+    title="A blow on the pendubot",
     conditions={"blow": {f"{blow:g} N m s": run(blow) for blow in (0.1, 0.3, 0.4, 0.5)}},
     answer=answer,
 )

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.gridspec import SubplotSpec
@@ -147,7 +148,7 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
     several = traces[0].scenario.plant.direct and any(len(group.channels) > 1 for group in style.split(traces))
     names = ["channels"] if several else ["x", "spread"]
-    names += ["u", "delivered", "reaction", "s"]
+    names += ["u", "delivered", "reaction", *["s"] * any(np.nan_to_num(trace.s).any() for trace in traces)]
     if several:
         return [*names, "end"] if width >= style.JOURNAL else names
     return [*names, "transient"] if width < pages.NARROW else [*names, *BESIDE]
@@ -187,6 +188,8 @@ def _draw_over_time(
             drawing.over_time(ax, part, own)
             drawing.jumps(ax, changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
+        for ax in (frame, *(ax for ax, *_ in rows)):
+            drawing.scale_ticks(ax.yaxis, panel)
         _level(frame, [ax for ax, *_ in rows])
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlabel("time (s)")
@@ -237,6 +240,7 @@ def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
             ax.set_xlim(0.0, end(panel.traces))
             ax.locator_params(axis="y", nbins=3)
             drawing.over_time(ax, panel, colours)
+            drawing.scale_ticks(ax.yaxis, panel)
             drawing.jumps(ax, changes, named=i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
@@ -254,10 +258,13 @@ def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], plac
         if name == "phase":
             panel = next(portraits)
             drawing.phase(ax, panel.traces, colours, rests)
-            ax.set(xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
+            for axis, part in ((ax.xaxis, panel), (ax.yaxis, panel._replace(quantity="v"))):
+                drawing.scale_ticks(axis, part)
+                axis.set_label_text(part.label)
         else:
             panel = drawing.transient(places[0])
             drawing.over_time(ax, panel, colours)
+            drawing.scale_ticks(ax.yaxis, panel)
             stop = max(trace.t[-1] for trace in panel.traces) or end(panel.traces)  # of runs that fail at once
             ax.set(xlabel="time, transient (s)", ylabel=panel.label, xlim=(0.0, stop))
 

@@ -14,10 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import ScalarFormatter
 
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
-from smc_mujoco.draw.decimate import columns, end, line, stretches, window
+from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
@@ -36,6 +38,8 @@ LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single cha
 COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
 DASH = 5.0  # widths of a line
 WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
+VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
+SMALL = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
 TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
@@ -67,20 +71,31 @@ class Panel(NamedTuple):
     channel: int | None = None  # of a small panel
 
     @property
+    def thousandths(self) -> bool:
+        """Whether its axis shows thousandths of the unit, as all its values are small."""
+        return not self.unitless and 0.0 < max(map(abs, span(self.traces, self.quantity))) < SMALL
+
+    @property
+    def unitless(self) -> bool:
+        """Whether the unit depends on the law: that of s, for some laws and plants."""
+        plant = self.traces[0].scenario.plant
+        return self.quantity == "s" and (plant.free or not all(_is_rate(trace.scenario.law) for trace in self.traces))
+
+    @property
     def label(self) -> str:
         """The label of the vertical axis, with its unit."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
         mean = "mean " * (len(group.channels) > 1)
         alike = {"spread": "x", "e": "x", "reaction": "force", "d": "force", "applied": "u"}
-        unit = f" ({style.units(group)[alike.get(name, name)]})"
+        unit = f" ({'m' * self.thousandths}{style.units(group)[alike.get(name, name)]})"
         if self.channel is not None:
             return f"{name}{self.channel}{unit}"
         if name == "spread":
             return f"max − min x{unit}"
         if name in REALISM:
             return f"{mean}{'delivered' if name == 'force' else 'reaction'}{' on q' * (not group.driven)}{unit}"
-        if name == "s" and (plant.free or not all(_is_rate(trace.scenario.law) for trace in self.traces)):
-            return f"{mean}sliding variable s"  # its unit depends on the law
+        if self.unitless:
+            return f"{mean}sliding variable s"
         if name == "s" and plant.mixed:
             return f"{mean}s{unit}"  # short: there are many such panels, and they are low
         kind = {"rad": "angle", "m": "position"}[group.unit]
@@ -148,10 +163,10 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
 
 
 def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
-    """Return the labels of panels of these heights in points; the unit is on a second line if two would touch."""
-    words = [panel.label for panel in panels]
-    free = [height - style.width(text, style.RC["font.size"]) for height, text in zip(heights, words, strict=True)]
-    close = {i for i, (a, b) in enumerate(itertools.pairwise(free)) if (a + b) / 2 < 4}
+    """Return the labels of panels of these heights in points; the unit is on a second line if two would be close."""
+    words, size = [panel.label for panel in panels], style.points(style.RC["font.size"])
+    free = [height - style.width(text, size) for height, text in zip(heights, words, strict=True)]
+    close = {i for i, (a, b) in enumerate(itertools.pairwise(free)) if (a + b) / 2 < size}
     return [text.replace(" (", "\n(") if {i - 1, i} & close else text for i, text in enumerate(words)]
 
 
@@ -166,12 +181,13 @@ def smoothed(trace: Trace) -> bool:
 
 
 def mean_window(traces: Sequence[Trace]) -> float | None:
-    """Return the longest window of the means drawn for u, s; None if no u chatters."""
-    times = [
-        window(trace) * trace.scenario.control_period
-        for trace in traces
-        if smoothed(trace) and stretches(trace.u.mean(axis=1), window(trace))
-    ]
+    """Return the longest window of the means drawn for u, s; None if no u chatters visibly."""
+    low, high = limits(traces, "u")
+    times = []
+    for trace in traces:
+        u = trace.u.mean(axis=1)
+        if smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE * (high - low):
+            times.append(window(trace) * trace.scenario.control_period)
     return max(times, default=None)
 
 
@@ -267,17 +283,36 @@ def rests(trace: Trace) -> list[int]:
 
 def target(ax: Axes, panel: Panel) -> None:
     """Draw each reference (zero for an error) as long as a run has it, its settling band, and the play of a gear."""
-    several = sorted(panel.traces, key=lambda trace: len(trace.t))
+    several, (bottom, top) = sorted(panel.traces, key=lambda trace: len(trace.t)), ax.get_ylim()
     for trace in {trace.scenario.resolved.reference: trace for trace in several}.values():
         r = reference(trace)
         known = np.isfinite(r)
         r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
         if known.any():
             (t, r), half, play = line(trace.t[known], r, 2), BAND * scale(trace), backlash_gap(trace.scenario) / 2
-            ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
+            if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
+                ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
             if play:
                 ax.fill_between(t, r - play, r + play, color=style.REACTION, alpha=PLAY, lw=0, zorder=1.1, gid=BACKLASH)
             ax.plot(t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
+
+
+class Thousandths(ScalarFormatter):
+    """Labels of ticks in thousandths of the axis's unit."""
+
+    def set_locs(self, locs: Any) -> None:
+        """Choose the digits for ticks at these places."""
+        super().set_locs([1e3 * place for place in locs])
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of a tick."""
+        return super().__call__(1e3 * x, pos)
+
+
+def scale_ticks(axis: Axis, panel: Panel) -> None:
+    """Label the ticks of an axis in the unit of a panel's label."""
+    if panel.thousandths:
+        axis.set_major_formatter(Thousandths())
 
 
 def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:

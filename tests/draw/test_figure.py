@@ -149,8 +149,8 @@ def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
     assert "reaction" not in text
     assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
     rubbed = words(figure([cart_and_pole(friction=Coulomb(0.01))], tmp_path / "b")[0])
-    assert "reaction (N)" in rubbed
-    assert "reaction on q (N·m)" in rubbed
+    assert "reaction (mN)" in rubbed
+    assert "reaction on q (mN·m)" in rubbed
 
 
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
@@ -209,11 +209,29 @@ def test_a_voltage_is_drawn_in_volts_beside_forces_in_newton_metres(tmp_path):
     torque = dataclasses.replace(volts, actuator=motor)
     one, other = smc.run([volts, torque])
     text = words(figure([one], tmp_path / "a")[0])
-    assert all(label in text for label in ("u (V)", "reaction (N·m)"))
+    assert all(label in text for label in ("u (V)", "reaction (mN·m)"))
     assert "u (N·m)" not in text
+    assert "sliding variable" not in text  # the law has none
     assert "u (N·m)" in words(figure([other], tmp_path / "b")[0])
     with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
         figure([one, other], tmp_path / "c")
+
+
+def test_small_values_are_drawn_in_thousandths_of_their_unit(tmp_path):
+    small = smc.run(smc.Scenario(plant="duffing", law="lqr", x0=0.02, duration=0.3))
+    text = words(figure([small], tmp_path / "a")[0])
+    assert "position x (mm)" in text
+    assert "control u (N)" in text
+    assert " 15 20 position x (mm)" in text.replace("  ", " ")
+
+
+def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
+    """A ripple of a thousandth of the largest |u|, on a run that is long enough to be averaged."""
+    (trace,) = runs(duration=1.0)[:1]
+    for ripple, told in ((1e-3, False), (0.1, True)):
+        u = trace.u + ripple * np.abs(trace.u).max() * np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0)[:, None]
+        text = words(figure([dataclasses.replace(trace, u=u)], tmp_path / f"{told}")[0])
+        assert ("where it chatters" in text) == told
 
 
 def test_laws_keep_their_colours_and_traces_never_share_one(pair):

@@ -56,6 +56,7 @@ class Charts:
                 ax.tick_params(length=0)
                 panels.jumps(ax, style.jumps(traces, names), named=False)
                 artists += panels.over_time(ax, panel, colours, label=False)
+                panels.scale_ticks(ax.yaxis, panel)
             self.full = picture(canvas)
             for artist in artists:
                 artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))

@@ -23,6 +23,7 @@ from smc_mujoco.simulation.scenario import Scenario
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
 GAP = 0.15  # between machines in a row, of their width or height; chosen
 AISLE = 0.05  # m between machines, chosen
+HIDDEN = 5  # a group of geoms that MuJoCo does not draw by default
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}  # looks and speed
 LOOK = "look"
@@ -117,6 +118,22 @@ def set_floor(
     model.vis.map.fogstart = start / model.stat.extent
     model.vis.map.fogend = (start + (stop - start) / FADED) / model.stat.extent
     model.vis.rgba.fog[:] = (*HAZE, 1.0)
+
+
+def hide_cut(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    turn: np.ndarray,
+    place: np.ndarray,
+    size: tuple[int, int],
+    room: camera.Room,
+) -> None:
+    """Hide fixed things below the room that the lower edge of the picture would cut, such as the foot of a stand."""
+    fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE))
+    corners = boxes(model, data)[fixed]
+    down = camera.project(corners.reshape(-1, 3), turn, place, size)[:, 1].reshape(len(fixed), 8)
+    cut = (down.min(axis=1) > room.bottom) & (down.max(axis=1) > size[1])
+    model.geom_group[fixed[cut]] = HIDDEN
 
 
 def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:

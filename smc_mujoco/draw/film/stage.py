@@ -81,6 +81,7 @@ class Stage:
         flat = [camera.project(points, turn, place, size) for points in seen]
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
         scene.forward(self.model, self.data)
+        scene.hide_cut(self.model, self.data, turn, place, size, room)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
         self.paths = [
             arm.Path(trace, there, colour)
