@@ -73,13 +73,15 @@ class Panel(NamedTuple):
     @property
     def thousandths(self) -> bool:
         """Whether its axis shows thousandths of the unit, as all its values are small."""
-        return not self.unitless and 0.0 < max(map(abs, span(self.traces, self.quantity))) < SMALL
+        largest = max(map(abs, span(self.traces, self.quantity)))
+        return 0.0 < largest < SMALL and not self.unitless
 
     @property
     def unitless(self) -> bool:
         """Whether the unit depends on the law: that of s, for some laws and plants."""
         plant = self.traces[0].scenario.plant
-        return self.quantity == "s" and (plant.free or not all(_is_rate(trace.scenario.law) for trace in self.traces))
+        rates = all(_is_rate(trace.scenario.law) for trace in self.traces)
+        return self.quantity == "s" and (plant.free > 0 or not rates)
 
     @property
     def label(self) -> str:
