@@ -136,7 +136,8 @@ def test_a_library_plant_has_no_other_joints():
 
 def test_the_foot_of_a_stand_that_the_picture_s_edge_would_cut_is_not_drawn():
     stand = """<mujoco><worldbody>
-      <geom name="post" type="box" size=".1 .1 1" pos="0 0 1"/><geom name="foot" type="box" size=".5 .5 .05" pos="0 0 .05"/>
+      <geom name="post" type="box" size=".1 .1 1" pos="0 0 1"/>
+      <geom name="foot" type="box" size=".5 .5 .05" pos="0 0 .05"/>
       <geom name="sign" type="box" size=".2 .1 .02" pos="0 0 .5"/>
     </worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(stand)
