@@ -6,6 +6,8 @@ import re
 import sys
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -51,6 +53,24 @@ def test_what_is_known_of_a_law_is_that_of_the_catalogue(vendor, tmp_path):
     )
     assert duffing["mjcf"] == (build.known.model_path("duffing.xml")).read_text()
     assert duffing["start"] == ["observer_free", "classical"]
+
+
+def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
+    skins = facts(smc.live("van_der_pol", out=tmp_path / "page"))["plants"]["van_der_pol"]["skins"]
+    model = smc.plant("van_der_pol").load()
+    data, drawn = mujoco.MjData(model), mujoco.MjvScene(model, 100)
+    data.qpos[0] = -1.2
+    mujoco.mj_forward(model, data)
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, drawn)
+    moved = []
+    for skin in skins:
+        vertices, weights = np.reshape(skin["vertices"], (-1, 3)), np.reshape(skin["weights"], (-1, len(skin["bones"])))
+        assert all(bone["quaternion"] == [1.0, 0.0, 0.0, 0.0] for bone in skin["bones"])
+        on = [data.body(bone["body"]).xpos - bone["position"] for bone in skin["bones"]]
+        moved.append(vertices + weights @ on)
+        assert np.max(skin["faces"]) == len(vertices) - 1
+    assert len(skins) == 2
+    assert np.concatenate(moved) == pytest.approx(drawn.skinvert.reshape(-1, 3), abs=1e-4)
 
 
 def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):

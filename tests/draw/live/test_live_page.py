@@ -20,6 +20,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.draw import style
 from smc_mujoco.draw.live.build import PLANTS
+from smc_mujoco.mechanisms.plants import van_der_pol
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
@@ -214,16 +215,53 @@ def test_a_link_with_nonsense_opens_the_page(seen):
     assert seen.said == []
 
 
-def coloured(page, colour) -> int:
-    """The pixels of the machines with about the hue of a colour, without the names that lie over them."""
+def picture(page) -> np.ndarray:
+    """The picture of the machines without the names that lie over them, (height, width, 3)."""
     names = page.locator(".name")
     names.evaluate_all("all => all.forEach(one => { one.style.visibility = 'hidden'; })")
-    picture = Image.open(io.BytesIO(page.locator("#machines").screenshot())).convert("RGB")
+    shot = Image.open(io.BytesIO(page.locator("#machines").screenshot())).convert("RGB")
     names.evaluate_all("all => all.forEach(one => { one.style.visibility = ''; })")
-    r, g, b = np.moveaxis(np.asarray(picture, float), -1, 0)
+    return np.asarray(shot, float)
+
+
+def coloured(page, colour) -> int:
+    """The pixels of the machines with about the hue of a colour."""
+    r, g, b = np.moveaxis(picture(page), -1, 0)
     wanted = np.array(style.rgb(colour), float)
     here = np.stack([r, g, b]) / np.maximum(np.linalg.norm([r, g, b], axis=0), 1.0)
     return int((np.tensordot(wanted / np.linalg.norm(wanted), here, 1) > 0.985).sum())
+
+
+def test_springs_follow_the_cart(seen):
+    seen.open("plant=van_der_pol")
+    seen.page.wait_for_function("live.running()[0].simulation.time > 0.4")
+    if seen.page.inner_text("#play .word") == "Pause":
+        seen.page.locator("#play").click()
+    seen.page.wait_for_timeout(500)  # two frames
+    x = seen.page.evaluate("live.running()[0].simulation.data.qpos[0]")
+    left, right = seen.page.evaluate(
+        "live.stage.machines[0].skins.map(({ geometry: { boundingBox: { min, max } } }) => [min.x, max.x])"
+    )
+    assert abs(x - smc.plant("van_der_pol").x0[0]) > 0.05
+    assert left == pytest.approx([-van_der_pol.ENDS, x - van_der_pol.EDGE], abs=0.02)
+    assert right == pytest.approx([x + van_der_pol.EDGE, van_der_pol.ENDS], abs=0.02)
+    seen.page.locator("#play").click()
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
+    """Without a GPU only the part of the picture in which something moves is drawn."""
+    seen.open(f"plant={plant}")
+    seen.page.wait_for_function("live.running()[0].simulation.time > 0.6")
+    assert seen.page.evaluate("live.stage.slow && live.stage.machines[0].drawn !== null")
+    seen.page.locator("#play").click()
+    seen.page.wait_for_timeout(500)  # two frames
+    drawn = picture(seen.page)
+    seen.page.evaluate("live.stage.drawAll()")
+    seen.page.wait_for_timeout(500)
+    again = picture(seen.page)
+    seen.page.locator("#play").click()
+    assert np.abs(drawn - again).max() == 0.0
 
 
 def test_two_laws_have_the_colours_of_the_figures(seen, page):

@@ -48,6 +48,7 @@ class Component {
 
   reset() {
     this.memories = Array.from({ length: this.channels }, () => new Float64Array(this.known.memory));
+    this.scratch = new Float64Array(this.known.memory);
   }
 
   // Take over the memory of another component if it has the same name.
@@ -62,7 +63,8 @@ class Component {
 
   // The same, without a change of the memory.
   peek(y, i, out) {
-    this.call(y, this.values, this.memories[i].slice(), out);
+    this.scratch.set(this.memories[i]);
+    this.call(y, this.values, this.scratch, out);
   }
 }
 
@@ -240,16 +242,19 @@ export class Simulation {
     return seen;
   }
 
-  // Return the sliding variable that the law would have now if the first channel were at x and v.
-  slidingAt(x, v) {
-    const { s, out } = this;
-    const y = { ...this.y, x, v, e: x - s.reference, de: v, has_surface: 0, s: 0, v_eq: 0 };
-    if (this.surface) {
-      this.surface.peek(y, 0, out);
-      [y.has_surface, y.s, y.v_eq] = [1, out[0], out[1]];
-    }
-    this.law.peek(y, 0, out);
-    return out[1];
+  // Return the law's present sliding variable, as a function of the x and v at which the first channel would be.
+  sliding() {
+    const { s: { reference }, out, law, surface } = this;
+    const y = { ...this.y };
+    return (x, v) => {
+      Object.assign(y, { x, v, e: x - reference, de: v, has_surface: 0, s: 0, v_eq: 0 });
+      if (surface) {
+        surface.peek(y, 0, out);
+        [y.has_surface, y.s, y.v_eq] = [1, out[0], out[1]];
+      }
+      law.peek(y, 0, out);
+      return out[1];
+    };
   }
 
   // Return the nominal f and g of x'' = f + g u: the channels' accelerations for u = 0, and what u = 1 adds to them.

@@ -7,6 +7,7 @@ const POSES = 9; // of the machine over its range, all of which the picture show
 const MARGIN = 1.06; // size of the picture, relative to what it shows: chosen
 const TILES = 80; // along an edge of the floor
 const SEAM = 2; // px between two machines
+const PAD = 3; // px around what moves
 // Qualities of the picture, from the finest to the fastest: px of the canvas per px of the page, and shadows. Chosen.
 const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.75, shadows: false }];
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
@@ -88,36 +89,54 @@ function tiles() {
   return texture;
 }
 
-// A skin, such as a spring, whose vertices follow bodies. The bones stand where MuJoCo's bodies are.
+// Return the mesh of a skin, such as a spring. `bend` moves its vertices: a GPU would do it faster, a processor slower.
 function skinned({ vertices, faces, weights, bones, rgba: [r, g, b] }) {
   const geometry = new THREE.BufferGeometry();
-  const count = vertices.length / 3;
-  const [indices, shares] = [new Uint16Array(4 * count), new Float32Array(4 * count)]; // at most four bones a vertex
-  for (let i = 0; i < count; i++) {
-    bones.forEach((_, k) => ([indices[4 * i + k], shares[4 * i + k]] = [k, weights[bones.length * i + k]]));
-  }
-  geometry.setAttribute("position", new THREE.Float32BufferAttribute(vertices, 3));
-  geometry.setAttribute("skinIndex", new THREE.BufferAttribute(indices, 4));
-  geometry.setAttribute("skinWeight", new THREE.BufferAttribute(shares, 4));
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(vertices, 3).setUsage(THREE.DynamicDrawUsage));
   geometry.setIndex(faces);
-  geometry.computeVertexNormals();
+  geometry.computeVertexNormals(); // they stay: bodies that bear skins do not turn
   const colour = new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace);
-  const mesh = new THREE.SkinnedMesh(geometry, new THREE.MeshPhongMaterial({ color: colour, shininess: 60, specular: 0x333333 }));
-  const at = bones.map(({ position, quaternion: [w, x, y, z] }) => new THREE.Matrix4().compose(
-    new THREE.Vector3(...position), new THREE.Quaternion(x, y, z, w), new THREE.Vector3(1, 1, 1)));
-  mesh.bind(new THREE.Skeleton(bones.map(() => new THREE.Bone()), at.map((matrix) => matrix.invert())), new THREE.Matrix4());
-  for (const bone of mesh.skeleton.bones) bone.matrixAutoUpdate = false;
-  mesh.add(...mesh.skeleton.bones);
-  mesh.frustumCulled = false; // its bounds are those of the first pose
+  const mesh = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({ color: colour, shininess: 60, specular: 0x333333 }));
+  mesh.userData.bones = bones.map(({ position, quaternion: [w, x, y, z] }, k) => {
+    const bind = new THREE.Matrix4().compose(new THREE.Vector3(...position), new THREE.Quaternion(x, y, z, w), new THREE.Vector3(1, 1, 1));
+    const local = new THREE.Float32BufferAttribute(vertices, 3).applyMatrix4(bind.invert()).array; // in the body's frame
+    return { local, weights: Float32Array.from(weights.filter((_, i) => i % bones.length === k)) };
+  });
+  mesh.frustumCulled = false;
   return mesh;
 }
 
-// A pose of MuJoCo as a matrix: position i of p, and rotation i of m.
-function pose(matrix, p, m, i) {
-  const [a, b] = [3 * i, 9 * i];
-  return matrix.set(
-    m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
-  );
+// Move a skin's vertices with its bodies: each is the weighted mean of its places on them.
+function bend({ geometry, userData: { bones, bodies } }, xpos, xmat) {
+  const { position } = geometry.attributes;
+  const at = position.array.fill(0);
+  bones.forEach(({ local, weights }, k) => {
+    const p = xpos.subarray(3 * bodies[k], 3 * bodies[k] + 3);
+    const m = xmat.subarray(9 * bodies[k], 9 * bodies[k] + 9);
+    for (let i = 0; i < weights.length; i++) {
+      const [x, y, z] = [local[3 * i], local[3 * i + 1], local[3 * i + 2]];
+      for (let row = 0; row < 3; row++) {
+        at[3 * i + row] += weights[i] * (p[row] + m[3 * row] * x + m[3 * row + 1] * y + m[3 * row + 2] * z);
+      }
+    }
+  });
+  position.needsUpdate = true;
+  geometry.computeBoundingBox();
+}
+
+const noBounds = () => ({ left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity });
+const corner = new THREE.Vector3();
+
+// Spread bounds over a mesh's box. `flat` gives x and y of its corners, after they are multiplied by `matrix`.
+function spread(bounds, { geometry: { boundingBox: { min, max } } }, matrix, flat) {
+  for (let c = 0; c < 8; c++) {
+    corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z).applyMatrix4(matrix);
+    const { x, y } = flat(corner);
+    bounds.left = Math.min(bounds.left, x);
+    bounds.right = Math.max(bounds.right, x);
+    bounds.bottom = Math.min(bounds.bottom, y);
+    bounds.top = Math.max(bounds.top, y);
+  }
 }
 
 // One machine: the scene of a simulation.
@@ -142,6 +161,7 @@ class Machine {
       mesh.castShadow = !flat;
       mesh.receiveShadow = true;
       mesh.matrixAutoUpdate = false;
+      geometry.computeBoundingBox();
       mesh.userData = { geom: i, body: model.geom_bodyid[i] };
       this.scene.add(mesh);
       this.meshes.push(mesh);
@@ -164,7 +184,6 @@ class Machine {
   // Free the memory of the graphics card.
   dispose() {
     this.scene.traverse((each) => {
-      each.skeleton?.dispose();
       each.geometry?.dispose();
       each.material?.dispose();
     });
@@ -201,17 +220,27 @@ class Machine {
 
   // Put meshes where MuJoCo's geoms are, and skins where its bodies are.
   place(meshes = this.moving) {
-    const { geom_xpos, geom_xmat, xpos, xmat } = this.simulation.data;
+    const { geom_xpos: p, geom_xmat: m, xpos, xmat } = this.simulation.data;
     for (const mesh of meshes) {
-      pose(mesh.matrix, geom_xpos, geom_xmat, mesh.userData.geom);
+      const i = mesh.userData.geom;
+      const [a, b] = [3 * i, 9 * i];
+      mesh.matrix.set(
+        m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
+      );
       mesh.matrixWorldNeedsUpdate = true;
     }
-    for (const { skeleton, userData } of this.skins) {
-      skeleton.bones.forEach((bone, k) => {
-        pose(bone.matrix, xpos, xmat, userData.bodies[k]);
-        bone.matrixWorldNeedsUpdate = true;
-      });
-    }
+    for (const skin of this.skins) bend(skin, xpos, xmat);
+  }
+
+  // Return the bounds, from -1 to 1 across the camera's picture, of what moves.
+  movingBounds(camera) {
+    const seen = noBounds();
+    const toPicture = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);
+    const matrix = new THREE.Matrix4();
+    const same = (point) => point;
+    for (const mesh of this.moving) spread(seen, mesh, matrix.multiplyMatrices(toPicture, mesh.matrix), same);
+    for (const skin of this.skins) spread(seen, skin, toPicture, same);
+    return seen;
   }
 
   // Return the bounds of x/z and y/z, in the camera's frame, of the machine in POSES over its range.
@@ -219,8 +248,8 @@ class Machine {
     const { simulation: { mujoco, model, data, plant, s } } = this;
     const kept = data.qpos.slice();
     const toCamera = camera.matrixWorld.clone().invert();
-    const seen = { left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity };
-    const corner = new THREE.Vector3();
+    const toTangents = (point) => point.multiplyScalar(-1 / point.z);
+    const seen = noBounds();
     for (let k = 0; k < POSES; k++) {
       plant.channels.forEach((channel, i) => {
         const reach = channel.unit === "rad" ? Math.PI : Math.abs(s.x0[i]);
@@ -229,17 +258,7 @@ class Machine {
       mujoco.mj_kinematics(model, data);
       this.place(this.meshes);
       for (const mesh of k === 0 ? this.meshes : this.moving) {
-        mesh.geometry.computeBoundingBox();
-        const { min, max } = mesh.geometry.boundingBox;
-        for (let c = 0; c < 8; c++) {
-          corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z);
-          corner.applyMatrix4(mesh.matrix).applyMatrix4(toCamera);
-          const [x, y] = [-corner.x / corner.z, -corner.y / corner.z];
-          seen.left = Math.min(seen.left, x);
-          seen.right = Math.max(seen.right, x);
-          seen.bottom = Math.min(seen.bottom, y);
-          seen.top = Math.max(seen.top, y);
-        }
+        spread(seen, mesh, toCamera.clone().multiply(mesh.matrix), toTangents);
       }
     }
     data.qpos.set(kept);
@@ -253,7 +272,8 @@ export class Stage {
   constructor(canvas) {
     this.canvas = canvas;
     this.slow = software();
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.slow });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.slow, preserveDrawingBuffer: this.slow });
+    canvas.addEventListener("webglcontextrestored", () => this.drawAll());
     this.setGrade(this.slow ? 2 : 0);
     this.renderer.setScissorTest(true);
     this.camera = new THREE.PerspectiveCamera();
@@ -276,6 +296,12 @@ export class Stage {
       machine.floor.material = machine.floors[GRADES[this.grade].shadows ? 0 : 1];
       machine.scene.traverse((each) => each.material && (each.material.needsUpdate = true));
     }
+    this.drawAll();
+  }
+
+  // Let the next picture be drawn as a whole.
+  drawAll() {
+    for (const machine of this.machines ?? []) machine.drawn = null;
   }
 
   // Use the next faster grade if the frames come too slowly; `now` in ms.
@@ -338,19 +364,43 @@ export class Stage {
   draw() {
     const { renderer, canvas } = this;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    renderer.setPixelRatio(Math.min(GRADES[this.grade].ratio, window.devicePixelRatio || 1));
+    const ratio = Math.min(GRADES[this.grade].ratio, window.devicePixelRatio || 1);
     const size = renderer.getSize(new THREE.Vector2());
-    if (size.x !== width || size.y !== height) renderer.setSize(width, height, false);
+    if (size.x !== width || size.y !== height || renderer.getPixelRatio() !== ratio) {
+      renderer.setPixelRatio(ratio);
+      renderer.setSize(width, height, false);
+      this.drawAll();
+    }
     this.parts().forEach((part, i) => {
       const machine = this.machines[i];
       machine.place();
       this.pointArrow(machine);
       this.open(part);
-      const bottom = height - part.y - part.height;
-      renderer.setViewport(part.x, bottom, part.width, part.height);
-      renderer.setScissor(part.x, bottom, part.width, part.height);
+      const box = this.changed(machine, part);
+      if (box === null) return;
+      renderer.setViewport(part.x, height - part.y - part.height, part.width, part.height);
+      renderer.setScissor(box.x, height - box.y - box.height, box.width, box.height);
       renderer.render(machine.scene, this.camera);
     });
+  }
+
+  // Return which box of a machine's part must be drawn, in px: around what moves, where it is and where it was. Without a
+  // GPU, the pixels take the time. With one, the whole part is drawn, because shadows move as well. Null: nothing moved.
+  changed(machine, part) {
+    const { simulation: { step }, arrow: { visible: pulled }, drawn } = machine;
+    if (drawn?.step === step && !drawn.pulled && !pulled) return null;
+    const { left, right, bottom, top } = machine.movingBounds(this.camera);
+    const now = {
+      left: part.x + ((left + 1) / 2) * part.width - PAD, right: part.x + ((right + 1) / 2) * part.width + PAD,
+      top: part.y + ((1 - top) / 2) * part.height - PAD, bottom: part.y + ((1 - bottom) / 2) * part.height + PAD,
+    };
+    machine.drawn = { step, pulled, ...now };
+    if (!this.slow || GRADES[this.grade].shadows || !drawn || drawn.pulled || pulled) return part;
+    const x = Math.max(part.x, Math.floor(Math.min(now.left, drawn.left)));
+    const y = Math.max(part.y, Math.floor(Math.min(now.top, drawn.top)));
+    const width = Math.min(part.x + part.width, Math.ceil(Math.max(now.right, drawn.right))) - x;
+    const height = Math.min(part.y + part.height, Math.ceil(Math.max(now.bottom, drawn.bottom))) - y;
+    return width > 0 && height > 0 ? { x, y, width, height } : null;
   }
 
   // Set the ray of a pointer. Return the index of the machine under it, or of the grabbed one; null for none.

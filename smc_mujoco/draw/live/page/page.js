@@ -119,7 +119,7 @@ function restart() {
   for (const { simulation } of running) simulation.delete();
   const palette = colours();
   running = sides().map((side, i) => ({ side, simulation: simulationOf(side), colour: palette[i] }));
-  for (const each of running) each.history = new History(each.simulation.s.control_period, SECONDS);
+  for (const each of running) each.history = new History(SECONDS);
   stage.show(running.map(({ simulation }) => simulation), palette);
   owed = 0;
   writeNames();
@@ -132,11 +132,6 @@ function change() {
     const simulation = simulationOf(each.side);
     simulation.resume(each.simulation);
     each.simulation.delete();
-    if (simulation.s.control_period !== each.simulation.s.control_period) {
-      const before = each.history;
-      each.history = new History(simulation.s.control_period, SECONDS);
-      before.each((i) => each.history.add({ t: before.t[i], x: [before.x[i], before.q[i]], v: [before.v[i]], u: before.u[i], s: before.s[i] }));
-    }
     each.simulation = simulation;
   }
   stage.swap(running.map(({ simulation }) => simulation));
@@ -146,7 +141,7 @@ function change() {
 function reset() {
   for (const each of running) {
     each.simulation.reset();
-    each.history = new History(each.simulation.s.control_period, SECONDS);
+    each.history = new History(SECONDS);
   }
   owed = 0;
   say("");
@@ -179,17 +174,19 @@ function simulate(seconds) {
 // Return the present curve s = 0 of a simulation in the phase plane: a function of x and of the least and largest v. It
 // returns v, or NaN where s does not change its sign.
 function surfaceOf({ simulation }) {
+  const sliding = simulation.sliding();
   return (x, [low, high]) => {
-    const at = (v) => simulation.slidingAt(x, v);
-    const [first, last] = [at(low), at(high)];
+    const [first, last] = [sliding(x, low), sliding(x, high)];
     if (!(first * last < 0)) return NaN;
-    const small = (s) => Math.abs(s) < 1e-6 * (Math.abs(first) + Math.abs(last));
+    const small = 1e-6 * (Math.abs(first) + Math.abs(last));
     let v = low - (first * (high - low)) / (last - first); // exact where s is linear in v
-    for (let k = 0; k < 40 && !small(at(v)); k++) { // else by halves
-      if (k > 0) [low, high] = at(v) * first > 0 ? [v, high] : [low, v];
+    let s = sliding(x, v);
+    for (let k = 0; k < 40 && !(Math.abs(s) < small); k++) { // else by halves
+      if (k > 0) [low, high] = s * first > 0 ? [v, high] : [low, v];
       v = (low + high) / 2;
+      s = sliding(x, v);
     }
-    return small(at(v)) ? v : NaN;
+    return Math.abs(s) < small ? v : NaN;
   };
 }
 
@@ -197,6 +194,7 @@ function surfaceOf({ simulation }) {
 
 let before = null;
 let frames = [];
+let drawn = 0; // frames
 
 function frame(now) {
   const elapsed = before === null ? 0 : (now - before) / 1000;
@@ -213,6 +211,7 @@ function frame(now) {
   requestAnimationFrame(frame);
 }
 
+// Draw two of the four plots, in turn.
 function plot() {
   const palette = { grid: css("--grid"), muted: css("--muted"), bound: css("--bound") };
   const now = Math.max(...running.map(({ simulation }) => simulation.time));
@@ -221,8 +220,12 @@ function plot() {
   const free = plantFacts().channels.length > 1 ? ["q"] : [];
   const over = (name, levels, height) =>
     overTime($(`plot-${name}`), palette, running, name === "x" ? ["x", ...free] : [name], { now, seconds: SECONDS, levels, least: height });
-  over("x", [reference], 0.4 * least);
-  over("u", [-bound, bound], 0.2 * bound);
+  drawn += 1;
+  if (drawn % 2) {
+    over("x", [reference], 0.4 * least);
+    over("u", [-bound, bound], 0.2 * bound);
+    return;
+  }
   over("s", [0], 0.4 * least);
   const series = running.map((each) => ({ ...each, surface: each.history.count ? surfaceOf(each) : null }));
   phasePlane($("plot-phase"), palette, series, { reference, least: 0.4 * least, unit: plantFacts().channels[0].unit });
@@ -230,7 +233,7 @@ function plot() {
 
 // ---- words
 
-const GREEK = { lam: "λ", alpha: "α", beta: "β", gamma: "γ", delta: "δ", mu: "μ", phi: "φ", eps: "ε", omega: "ω" };
+const GREEK = { lam: "λ", alpha: "α", beta: "β", gamma: "γ", delta: "δ", mu: "μ", phi: "φ", tau: "τ", sigma: "σ", eps: "ε", omega: "ω" };
 
 // Return a formula with Greek letters, exponents, primes and subscripts instead of plain text.
 function pretty(text) {
@@ -242,6 +245,13 @@ function pretty(text) {
 
 function say(text) {
   if ($("status").textContent !== text) $("status").textContent = text;
+}
+
+// Return the name of a side: of its law, and of its surface and velocity estimator where they are chosen.
+function nameOf(side) {
+  const parts = Object.entries(PARTS).filter(([part]) => chosen[side][part]);
+  const names = parts.map(([part, kind]) => facts[kind][chosen[side][part].name].label.toLowerCase());
+  return [facts.laws[chosen[side].law].label, ...names].join(" · ");
 }
 
 // Write the names of plant, laws and quantities.
@@ -258,15 +268,15 @@ function writeNames() {
   SIDES.forEach((side) => {
     const i = running.findIndex((each) => each.side === side);
     const badge = $(`name-${side}`);
-    const twice = i > 0 && chosen.a.law === chosen.b.law;
-    badge.textContent = i < 0 ? "" : facts.laws[chosen[side].law].label + (twice ? ", second" : "");
+    badge.textContent = i < 0 ? "" : nameOf(side);
     $(`law-${side}`).style.setProperty("--law", i < 0 ? "" : running[i].colour);
     if (i < 0) return;
     badge.style.setProperty("--law", running[i].colour);
     badge.style.left = `${parts[i].x + 10}px`;
     badge.style.top = `${parts[i].y + 10}px`;
+    badge.style.maxWidth = `${parts[i].width - 20}px`;
   });
-  const names = running.map(({ side }) => facts.laws[chosen[side].law].label).join(" and ");
+  const names = running.map(({ side }) => nameOf(side)).join(" and ");
   $("machines").setAttribute("aria-label", `${label} under ${names}`);
   document.title = `${label}: ${names}`;
 }
@@ -365,6 +375,7 @@ function partForm(side, part, title) {
   const select = element("select", { id: `${part}-${side}`, onchange: ({ target: { value } }) => {
     chosen[side][part] = value === fallback ? null : { name: value, gains: {} };
     change();
+    writeNames();
     lawForm(side);
     $(`${part}-${side}`).focus();
     toAddress();
@@ -540,6 +551,7 @@ async function begin() {
     facts,
     running: () => running,
     trace: (chosen, duration) => trace(mujoco, vfs, facts, functions, chosen, duration),
+    stage,
     onScreen: (i, geom) => stage.onScreen(i, geom),
   };
   document.documentElement.dataset.ready = "";

@@ -1,27 +1,54 @@
 // Plots of the last seconds of a few simulations, on canvases.
 
 const MARGINS = { left: 46, right: 8, top: 4, bottom: 18 }; // px around the axes
-const CURVE = 60; // parts of the curve s = 0
+const CURVE = 40; // parts of the curve s = 0: chosen
+const BINS = 1000; // parts of a history: chosen, more than a plot has px
+const SIGNALS = ["x", "v", "u", "s", "q"]; // q: position of a free joint
 const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
 
-// The last `seconds` of a simulation's samples, in circular buffers. `period` is the control period, s.
+// The last `seconds` of a simulation, in parts of equal time: of each signal the lowest, highest and last value.
 export class History {
-  constructor(period, seconds) {
-    this.size = Math.ceil(seconds / period) + 1;
-    for (const name of ["t", "x", "v", "u", "s", "q"]) this[name] = new Float64Array(this.size);
-    this.count = 0;
+  constructor(seconds) {
+    this.seconds = seconds;
+    this.t = new Float64Array(BINS + 1); // of the last sample of a part
+    for (const name of SIGNALS) {
+      this[name] = { low: new Float64Array(BINS + 1), high: new Float64Array(BINS + 1), last: new Float64Array(BINS + 1) };
+    }
+    this.count = 0; // of parts with samples
+    this.part = -1; // of the last sample
   }
 
-  add(sample) {
-    const i = this.count % this.size;
-    [this.t[i], this.u[i], this.s[i]] = [sample.t, sample.u, sample.s];
-    [this.x[i], this.v[i], this.q[i]] = [sample.x[0], sample.v[0], sample.x[1] ?? 0]; // q: of a free joint
-    this.count += 1;
+  add({ t, x, v, u, s }) {
+    const part = Math.floor((t * BINS) / this.seconds + 1e-9);
+    const fresh = part !== this.part;
+    if (fresh) this.count += 1;
+    this.part = part;
+    const i = this.latest;
+    this.t[i] = t;
+    const put = ({ low, high, last }, value) => {
+      last[i] = value;
+      if (fresh || value < low[i]) low[i] = value;
+      if (fresh || value > high[i]) high[i] = value;
+    };
+    put(this.x, x[0]);
+    put(this.v, v[0]);
+    put(this.u, u);
+    put(this.s, s);
+    put(this.q, x[1] ?? 0);
   }
 
-  // Call f(i) with the index of each sample, the oldest first.
+  // The index of the last part.
+  get latest() {
+    return (this.count - 1) % (BINS + 1);
+  }
+
+  // Call f(i) with the index of each part, the oldest first.
   each(f) {
-    for (let k = Math.max(0, this.count - this.size); k < this.count; k++) f(k % this.size);
+    const begin = this.t[this.latest] - this.seconds;
+    for (let k = Math.max(0, this.count - BINS - 1); k < this.count; k++) {
+      const i = k % (BINS + 1);
+      if (this.t[i] >= begin) f(i);
+    }
   }
 }
 
@@ -97,27 +124,19 @@ function line(pen, points) {
   pen.stroke();
 }
 
-// Draw a signal: a column of pixels shows the lowest and highest of its samples, so that chattering is drawn whole.
+// Draw a signal: each part of the history from its lowest to its highest value, so that chattering is drawn whole.
 function curve(pen, place, history, name) {
-  let [column, least, most, last] = [null, 0, 0, 0];
-  const finish = () => {
-    if (column === null) return;
-    pen.lineTo(column, least);
-    if (most !== least) pen.lineTo(column, most);
-    pen.lineTo(column, last);
-  };
+  const { low, high, last } = history[name];
   pen.beginPath();
   history.each((i) => {
-    const [x, y] = [Math.round(place.x(history.t[i]) * 2) / 2, place.y(history[name][i])];
-    if (x !== column) {
-      finish();
-      [column, least, most] = [x, y, y];
+    const x = place.x(history.t[i]);
+    const [lowest, highest] = [place.y(low[i]), place.y(high[i])];
+    if (lowest - highest > 1) {
+      pen.lineTo(x, lowest);
+      pen.lineTo(x, highest);
     }
-    least = Math.min(least, y);
-    most = Math.max(most, y);
-    last = y;
+    pen.lineTo(x, place.y(last[i]));
   });
-  finish();
   pen.stroke();
 }
 
@@ -129,9 +148,8 @@ export function overTime(canvas, colours, series, names, { now, seconds, levels 
   for (const { history } of series) {
     for (const name of names) {
       history.each((i) => {
-        const value = history[name][i];
-        if (value < low) low = value;
-        if (value > high) high = value;
+        low = Math.min(low, history[name].low[i]);
+        high = Math.max(high, history[name].high[i]);
       });
     }
   }
@@ -164,8 +182,8 @@ export function phasePlane(canvas, colours, series, { reference, least, unit }) 
   for (const { history } of series) {
     history.each((i) => {
       for (const name of ["x", "v"]) {
-        range[name][0] = Math.min(range[name][0], history[name][i]);
-        range[name][1] = Math.max(range[name][1], history[name][i]);
+        range[name][0] = Math.min(range[name][0], history[name].low[i]);
+        range[name][1] = Math.max(range[name][1], history[name].high[i]);
       }
     });
   }
@@ -202,15 +220,13 @@ export function phasePlane(canvas, colours, series, { reference, least, unit }) 
   line(pen, [[place.x(reference), place.y(0) - 4], [place.x(reference), place.y(0) + 4]]);
   for (const { history, colour } of series) {
     if (history.count === 0) continue;
-    const every = Math.max(1, Math.floor(Math.min(history.count, history.size) / 2500));
     pen.strokeStyle = pen.fillStyle = colour;
     pen.beginPath();
-    let k = 0;
-    history.each((i) => k++ % every === 0 && pen.lineTo(place.x(history.x[i]), place.y(history.v[i])));
+    const { x: { last: x }, v: { last: v }, latest } = history;
+    history.each((i) => pen.lineTo(place.x(x[i]), place.y(v[i])));
     pen.stroke();
-    const end = (history.count - 1) % history.size;
     pen.beginPath();
-    pen.arc(place.x(history.x[end]), place.y(history.v[end]), 4.5, 0, 7);
+    pen.arc(place.x(x[latest]), place.y(v[latest]), 4.5, 0, 7);
     pen.fill();
   }
   pen.restore();
