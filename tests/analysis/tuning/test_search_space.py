@@ -134,11 +134,3 @@ def test_a_unit_follows_the_exponent_that_a_law_was_given():
     for a in (0.25, 0.75):
         low, high = search_space.box(smc.law("power_rate", a=a), scales)["k"]
         assert math.sqrt(low * high) == pytest.approx(6.0 / (2.0 / 0.5) ** a)
-
-
-def test_the_scales_of_a_mass_are_its_force_way_mass_and_time():
-    """x'' = u / M: u_max moves it from rest by X / 2 within T."""
-    heavy = smc.plant("duffing", M=2.0)
-    scales = search_space.scales(heavy, u_max=3.0, with_model=False, reach=0.5)
-    assert scales == pytest.approx({"F": 3.0, "X": 0.5, "M": 2.0, "T": math.sqrt(0.5 * 2.0 / 3.0)})
-    assert search_space.scales(heavy, u_max=3.0, with_model=True, reach=0.5) == pytest.approx(scales | {"F": 1.5})
