@@ -3,8 +3,7 @@
 While the arm sways, the forearm is hit from the side at 1 s: 400 N for 20 ms, an impulse of 5 N s. Friction is that
 identified on a real Panda; no law sees the blow coming.
 
-Look for: the bars at 1 s, which jump for as long as the blow lasts; and the last panel, which shows how far the tip is
-thrown and how it comes back.
+Look for: the arrow at 1 s, which is the blow; and how far the tip is thrown, and how it comes back.
 """
 
 import smc_mujoco as smc

@@ -5,6 +5,7 @@ joints([trace, other], "joints.svg", labels=["computed torque", "passivity"])
 
 import os
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,15 +13,24 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
-from smc_mujoco.draw.decimate import finite
+from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Size
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
-COLUMNS, ROW = 3, 1.75  # panels in a row; inches on a full page
-ALONE = 8.0  # times the errors of all other runs: a run so far off leaves the panel instead of flattening them; chosen
+WIDE, SLIM = (4, 3), (2, 3)  # panels in a row of a page, and of a narrow one: the number that leaves fewer cells empty
+ROW = 2.0  # inches on a full page
+LEAVING = 0.6  # points, width of a curve that leaves its panel
+CONTACT = "force of contact (N)"
+
+
+class Quantity(NamedTuple):
+    """What a panel shows: its title, and its values in a trace, (K + 1,)."""
+
+    title: str
+    of: Callable[[Trace], np.ndarray]
 
 
 def joints(
@@ -35,7 +45,7 @@ def joints(
     """Draw the error of every joint over time, a panel each, and what the tip does.
 
     The tip's panels are its distance from where the references want it, and the normal force if it touches something,
-    with bars at the bottom where a contact is lost.
+    with bars at the bottom where a contact is lost. A blow and a change of the arm are marked by dotted lines.
 
     Args:
       traces: of one plant.
@@ -49,58 +59,75 @@ def joints(
     """
     traces = [finite(trace) for trace in style.same_plant(traces)]
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
-    plant = traces[0].scenario.plant
-    panels: list[tuple[str, Callable[[Trace], np.ndarray]]] = [
-        (f"{name} ({'mrad' if unit == 'rad' else 'mm'})", lambda trace, i=i: 1e3 * (trace.x - trace.r)[:, i])
-        for i, (name, unit) in enumerate(zip(joint_names(plant), plant.units, strict=True))
-    ]
-    if plant.tip:
-        panels.append(("tip, distance (mm)", lambda trace: 1e3 * tip.tip_error(trace)))
-    touching = all(trace.scenario.contact.kind != "none" for trace in traces)
-    if touching:
-        panels.append(("contact, normal force (N)", lambda trace: tip.contacts(trace).force))
+    plant, shown = traces[0].scenario.plant, quantities(traces)
+    marks = style.jumps(traces, names) | style.blows(traces)
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
-    rows = -(-len(panels) // COLUMNS)
+    columns = min(SLIM if width < pages.NARROW else WIDE, key=lambda n: -len(shown) % n)
+    rows = -(-len(shown) // columns)
     with style.page(width):
         page = pages.blank(width, height or style.points(ROW * rows + 0.9), fig)
-        grid = page.subplots(rows, COLUMNS, sharex=True, squeeze=False)
-        for ax, (label, quantity) in zip(grid.flat, panels, strict=False):
-            sizes = []
-            for k, (trace, colour) in enumerate(zip(traces, colours, strict=True)):
-                values = quantity(trace)
-                sizes.append((float(np.abs(values).max()), values.min(), values.max()))
-                ax.plot(trace.t, values, color=colour, lw=style.points(1.5), zorder=3 - 0.1 * k)
-                if label.startswith("contact"):
-                    mark_losses(ax, trace.t, values, colour, k)
-            ax.set_title(label, fontsize=style.points(10.0))
-            ax.margins(0.0, 0.08)
-            keep_within(ax, sizes)
-        for ax in grid.flat[len(panels) :]:
-            ax.set_visible(False)
-        last = [grid[max(row for row in range(rows) if row * COLUMNS + j < len(panels)), j] for j in range(COLUMNS)]
-        for ax in last:
-            ax.set_xlabel("time (s)")
-            ax.tick_params(labelbottom=True)
+        grid = page.subplots(rows, columns, sharex=True, squeeze=False)
+        for ax, quantity in zip(grid.flat, shown, strict=False):
+            draw(ax, quantity, traces, names, colours)
+            panels.jumps(ax, marks, named=False)
+        for k, ax in enumerate(grid.flat):
+            ax.set_visible(k < len(shown))
+            if k + columns >= len(shown):
+                ax.set_xlabel("time (s)")
+                ax.tick_params(labelbottom=True)
         handles = [
             Line2D([], [], color=colour, lw=style.points(3.0), label=name)
             for name, colour in zip(names, colours, strict=True)
         ]
+        dotted = {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
+        handles += [Line2D([], [], **dotted, label=f"{what} at {time:g} s") for time, what in sorted(marks.items())]
         pages.set_head(page, width, title or style.plant_name(plant), handles)
         pages.write(page, paths)
     return page
 
 
-def keep_within(ax: Axes, sizes: list[tuple[float, float, float]]) -> None:
-    """Let one run that is far off leave the panel, and say so. Sizes: largest |y|, least and largest y of each run."""
-    *others, largest = sorted(sizes)
-    if others and largest[0] > ALONE * others[-1][0] > 0.0:
-        low, high = min(one[1] for one in others), max(one[2] for one in others)
-        room = 0.3 * (high - low)
-        ax.set_ylim(low - room, high + room)
-        place = {"xytext": (-3, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
-        text = f"one run: up to {style.short(largest[0])}"
-        ax.annotate(text, (1.0, 1.0), xycoords="axes fraction", fontsize=style.points(8.0), color=style.MUTED, **place)
+def quantities(traces: Sequence[Trace]) -> list[Quantity]:
+    """Return what the panels show: the error of each joint, and what the tip does."""
+    plant = traces[0].scenario.plant
+    found = [
+        Quantity(
+            f"{name}, error ({'mrad' if unit == 'rad' else 'mm'})", lambda trace, i=i: 1e3 * (trace.x - trace.r)[:, i]
+        )
+        for i, (name, unit) in enumerate(zip(joint_names(plant), plant.units, strict=True))
+    ]
+    if plant.tip:
+        found.append(Quantity("tip off its path (mm)", lambda trace: 1e3 * tip.tip_error(trace)))
+    if all(tip.knows_contacts(trace.scenario) for trace in traces):
+        found.append(Quantity(CONTACT, lambda trace: tip.contacts(trace).force))
+    return found
+
+
+def draw(ax: Axes, quantity: Quantity, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> None:
+    """Draw a panel. Curves that lie on each other are dashed in turn; a run far off leaves the panel, which says so."""
+    values = [quantity.of(trace) for trace in traces]
+    sizes = [float(np.abs(one).max()) for one in values]
+    away = panels.far_off(sizes)
+    usual = [one for k, one in enumerate(values) if k != away]
+    low, high = min(one.min() for one in usual), max(one.max() for one in usual)
+    air = 0.08 * (high - low) or 1.0
+    ax.set_ylim(low - air, high + air * (1.0 if away is None else 4.0))
+    ax.set_xlim(0.0, end(traces))
+    lines = [(trace.t, one) for trace, one in zip(traces, values, strict=True)]
+    dashes = panels.dashes(lines, ax.get_ylim())
+    for k, ((t, one), colour, dash) in enumerate(zip(lines, colours, dashes, strict=True)):
+        width = LEAVING if k == away else panels.LINE
+        ax.plot(t, one, color=colour, lw=style.points(width), ls=dash, zorder=3 - 0.1 * k)
+        if quantity.title == CONTACT:
+            mark_losses(ax, t, one, colour, k)
+    ax.set_title(quantity.title, fontsize=style.points(10.0))
+    if away is not None:
+        room = 72 * ax.get_position().width * ax.figure.bbox.width / ax.figure.dpi
+        size = style.points(8.5)
+        most = f": up to {style.short(sizes[away])}"
+        words = style.cropped(names[away], 0.95 * room - style.width(most, size), size) + most
+        look = {"fontsize": size, "color": colours[away], "ha": "right", "va": "top", "parse_math": False}
+        ax.annotate(words, (1.0, 1.0), (-2, -1), "axes fraction", "offset points", **look)
 
 
 def mark_losses(ax: Axes, t: np.ndarray, force: np.ndarray, colour: str, row: int) -> None:

@@ -21,6 +21,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
+from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
 from smc_mujoco.simulation.signals import PerChannel
@@ -43,7 +44,13 @@ SMALL = 0.03  # of a unit: axes with smaller values show thousandths, such as mm
 TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
-UNBANDED = ("x", "e", "spread")  # drawn sample by sample, without a mean over time
+OF_ARMS = {  # quantities of arms, one number a sample -> what an axis says
+    "tip": "tip off its path (mm)",
+    "contact": "force of contact (N)",
+    "worst": "largest error of a joint",
+}
+UNBANDED = ("x", "e", "spread", *OF_ARMS)  # drawn sample by sample, without a mean over time
+ALONE = 8.0  # times the errors of all other runs: a run so far off leaves the panel instead of flattening them; chosen
 
 REFERENCE, BACKLASH = "reference", "backlash"  # ids of a reference's lines, and of a gear's play
 PLAY = 0.16  # opacity of a gear's play around the reference
@@ -59,6 +66,9 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "force": lambda trace: trace.force,
     "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
+    "tip": lambda trace: 1e3 * tip.tip_error(trace)[:, None],
+    "contact": lambda trace: tip.contacts(trace).force[:, None],
+    "worst": lambda trace: 1e3 * np.abs(trace.x - trace.r).max(axis=1, keepdims=True),
 }
 
 
@@ -74,7 +84,7 @@ class Panel(NamedTuple):
     def thousandths(self) -> bool:
         """Whether its axis shows thousandths of the unit, as all its values are small."""
         largest = max(map(abs, span(self.traces, self.quantity)))
-        return 0.0 < largest < SMALL and not self.unitless
+        return 0.0 < largest < SMALL and not self.unitless and self.quantity not in OF_ARMS
 
     @property
     def unitless(self) -> bool:
@@ -87,13 +97,13 @@ class Panel(NamedTuple):
     def label(self) -> str:
         """The label of the vertical axis, with its unit."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
+        if name in OF_ARMS:
+            return OF_ARMS[name] + (f" (m{group.unit})" if name == "worst" else "")
         mean = "mean " * (len(group.channels) > 1)
         alike = {"spread": "x", "e": "x", "reaction": "force", "d": "force", "applied": "u"}
         unit = f" ({'m' * self.thousandths}{style.units(group)[alike.get(name, name)]})"
-        if self.channel is not None:
-            return f"{name}{self.channel}{unit}"
-        if name == "spread":
-            return f"max − min x{unit}"
+        if self.channel is not None or name == "spread":
+            return f"{'max − min x' if name == 'spread' else f'{name}{self.channel}'}{unit}"
         if name in REALISM:
             return f"{mean}{'delivered' if name == 'force' else 'reaction'}{' on q' * (not group.driven)}{unit}"
         if self.unitless:
@@ -140,14 +150,22 @@ def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, Panel]]:
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels below a film, from left to right: x of each group of channels, and u of the driven ones."""
+    """Return the panels below a film, from left to right: x of each group of channels, and u of the driven ones.
+
+    Of arms: how far the tip is off its path, and the force of its contact, or else the largest error of a joint.
+    """
     groups = style.split(traces).items()
+    if all(trace.scenario.plant.tip for trace in traces):
+        one, first = Panel("tip", next(iter(groups))[0], traces), next(iter(groups))[0]
+        if all(tip.knows_contacts(trace.scenario) for trace in traces):
+            return [one, Panel("contact", first, traces)]
+        return [one, *(Panel("worst", *each) for each in groups if each[0].driven)]
     return [Panel("x", *each) for each in groups] + [Panel("u", *each) for each in groups if each[0].driven]
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     """Return the meaning of bands and lines that need an explanation: "play", "band", "line", "light" -> words."""
-    n = max(len(panel.group.channels) for panel in panels)
+    n = max((len(panel.group.channels) for panel in panels if panel.quantity not in OF_ARMS), default=1)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
     over, single, words = max(filter(None, windows), default=None), len(light(n)), {}
@@ -444,6 +462,21 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[keep], v[keep]
 
 
+def far_off(sizes: Sequence[float]) -> int | None:
+    """Return the index of the run, by their largest |y|, that is so far off that a panel shows the others; or None."""
+    if len(sizes) < 2:
+        return None
+    *_, second, largest = np.argsort(sizes).tolist()
+    return largest if sizes[largest] > ALONE * sizes[second] > 0.0 else None
+
+
+def outside(panel: Panel, names: Sequence[str]) -> str:
+    """Return which run leaves a panel of an arm and how far, such as "Time-delay sliding: up to 310"; else ""."""
+    sizes = [float(np.nanmax(np.abs(QUANTITIES[panel.quantity](trace)))) for trace in panel.traces]
+    away = far_off(sizes) if panel.quantity in OF_ARMS else None
+    return "" if away is None else f"{names[away]}: up to {style.short(sizes[away])}"
+
+
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     """Return the least and largest value of successful runs; if there are none, of failed ones without their ends."""
     seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
@@ -451,6 +484,8 @@ def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
         y = QUANTITIES[name](trace)
         seen.append(y[: max(1, int(0.8 * len(y)))] if trace.plant_diverged else y)
     seen = [y for y in seen if np.isfinite(y).all()] or [np.zeros(1)]
+    if name in OF_ARMS and (away := far_off([float(np.abs(y).max()) for y in seen])) is not None:
+        del seen[away]
     return float(min(y.min() for y in seen)), float(max(y.max() for y in seen))
 
 

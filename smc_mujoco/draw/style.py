@@ -23,6 +23,7 @@ from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation.perturbations import Jump
+from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.trace import Trace
 
 # Colours of laws that state none. Chosen from a grid as the farthest in CIEDE2000 from the stated ones, from each other
@@ -279,13 +280,28 @@ def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
         if jump := trace.scenario.jump:
             added = trace.scenario.plant.added
             words = ", ".join(
-                f"{what} {'+' if what in added else '×'} {factor:.3g}" for what, factor in jump.factors.items()
+                f"{what} + {factor:.3g} {added[what]}" if what in added else f"{what} × {factor:.3g}"
+                for what, factor in jump.factors.items()
             )
             found.setdefault((jump.time, words), []).append(name)
     changes: dict[float, list[str]] = {}
     for (time, words), who in sorted(found.items()):
         changes.setdefault(time, []).append(words if len(who) == len(traces) else f"{', '.join(who)}: {words}")
     return {time: "; ".join(parts) for time, parts in changes.items()}
+
+
+def pushes(traces: Sequence[Trace]) -> list[Push]:
+    """Return the blows on the bodies of arms."""
+    arms = [trace.scenario for trace in traces if trace.scenario.plant.tip]
+    return [push for scenario in arms for push in scenario.disturbance if isinstance(push, Push)]
+
+
+def blows(traces: Sequence[Trace]) -> dict[float, str]:
+    """Return the blows on the bodies of arms, time in s -> "blow of 400 N for 20 ms"."""
+    found = {}
+    for push in pushes(traces):
+        found[push.time] = f"blow of {short(math.hypot(push.x, push.y, push.z))} N for {1e3 * push.width:.3g} ms"
+    return found
 
 
 @functools.cache

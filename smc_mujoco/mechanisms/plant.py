@@ -115,8 +115,8 @@ class Plant:
       name: as in `smc.plants()`.
       parameters: name -> value, SI units; the nominal ones, which laws may know.
       mass: parameter that is meant by "mass" in a mismatch or a jump.
-      added: names of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its number to
-        such a parameter, in the parameter's unit, instead of multiplying it.
+      added: name -> unit of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
+        number to such a parameter, in this unit, instead of multiplying it.
       unit: unit of x, "rad" or "m"; that of the first channel if they differ.
       mixed: units of all channels if they differ, (n,), else (); `units` has them in both cases.
       x0: default initial positions, those of the paper study, (n,).
@@ -163,7 +163,7 @@ class Plant:
     underactuated: bool = False
     goal: tuple[float, ...] = ()
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    added: tuple[str, ...] = ()
+    added: Mapping[str, str] = dataclasses.field(default_factory=dict)
     direct: bool = False
     smooth: bool = True
     dry: tuple[str, ...] = ()
@@ -178,7 +178,7 @@ class Plant:
     suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
-        for name in ("parameters", "contacts", "mechanisms", "placed"):
+        for name in ("parameters", "contacts", "mechanisms", "placed", "added"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "jumps", frozen({size: frozen(factors) for size, factors in self.jumps.items()}))
 

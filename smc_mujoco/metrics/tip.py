@@ -10,7 +10,10 @@ backlash. The state of a friction does not matter: a sliding contact's spring ca
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+import functools
+import weakref
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
@@ -24,7 +27,10 @@ from smc_mujoco.simulation import model as assembly
 
 if TYPE_CHECKING:
     from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
+
+V = TypeVar("V")
 
 SETTLED = (
     0.2  # of a run, after which forces of contact are scored: chosen; the tip has touched, and the force has risen
@@ -37,10 +43,25 @@ class Contacts(NamedTuple):
     Attributes:
       force: sum of the normal forces, (K + 1,) N; 0 without contact.
       depth: of the deepest, (K + 1,) m; 0 without contact.
+      push: on the arm, the normal forces as a vector in space, (K + 1, 3) N.
     """
 
     force: np.ndarray
     depth: np.ndarray
+    push: np.ndarray
+
+
+def kept(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
+    """Keep what a function returns of a trace as long as the trace: tables, figures and films all ask for it."""
+    found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
+
+    @functools.wraps(function)
+    def ask(trace: Trace) -> V:
+        if trace not in found:
+            found[trace] = function(trace)
+        return found[trace]
+
+    return ask
 
 
 def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
@@ -62,14 +83,34 @@ def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
     return found
 
 
+@kept
+def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the tip is and where it is wanted, (K + 1, 3) m each, read-only. Raises like `tip_path`."""
+    paths = tip_path(trace.scenario.plant, trace.x), tip_path(trace.scenario.plant, trace.r)
+    for path in paths:
+        path.flags.writeable = False
+    return paths
+
+
 def tip_error(trace: Trace) -> np.ndarray:
     """Return how far the tip is from where the references want it, (K + 1,) m. Raises like `tip_path`."""
-    plant = trace.scenario.plant
-    return np.linalg.norm(tip_path(plant, trace.x) - tip_path(plant, trace.r), axis=1)
+    is_, wanted = tip_paths(trace)
+    return np.linalg.norm(is_ - wanted, axis=1)
 
 
+def knows_contacts(scenario: Scenario) -> bool:
+    """Return whether a run has contacts, and a trace all that their forces depend on."""
+    return scenario.contact.kind != "none" and not _unknown(scenario)
+
+
+def _unknown(scenario: Scenario) -> list:
+    """Return the actuators with a state that a trace lacks."""
+    return [part for part in scenario.actuator if part.stateful or not part.drives]
+
+
+@kept
 def contacts(trace: Trace) -> Contacts:
-    """Return the normal forces and depths of a run's contacts.
+    """Return the normal forces and depths of a run's contacts, read-only.
 
     Raises:
       ScenarioError: the scenario has no contact, or an actuator with a state that a trace lacks.
@@ -77,14 +118,15 @@ def contacts(trace: Trace) -> Contacts:
     scenario = trace.scenario.resolved
     if scenario.contact.kind == "none":
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
-    if unknown := [part for part in scenario.actuator if part.stateful or not part.drives]:
+    if unknown := _unknown(scenario):
         raise ScenarioError(f"the state of {type(unknown[0]).__name__} is not in a trace, so its contacts are unknown")
     compiled = assembly.model([scenario])
     model = assembly.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
-    found, wrench = Contacts(*np.zeros((2, len(trace.t)))), np.zeros(6)
+    found, wrench = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3))), np.zeros(6)
+    moves = model.body_weldid[model.geom_bodyid] != 0
     data.qpos[:] = assembly.initial_pose(model)
     jump = None if scenario.jump is None else -(-scenario.jump_step // scenario.steps)  # its first sample
     for k in range(len(trace.t)):
@@ -99,6 +141,10 @@ def contacts(trace: Trace) -> Contacts:
             mujoco.mj_contactForce(model, data, i, wrench)
             found.force[k] += wrench[0]
             found.depth[k] = max(found.depth[k], -data.contact.dist[i])
+            one, other = moves[data.contact.geom[i]].astype(float)  # the normal points from the first to the other
+            found.push[k] += (other - one) * wrench[0] * data.contact.frame[i, :3]
+    for values in found:
+        values.flags.writeable = False
     return found
 
 

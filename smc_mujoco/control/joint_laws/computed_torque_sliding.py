@@ -23,6 +23,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, SPEED, Gain
         "c": Gain(5.0, RATE, positive=True),
         "width": Gain(0.1, SPEED, positive=True),
     },
+    label="Computed-torque sliding",
 )
 def computed_torque_sliding(y, gains, memory):
     s = y.de + gains.c * y.e

@@ -46,6 +46,7 @@ from smc_mujoco.control.units import ACCELERATION, FORCE, RATE, SPEED, Gain, Uni
         "f2": Gain(0.0, Unit(position=-1, time=1), held=True),
         "f3": Gain(0.0, SPEED, held=True),
     },
+    label="Hybrid of position and force",
 )
 def hybrid_sliding(y, gains, memory):
     n = np.array([gains.nx, gains.ny, gains.nz]) / math.sqrt(gains.nx**2 + gains.ny**2 + gains.nz**2)

@@ -23,6 +23,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     family="observer-free",
     continuous=True,
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
+    label="Observer-free (every joint)",
     colour="#0072B2",
 )
 def observer_free_joint(y, gains, memory):

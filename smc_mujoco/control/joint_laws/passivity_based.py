@@ -30,6 +30,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_SPEED, RATE, SPEED, Gain
         "c": Gain(5.0, RATE, positive=True),
         "width": Gain(0.1, SPEED, positive=True),
     },
+    label="Passivity-based",
 )
 def passivity_based(y, gains, memory):
     s = y.de + gains.c * y.e

@@ -33,6 +33,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
         "c": Gain(5.0, RATE, positive=True),
         "w_max": Gain(math.inf, ACCELERATION, nonnegative=True, held=True),
     },
+    label="Super-twisting computed torque",
     memory=1,
 )
 def super_twisting_computed_torque(y, gains, memory):

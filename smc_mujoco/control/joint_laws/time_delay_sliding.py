@@ -34,6 +34,7 @@ from smc_mujoco.control.units import ACCELERATION, INERTIA, RATE, SPEED, Gain
         "c": Gain(5.0, RATE, positive=True),
         "width": Gain(0.1, SPEED, positive=True),
     },
+    label="Time-delay sliding",
     memory=3,  # last command, last velocity, whether there was one
 )
 def time_delay_sliding(y, gains, memory):
