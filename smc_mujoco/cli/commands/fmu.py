@@ -32,6 +32,7 @@ def export_fmu(
         typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as needed."),
     ] = None,
     joint: Annotated[str, typer.Option(metavar="hinge|slide", help="Units: rad and N m, or m and N.")] = "hinge",
+    joints: options.Joints = None,
     binary: Annotated[bool, typer.Option(help="Whether to compile a binary for this machine.")] = True,
     out: Annotated[Path | None, typer.Option(help="The file to write; default the law's name with .fmu.")] = None,
 ) -> None:
@@ -41,6 +42,10 @@ def export_fmu(
     estimator replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s. All gains are
     tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
     it gives the bits of `smc-mujoco run`.
+
+    A law of many joints has a variable for each element: x[1], x[2], M[1,1]. Its inputs are also those of M, h, g, the
+    matrix C of Coriolis forces and the tip's Jacobian J that it reads. Its gains may have one value for each joint, as
+    in --gains "k=8 20 15,c=5".
 
     Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
     """
@@ -57,7 +62,9 @@ def export_fmu(
         "velocity": velocity
         and options.component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
     }
-    path = export(chosen, out, **parts, control_period=period, u_max=u_max, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
+    numbers = {"control_period": period, "u_max": u_max, "joints": joints}
+    with options.joints_as_option():
+        path = export(chosen, out, **parts, **numbers, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
     print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
 
 

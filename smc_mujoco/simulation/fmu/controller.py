@@ -11,12 +11,13 @@ import dataclasses
 import math
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.control.c import export
+from smc_mujoco.control.c.joint_translate import JOINTS
 from smc_mujoco.control.c.translate import plain
-from smc_mujoco.control.component import Component
+from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
@@ -40,9 +41,10 @@ INPUTS: dict[str, tuple[Unit | None, str]] = {
     "gq": (None, "nominal gq of q'' = fq + gq u"),
 }
 ALWAYS = ("x", "r", "dr")  # inputs of every FMU
+OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
     "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
-    "smc_law_real", "smc_law_degree", "smc_law_modelled",
+    "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared",
 )  # fmt: skip
 
 
@@ -70,21 +72,23 @@ class Variable(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Controller:
-    """A law with all that it needs to control one joint.
+    """A law with all that it needs to control one joint, or many.
 
     Attributes:
-      law, surface, estimator: components of one channel; None for the law's own surface, or a measured velocity.
+      law, surface, estimator: components; None for the law's own surface, or a measured velocity.
       period: control period, s.
-      u_max: bound on |u|; may be infinite.
-      modelled: whether the law reads the nominal f and g.
+      u_max: bound on |u| of each joint; may be infinite.
+      modelled: whether the law reads the nominal model.
+      joints: how many joints a law of many joints has; 0 for a law of one channel.
     """
 
     law: Law
     surface: Surface | None
     estimator: Estimator | None
     period: float
-    u_max: float
+    u_max: tuple[float, ...]
     modelled: bool
+    joints: int = 0
 
     @property
     def parts(self) -> dict[str, Component]:
@@ -98,14 +102,16 @@ class Controller:
         Raises:
           ScenarioError: one uses Python without translation into C.
         """
-        return {kind: export.translated(part) for kind, part in self.parts.items()}
+        return {
+            kind: export.translated(part, joints=self.joints if kind == "law" else 0)
+            for kind, part in self.parts.items()
+        }
 
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
     """Return the variables in the order of their value references."""
-    read = {name for _, text in code.values() for name in re.findall(r"\by->(\w+)", text)}
-    wanted = [name for name in INPUTS if name in ALWAYS or name in _needed(controller, code, read)]
-    inputs = [Variable(name, "SMC_INPUT", INPUTS[name][1], INPUTS[name][0]) for name in wanted]
+    wanted = {*ALWAYS, *_needed(controller, code, reads(code.values()))}
+    inputs = [Variable(name, "SMC_INPUT", words, unit) for name, (unit, words) in INPUTS.items() if name in wanted]
     computed = [
         Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE),
         Variable("s", "SMC_COMPUTED", "sliding variable"),
@@ -114,10 +120,9 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
         computed.append(Variable("v_eq", "SMC_COMPUTED", "acceleration of the error that keeps s constant"))
     if controller.estimator:
         computed.append(Variable("v_estimated", "SMC_COMPUTED", "estimated velocity", SPEED))
-    bound = controller.u_max if math.isfinite(controller.u_max) else UNBOUNDED
-    parameters = [Variable("u_max", "SMC_PARAMETER", "bound on the magnitude of u", FORCE, bound, 0.0, True)]
+    parameters = [bounded("u_max", "u", controller.u_max[0])]
     for kind, part in controller.parts.items():
-        parameters += _gains(kind, part)
+        parameters += [parameter(kind, part, name, value) for name, value in part.gains.items()]
     period = Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period)
     memory = [
         Variable(f"{kind}.memory[{i + 1}]", "SMC_STATE", f"number {i + 1} of the memory of the {kind}")
@@ -130,7 +135,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
 
 def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: set[str]) -> Iterator[str]:
     """Yield the inputs that the functions read, beside those of every FMU."""
-    if controller.estimator is None or "y->v" in re.findall(r"y->\w+", code["estimator"][1]):
+    if controller.estimator is None or "v" in reads([code["estimator"]]):
         yield "v"
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
         yield "ddr"
@@ -139,20 +144,27 @@ def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: s
     yield from read & {"q", "dq"}
 
 
-def _gains(kind: str, part: Component) -> Iterator[Variable]:
-    """Yield the gains of a component as parameters."""
-    template = part.template
-    for name, value in part.gains.items():
-        gain = template.gains[name] if template and name in template.gains else None
-        unit = gain.unit_at(part.gains) if gain else None
-        positive, least = (
-            bool(gain and gain.positive),
-            0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf,
-        )
-        limits = ", greater than 0" if positive else ", at least 0" if least == 0.0 else ""
-        finite = value if math.isfinite(value) else math.copysign(UNBOUNDED, value)
-        words = f"gain {name} of the {kind} {part.name}{limits}"
-        yield Variable(f"{kind}.{plain(name)}", "SMC_PARAMETER", words, unit, finite, least, positive)
+def reads(code: Iterable[tuple[int, str]]) -> set[str]:
+    """Return the fields of the measurement that some functions read."""
+    return {name for _, text in code for name in re.findall(r"\by->(\w+)", text)}
+
+
+def bounded(name: str, what: str, bound: float) -> Variable:
+    """Return the parameter that bounds the magnitude of a command."""
+    start = bound if math.isfinite(bound) else UNBOUNDED
+    return Variable(name, "SMC_PARAMETER", f"bound on the magnitude of {what}", FORCE, start, 0.0, True)
+
+
+def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
+    """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
+    gain = part.template.gains[name] if part.template and name in part.template.gains else None
+    unit = gain.unit_at({key: at(one, 0) for key, one in part.gains.items()}) if gain else None
+    positive = bool(gain and gain.positive)
+    least = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
+    limits = ", greater than 0" if positive else ", at least 0" if least == 0.0 else ""
+    finite = value if math.isfinite(value) else math.copysign(UNBOUNDED, value)
+    words = f"gain {name} of the {kind} {part.name}{limits}"
+    return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, least, positive)
 
 
 # C
@@ -174,6 +186,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
         "/* own names, so that several FMUs can be linked into one program */",
         *(f"#define {name} {identifier}_{name}" for name in SYMBOLS),
         "",
+        *([f"#define {JOINTS} {controller.joints}"] if controller.joints else []),
         '#include "smc_fmu.h"',
         "",
         f'#define SMC_TOKEN "{token}"',
@@ -191,8 +204,13 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
     return "\n".join(lines)
 
 
-def source(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> str:
-    """Return controller.c: the table of variables, and the function that runs all parts at a sample."""
+def source(listed: Sequence[Variable], helpers: Iterable[str], body: Iterable[str]) -> str:
+    """Return controller.c: the table of variables, and the function that runs all parts at a sample.
+
+    Args:
+      helpers: lines of functions before that one.
+      body: its statements, without indentation.
+    """
     lines = [
         "/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */",
         '#include "controller.h"',
@@ -214,55 +232,58 @@ def source(listed: Sequence[Variable], controller: Controller, code: Mapping[str
         "    return x >= DBL_MAX ? INFINITY : x <= -DBL_MAX ? -INFINITY : x;",
         "}",
         "",
+        *helpers,
         "int smc_controller(double *value, double t)",
         "{",
-        *(f"    {line}" for line in _body({one.name: f"value[{place(one.name)}]" for one in listed}, controller, code)),
+        *(f"    {line}" for line in body),
         "}",
         "",
     ]
     return "\n".join(lines)
 
 
-def _body(at: Mapping[str, str], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
-    """Yield the statements of smc_controller, without indentation.
+def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
+    """Yield the lines of functions that the law calls: there are none."""
+    yield from ()
 
-    Args:
-      at: variable -> its element of the array.
-    """
+
+def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
+    """Yield the statements of smc_controller, without indentation."""
+    found = {one.name: f"value[{place(one.name)}]" for one in listed}
     for kind, part in controller.parts.items():
         yield f"const double {kind}_gains[] = {{"
-        yield from (f"    number({at[f'{kind}.{plain(name)}']})," for name in part.gains)
+        yield from (f"    number({found[f'{kind}.{plain(name)}']})," for name in part.gains)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
-        memory = "&" + at[f"{kind}.memory[1]"] if code[kind][0] else "NULL"
+        memory = "&" + found[f"{kind}.memory[1]"] if code[kind][0] else "NULL"
         yield f"double *{kind}_memory = {memory};"
     yield "smc_measurement y = {0};"
     if controller.estimator:
-        yield f"const smc_reading reading = {{SMC_DT, {at['x']}, {at.get('v', '0.0')}}};"
+        yield f"const smc_reading reading = {{SMC_DT, {found['x']}, {found.get('v', '0.0')}}};"
     yield "double out[2];"
     yield "int failure;"
-    yield f"y.t = t, y.dt = SMC_DT, y.limit = number({at['u_max']}), y.model = {float(controller.modelled)!r};"
-    yield f"y.r = {at['r']}, y.dr = {at['dr']}, y.ddr = y.a = {at.get('ddr', '0.0')};"
+    yield f"y.t = t, y.dt = SMC_DT, y.limit = number({found['u_max']}), y.model = {float(controller.modelled)!r};"
+    yield f"y.r = {found['r']}, y.dr = {found['dr']}, y.ddr = y.a = {found.get('ddr', '0.0')};"
     for name in ("f", "g"):
-        yield f"y.{name} = {at.get(name, 'NAN')};"
+        yield f"y.{name} = {found.get(name, 'NAN')};"
     for name in ("q", "dq", "fq", "gq"):
-        if name in at:
-            yield f"y.{name} = {at[name]};"
-    yield f"y.x = {at['x']};"
+        if name in found:
+            yield f"y.{name} = {found[name]};"
+    yield f"y.x = {found['x']};"
     if controller.estimator:
         yield from _call("estimator", "&reading")
-        yield f"y.v = {at['v_estimated']} = out[0];"
+        yield f"y.v = {found['v_estimated']} = out[0];"
         yield "if (!isnan(out[1])) y.a = out[1];"
     else:
-        yield f"y.v = {at['v']};"
+        yield f"y.v = {found['v']};"
     yield "y.e = y.x - y.r, y.de = y.v - y.dr;"
     if controller.surface:
         yield from _call("surface", "&y")
-        yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {at['v_eq']} = out[1];"
+        yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {found['v_eq']} = out[1];"
     yield from _call("law", "&y")
-    yield f"{at['u']} = fmin(fmax(out[0], -y.limit), y.limit);"
-    yield f"{at['s']} = out[1];"
-    yield f"return isfinite(out[0]) && isfinite(out[1]) && fabs({at['u']}) < {MAX_CONTROL!r} ? 0 : SMC_NOT_FINITE;"
+    yield f"{found['u']} = fmin(fmax(out[0], -y.limit), y.limit);"
+    yield f"{found['s']} = out[1];"
+    yield f"return isfinite(out[0]) && isfinite(out[1]) && fabs({found['u']}) < {MAX_CONTROL!r} ? 0 : SMC_NOT_FINITE;"
 
 
 def _call(kind: str, measured: str) -> Iterator[str]:
@@ -284,6 +305,7 @@ def component_file(component: Component, slots: int, text: str) -> str:
     return "\n".join(parts)
 
 
-def law_file(law: Law) -> str:
-    """Return the C file of the law: that of `export-c`."""
-    return f'#include "controller.h"\n{export.law_to_c(law)}'
+def law_file(controller: Controller, slots: int, text: str) -> str:
+    """Return the C file of the law: that of `export-c`, without the size of its code, which depends on the compiler."""
+    written = export.with_head(controller.law, "double", slots, text, controller.joints, measured=False)
+    return f'#include "controller.h"\n{written}'

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.units import Unit
-from smc_mujoco.simulation.fmu.controller import UNBOUNDED, Controller, Variable
+from smc_mujoco.simulation.fmu.controller import OUTPUTS, UNBOUNDED, Controller, Variable
 
 # Kind of joint -> units of force and position: name, exponents of the base units.
 JOINTS = {
@@ -23,7 +23,6 @@ ROLES = {
     "SMC_CONSTANT": ("local", "constant", "exact"),
     "SMC_STATE": ("local", "discrete", "exact"),
 }
-OUTPUTS = ("u", "s")
 
 
 def unit_name(unit: Unit, joint: str) -> str:
@@ -94,11 +93,16 @@ def model_description(
     variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
     for reference, one in enumerate(listed):
         variables.append(_variable(reference, one, joint))
-    outputs = [str(reference) for reference, one in enumerate(listed) if one.name in OUTPUTS]
+    outputs = [str(reference) for reference, one in enumerate(listed) if is_output(one)]
     for element in ("Output", "InitialUnknown"):
         for reference in outputs:
             xml.SubElement(structure, element, valueReference=reference)
     return written(root)
+
+
+def is_output(one: Variable) -> bool:
+    """Return whether a variable is u or s, or an element of these."""
+    return one.name.partition("[")[0] in OUTPUTS
 
 
 def _units(listed: Iterable[Variable]) -> list[Unit]:
@@ -110,7 +114,7 @@ def _variable(reference: int, one: Variable, joint: str) -> xml.Element:
     """Return the element of a variable."""
     causality, variability, initial = ROLES[one.kind]
     about = {"name": one.name, "valueReference": str(reference), "description": one.description}
-    about |= {"causality": "output" if one.name in OUTPUTS else causality, "variability": variability}
+    about |= {"causality": "output" if is_output(one) else causality, "variability": variability}
     if initial is not None:
         about["initial"] = initial
     if one.unit is not None and any(one.unit):
@@ -175,7 +179,7 @@ def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
     for one in listed:
         if one.kind == "SMC_STATE":
             continue
-        role = "output" if one.name in OUTPUTS else ROLES[one.kind][0]
+        role = "output" if is_output(one) else ROLES[one.kind][0]
         unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
         start = "unbounded" if one.start == UNBOUNDED else f"{one.start:g}"
         start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start

@@ -13,32 +13,33 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import ended, replacing
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.c import build
-from smc_mujoco.control.c.export import writable
+from smc_mujoco.control.c.export import number_of_joints, writable
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.fmu import controller as inside
-from smc_mujoco.simulation.fmu import description
+from smc_mujoco.simulation.fmu import controller as one_joint
+from smc_mujoco.simulation.fmu import description, joint_controller
 from smc_mujoco.simulation.fmu.controller import Controller
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
-HERE = Path(__file__).parent
+HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
 HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 # No symbols but those of FMI, and none of where it was built: the same law gives the same bytes.
 HIDDEN = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
-MODELS = ("none", "nominal")
 
 
 def export_fmu(
@@ -48,36 +49,39 @@ def export_fmu(
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
     control_period: float | None = None,
-    u_max: float | None = None,
+    u_max: float | Sequence[float] | None = None,
     model: str | None = None,
     joint: str | None = None,
+    joints: int | None = None,
     binary: bool = True,
 ) -> Path:
     """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0, Co-Simulation. Return its path.
 
     Args:
       law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity, control_period, u_max,
-        model and the joint's units.
+        model, the number of joints and their units.
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
       control_period: s; the law runs this often. Default: 1 ms.
-      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. Default: none.
-      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u. Default: "nominal" for a law that requires it,
-        else "none".
+      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. For many joints also one for each. Default: none.
+      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and J that a law of
+        many joints reads. Default: "nominal" for a law that requires it, else "none".
       joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
+      joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
     Inputs are x, v unless an estimator replaces it, the reference r, dr, ddr where the law reads it, and what else the
-    law reads; outputs are u and s. All gains are tunable parameters.
+    law reads; outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
 
     Raises:
-      ScenarioError: a law of many joints or in C, Python without translation into C, a surface that does not fit, no
+      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no
         compiler.
     """
     if isinstance(law, Scenario):
         given = {"surface": surface, "velocity": velocity, "control_period": control_period}
-        law, about, joint = _of_scenario(law, given | {"u_max": u_max, "model": model, "joint": joint})
+        given |= {"u_max": u_max, "model": model, "joint": joint, "joints": joints}
+        law, about, joint = _of_scenario(law, given)
     else:
         about = {
             "surface": surface,
@@ -85,9 +89,10 @@ def export_fmu(
             "control_period": 1e-3 if control_period is None else control_period,
             "u_max": math.inf if u_max is None else u_max,
             "model": model,
+            "joints": joints,
         }
         joint = "hinge" if joint is None else joint
-    find("joint", joint, description.JOINTS)
+        find("joint", joint, description.JOINTS)
     controller = _controller(law, **about)
     identifier = _identifier(controller.law.name)
     target = ended(path if path is not None else f"{identifier}.fmu", ".fmu")
@@ -105,17 +110,19 @@ def _of_scenario(scenario: Scenario, given: Mapping[str, Any]) -> tuple[Law, dic
     if chosen := [name for name, value in given.items() if value is not None]:
         raise ScenarioError(f"a scenario has its own {chosen[0]}: leave {chosen[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
-    if len(limits) > 1 or s.feedforward is not None:
-        what = "a bound for each channel" if len(limits) > 1 else "a feedforward"
+    several = len(limits) > 1 and not s.law.joint
+    if several or s.feedforward is not None:
+        what = "a bound for each channel" if several else "a feedforward"
         raise ScenarioError(f"the scenario has {what}, which an FMU has not: give its law, with u_max=")
     about = {
         "surface": s.surface,
         "velocity": s.velocity,
         "control_period": s.control_period,
-        "u_max": limits.pop(),
+        "u_max": list(scenario.limits) if s.law.joint else limits.pop(),
         "model": s.model,
+        "joints": s.plant.n if s.law.joint else None,
     }
-    return s.law, about, "slide" if s.plant.unit == "m" else "hinge"
+    return s.law, about, MIXED if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
 
 
 def _controller(
@@ -123,28 +130,40 @@ def _controller(
     surface: Surface | Template | str | None,
     velocity: Estimator | Template | str | None,
     control_period: float,
-    u_max: float,
+    u_max: float | Sequence[float],
     model: str | None,
+    joints: int | None,
 ) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
     surface, estimator = coerce.surface(surface), coerce.velocity(velocity)
-    law = writable(law)
-    if law.joint:
-        raise ScenarioError(f"law {law.name!r} is of many joints: an FMU has a law of one channel")
+    chosen = writable(law)
+    count = number_of_joints(chosen, joints)
+    if surface is not None and count:
+        raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
     if surface is not None:
-        check_surface(surface, law)
-    if model not in (None, *MODELS):
+        check_surface(surface, chosen)
+    if model not in (None, *coerce.MODELS):
         raise ScenarioError(f"model is {shown(model)}: give 'none' or 'nominal'")
-    if law.requires_model and model == "none":
-        raise ScenarioError(f"law {law.name!r} needs the nominal model: leave model out, or give 'nominal'")
+    if chosen.requires_model and model == "none":
+        raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
     return Controller(
-        law=law,
+        law=chosen,
         surface=surface,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
         period=number("control_period", control_period, above=0.0),
-        u_max=number("u_max", u_max, above=0.0, infinite=True),
-        modelled=law.requires_model or model == "nominal",
+        u_max=_bounds(u_max, count),
+        modelled=chosen.requires_model or model == "nominal",
+        joints=count,
     )
+
+
+def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
+    """Return the bound on |u| of each joint, from one for all or one for each."""
+    each = list(u_max) if joints and isinstance(u_max, Sequence | np.ndarray) else [u_max] * max(1, joints)
+    if len(each) != max(1, joints):
+        raise ScenarioError(f"u_max has {len(each)} values for {joints} joints: give one, or {joints}")
+    names = [f"u_max[{i}]" for i in range(joints)] if joints and each[0] is not u_max else ["u_max"] * len(each)
+    return tuple(number(name, one, above=0.0, infinite=True) for name, one in zip(names, each, strict=True))
 
 
 def _identifier(name: str) -> str:
@@ -155,19 +174,27 @@ def _identifier(name: str) -> str:
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
     """Return path in the archive -> text, of all but the binary."""
-    code = controller.code()
+    code, inside = controller.code(), joint_controller if controller.joints else one_joint
     listed = inside.variables(controller, code)
-    files = {"controller.c": inside.source(listed, controller, code), "law.c": inside.law_file(controller.law)}
+    if joint == MIXED:
+        joint = "hinge"  # of which no unit is left but powers of the second
+        listed = [
+            one if one.unit and not (one.unit.force or one.unit.position) else one._replace(unit=None) for one in listed
+        ]
+    body = inside.body(listed, controller, code)
+    files = {"controller.c": one_joint.source(listed, inside.helpers(controller, code), body)}
+    files["law.c"] = one_joint.law_file(controller, *code["law"])
     for kind, (slots, text) in code.items():
         if kind != "law":
-            files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
+            files[f"{kind}.c"] = one_joint.component_file(controller.parts[kind], slots, text)
     files = {"fmu.c": (HERE / "fmu.c").read_text(encoding="utf-8"), **files}
-    content = "\0".join([*files.values(), inside.header(listed, controller, identifier, ""), joint])
+    content = "\0".join([*files.values(), one_joint.header(listed, controller, identifier, ""), joint])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
-    files["controller.h"] = inside.header(listed, controller, identifier, token)
+    files["controller.h"] = one_joint.header(listed, controller, identifier, token)
     files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text(encoding="utf-8")
-    files["smc_law.h"] = build.HEADER.read_text(encoding="utf-8")
+    own = build.JOINT_HEADER if controller.joints else build.HEADER
+    files[own.name] = own.read_text(encoding="utf-8")
     files |= {name: (HERE / "headers" / name).read_text(encoding="utf-8") for name in HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),

@@ -33,6 +33,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
 from smc_mujoco.simulation.fmu import slave
+from smc_mujoco.simulation.fmu.controller import OUTPUTS, UNBOUNDED
 from smc_mujoco.simulation.fmu.slave import REAL, Fault, Slave
 
 # Our name -> names of an FMU's variables that mean it, in any case.
@@ -48,10 +49,8 @@ NAMES = {
     "s": ("s", "sigma", "sliding", "sliding_variable"),
 }
 INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
-OUTPUTS = ("u", "s")
 CLOSE = 1e-6  # relative difference of two periods that are the same
 MAX_TIMEOUT = 86_400.0  # s
-LARGEST = sys.float_info.max  # a parameter that is this has no bound
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # by the number that a run keeps in its memory
@@ -117,7 +116,7 @@ class FmuLaw(Uncompiled):
     def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
         """Start an instance, which ends with the memory of the run. Return its number."""
         place = next(_numbers)
-        values = (max(-LARGEST, min(float(gain), LARGEST)) for gain in gains)
+        values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
         fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
         names = [theirs for _, theirs in self.inputs]
         address = memory.__array_interface__["data"][0]
@@ -374,7 +373,7 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         ours = re.sub(r"\W+", "_", variable.name).strip("_")
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
-        start = math.copysign(math.inf, start) if abs(start) >= LARGEST else start
+        start = math.copysign(math.inf, start) if abs(start) >= UNBOUNDED else start
         least = math.nan if variable.min is None else float(variable.min)
         gains[ours] = variable.name, Gain(start, nonnegative=least == 0.0)
     return gains

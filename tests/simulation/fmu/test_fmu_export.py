@@ -432,7 +432,7 @@ def test_the_units_are_those_of_the_scenario_s_joint(folder):
     ("call", "said"),
     [
         (lambda: smc.export_fmu("twistin"), "unknown law 'twistin'"),
-        (lambda: smc.export_fmu("passivity_based"), "is of many joints"),
+        (lambda: smc.export_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
         (lambda: smc.export_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
         (lambda: smc.export_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
         (lambda: smc.export_fmu("pid", joint="ball"), "unknown joint 'ball'"),
