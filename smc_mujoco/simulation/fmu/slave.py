@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
 STEPS, PERIOD = 500, 1e-3  # of a trial: steps, and their length if the FMU names none, s
@@ -18,6 +18,15 @@ MAX_POSITION = 3.0  # a stop for the double integrator of a trial, because a law
 
 class Fault(Exception):
     """What is wrong with an FMU, in words."""
+
+
+class Group(NamedTuple):
+    """Variables of one type: their names, value references, and places among the values that are set or read."""
+
+    kind: str
+    names: list[str]
+    references: list[int]
+    places: list[int]
 
 
 class Slave:
@@ -39,17 +48,17 @@ class Slave:
         about = fmpy.read_model_description(folder, validate=False)
         self.known = {variable.name: variable for variable in about.modelVariables}
         self.two, self.said = str(about.fmiVersion).startswith("2"), list[str]()
-        self.inputs, self.outputs = inputs, outputs
+        self.inputs, self.outputs = self._by_type(inputs), self._by_type(outputs)
         self.fmu: Any = self._called("instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log)
         if self.two:
             self._called("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
         for name, value in fixed.items():
             if self.known[name].causality != "input":
-                self._set([name], [value])
+                self._set(self._by_type([name]), [value])
         self._called("initialization", self.fmu.enterInitializationMode, **({} if self.two else {"startTime": start}))
         for name, value in fixed.items():
             if self.known[name].causality == "input":
-                self._set([name], [value])
+                self._set(self._by_type([name]), [value])
         self._called("initialization", self.fmu.exitInitializationMode)
 
     def step(self, values: Sequence[float], t: float, length: float) -> list[float]:
@@ -57,7 +66,7 @@ class Slave:
         self._set(self.inputs, values)
         where = {"currentCommunicationPoint": t, "communicationStepSize": length}
         self._called(f"the step from t = {t:g} s", self.fmu.doStep, **where)
-        return [self._get(name) for name in self.outputs]
+        return self._get(self.outputs)
 
     def close(self) -> None:
         """End the instance."""
@@ -66,24 +75,46 @@ class Slave:
         finally:
             self.fmu.freeInstance()
 
-    def _set(self, names: Sequence[str], values: Sequence[float]) -> None:
-        for name, value in zip(names, values, strict=True):
-            variable = self.known[name]
-            setter = getattr(self.fmu, f"set{variable.type}")
-            self._called(f"setting {name} = {value:g}", setter, [variable.valueReference], [value])
+    def _by_type(self, names: Sequence[str]) -> list[Group]:
+        """Return groups of variables of the same type, which one call sets or reads."""
+        groups: dict[str, Group] = {}
+        for place, name in enumerate(names):
+            group = groups.setdefault(kind := self.known[name].type, Group(kind, [], [], []))
+            group.names.append(name)
+            group.references.append(self.known[name].valueReference)
+            group.places.append(place)
+        return list(groups.values())
 
-    def _get(self, name: str) -> float:
-        variable = self.known[name]
-        getter = getattr(self.fmu, f"get{variable.type}")
-        return float(self._called(f"reading {name}", getter, [variable.valueReference])[0])
+    def _set(self, groups: Sequence[Group], values: Sequence[float]) -> None:
+        """Set variables to the values at their places."""
+        for kind, names, references, places in groups:
+            own = [values[place] for place in places]
+            try:
+                getattr(self.fmu, f"set{kind}")(references, own)
+            except Exception as error:
+                what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, own, strict=True))
+                raise self._fault(f"setting {what}", error) from error
+
+    def _get(self, groups: Sequence[Group]) -> list[float]:
+        """Return the values of variables in the order of their places."""
+        found = [0.0] * sum(len(group.places) for group in groups)
+        for kind, names, references, places in groups:
+            read = self._called(f"reading {', '.join(names)}", getattr(self.fmu, f"get{kind}"), references)
+            for place, value in zip(places, read, strict=True):
+                found[place] = float(value)
+        return found
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
         """Call a function of FMPy. Raise Fault with the FMU's own words if it fails."""
         try:
             return function(*arguments, **named)
         except Exception as error:
-            why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
-            raise Fault(f"{what} fails ({' '.join(why.split())})") from error
+            raise self._fault(what, error) from error
+
+    def _fault(self, what: str, error: Exception) -> Fault:
+        """Return the Fault of a call that failed, with the FMU's last words or else those of the error."""
+        why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
+        return Fault(f"{what} fails ({' '.join(why.split())})")
 
     def _log(self, *words: Any) -> None:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
