@@ -1,16 +1,16 @@
-"""Laws of many joints: pure functions of the measurement of all channels, which return a command for each.
+"""Laws of many joints: functions of the measurement of all channels, which return a command for each channel.
 
     @law_function(joint=True, gains={"lam": 6.0, "k1": 3.0})
     def my_law(y, gains, memory):
         s = y.de + gains.k1 * y.e                     # vectors (n,), one number for each channel
         return -gains.lam * saturate(s), s
 
-The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d,
-where a law of one channel sees x'' = f + g u. M and h come from MuJoCo's own functions for your own models,
+The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d. A
+law of one channel sees x'' = f + g u instead. M and h come from MuJoCo's own functions for your own models,
 `double_pendulum` and `panda`. The other plants have one equation per channel, so their M is diagonal.
 
-A gain is a vector (n,), too, unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays
-are copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.
+A gain is a vector (n,), unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays are
+copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.
 """
 
 # pyright: reportCallIssue=false
@@ -35,7 +35,7 @@ class JointMeasurement(NamedTuple):
     t: float  # time of the sample
     dt: float  # control period
     model: float  # 1 if the scenario lets the law use M, h and g, else 0
-    dynamics: Any  # what `coriolis` and `jacobian` call
+    dynamics: Any  # handle of the nominal mechanism, for `coriolis` and `jacobian`
     x: np.ndarray  # measured positions
     v: np.ndarray  # measured or estimated velocities
     e: np.ndarray  # x - r
@@ -46,16 +46,16 @@ class JointMeasurement(NamedTuple):
     a: np.ndarray  # estimated accelerations; r'' if the estimator gives none
     limit: np.ndarray  # bounds on |u|
     M: np.ndarray  # nominal mass matrix of M x'' + h = u, (n, n), at the measured x
-    h: np.ndarray  # all forces but inertia and u: c(x, v) of Coriolis, gravity, springs, dampers; in the unit of u
-    g: np.ndarray  # those of them that hold at rest, h(x, 0): gravity and springs
+    h: np.ndarray  # Coriolis forces c(x, v), gravity, springs and dampers, in the unit of u
+    g: np.ndarray  # h(x, 0), the forces at rest: gravity and springs
 
 
-VECTORS = 9  # x to limit
-HEADER = 5  # t, dt, model, dynamics, n: numbers before the vectors where a measurement is stored
+VECTORS = 9  # fields of a measurement from x to limit
+HEADER = 5  # numbers before the vectors of a stored measurement: t, dt, model, dynamics, n
 
 
 def numbers(n: int) -> int:
-    """Return how many numbers store the measurement of n channels."""
+    """Return how many numbers a stored measurement of n channels has."""
     return HEADER + (VECTORS + 2) * n + n * n
 
 
@@ -87,7 +87,12 @@ def measurement_at(address):
 
 
 def stored_measurement(numbers: np.ndarray, dynamics: Any) -> JointMeasurement:
-    """Return the measurement that is stored in an array, for Python."""
+    """Return the measurement that is stored in an array, for the reference loop.
+
+    Args:
+      numbers: as `measurement_at` reads them, (numbers(n),).
+      dynamics: an object with the methods `coriolis` and `jacobian`.
+    """
     n = int(numbers[HEADER - 1])
     vectors, end = numbers[HEADER:], VECTORS * n
     M, rest = vectors[end : end + n * n].reshape(n, n), vectors[end + n * n :].reshape(2, n)
@@ -95,10 +100,10 @@ def stored_measurement(numbers: np.ndarray, dynamics: Any) -> JointMeasurement:
 
 
 def coriolis(y, w):
-    """Return C(x, v) w, (n,), for a vector w (n,), with the C of Christoffel's symbols: M' - 2 C is skew-symmetric.
+    """Return C(x, v) w, (n,), for a vector w (n,). C is made of Christoffel symbols, so M' - 2 C is skew-symmetric.
 
-    c(x, v) = C(x, v) v is part of y.h. C follows from c alone, as C(x, v) w = (c(x, v + w) - c(x, v - w)) / 4. It is 0
-    without the model, and for plants with one equation per channel.
+    c(x, v) = C(x, v) v is part of y.h. The product follows from c alone: C(x, v) w = (c(x, v + w) - c(x, v - w)) / 4.
+    It is 0 without the model, and for plants with one equation per channel.
     """
     return y.dynamics.coriolis(np.asarray(w, float))
 
@@ -111,7 +116,8 @@ def _coriolis(y, w):
         for i in range(n):
             given[i] = w[i]
         if y.dynamics != 0:
-            own = carray(pointer(y.dynamics), (4,))  # two functions, their parameters, force per unit of u
+            # addresses of the functions for coriolis and jacobian, address of their parameters, force per unit of u
+            own = carray(pointer(y.dynamics), (4,))
             call(int(own[0]), given.ctypes.data, int(own[2]), 0, found.ctypes.data)
             for i in range(n):
                 found[i] /= own[3]
@@ -121,7 +127,9 @@ def _coriolis(y, w):
 
 
 def jacobian(y):
-    """Return the nominal Jacobian of the plant's tip, (3, n): J v is the tip's velocity, J' F the torques of F there.
+    """Return the nominal Jacobian J of the plant's tip, (3, n).
+
+    J v is the tip's velocity, m/s. J' F is the generalised force of a force F, N, that acts on the tip.
 
     Raises:
       ValueError: the law has no model, or the plant no tip.
@@ -145,7 +153,7 @@ def _jacobian(y):
 
 @njit
 def product(M, w):
-    """Return M w. It adds in the same order in Python and compiled, as `M @ w` may not."""
+    """Return M w, added in the same order in Python and compiled. `M @ w` does not promise that."""
     found = np.zeros(len(w))
     for i in range(len(w)):
         for j in range(len(w)):
@@ -155,7 +163,7 @@ def product(M, w):
 
 @njit
 def inner(a, b):
-    """Return the sum of a_i b_i. It adds in the same order in Python and compiled, as `a @ b` may not."""
+    """Return the sum of a_i b_i, added in the same order in Python and compiled. `a @ b` does not promise that."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -164,7 +172,7 @@ def inner(a, b):
 
 @njit
 def solve(M, b):
-    """Return M^-1 b for a positive definite M, by Cholesky's factors: the same in Python and compiled."""
+    """Return M^-1 b for a positive definite M, by Cholesky's factors. The bits are the same in Python and compiled."""
     n = len(b)
     L, x = np.zeros((n, n)), b.copy()
     for i in range(n):
@@ -185,7 +193,7 @@ def solve(M, b):
 
 @njit
 def torque(y, v):
-    """Return the u for the accelerations v of the errors: M (v + r'') + h with the model, v without."""
+    """Return the u that gives the errors the accelerations v: M (v + r'') + h. Without the model it is v itself."""
     if y.model == 0.0:
         return v
     return product(y.M, v + y.ddr) + y.h
@@ -199,7 +207,7 @@ def saturate(a):
 
 @njit
 def tanh(a):
-    """Return the hyperbolic tangents of a vector: the same in Python and compiled, as numpy's may not be."""
+    """Return the hyperbolic tangents of a vector. The bits are the same in Python and compiled, unlike numpy's."""
     found = np.empty(len(a))
     for i in range(len(a)):
         found[i] = math.tanh(a[i])
@@ -208,7 +216,7 @@ def tanh(a):
 
 @njit
 def norm(a):
-    """Return the Euclidean norm of a vector. It adds in the same order in Python and compiled."""
+    """Return the Euclidean norm of a vector, added in the same order in Python and compiled."""
     total = 0.0
     for each in a:
         total += each * each

@@ -1,9 +1,9 @@
 """Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
 
-The tip is the plant's site of that name, `plant.tip`. Its path follows from the joints' positions. Forces of contact
-are MuJoCo's at the logged state under the logged command: those of the sample, not means over a control period. So they
-are known only where the actuators have no state that a trace lacks, such as a motor's current or the rotor behind a
-backlash. The state of a friction does not matter: a sliding contact's spring carries 99 % of a change of load, see
+The tip is the site that `plant.tip` names. Its path follows from the joints' positions. Forces of contact are MuJoCo's
+at the logged state under the logged command: those of the sample, not means over a control period. They are unknown if
+an actuator has a state that a trace lacks, such as a motor's current or the rotor behind a backlash. The state of a
+friction does not matter: a sliding contact's spring carries 99 % of a change of load, see
 `mechanisms.hardware.contact`. Joints without a channel are taken to be where they start.
 """
 
@@ -32,18 +32,17 @@ if TYPE_CHECKING:
 
 V = TypeVar("V")
 
-SETTLED = (
-    0.2  # of a run, after which forces of contact are scored: chosen; the tip has touched, and the force has risen
-)
+# Share of a run after which forces of contact are scored: chosen, so that the tip has touched and the force has risen.
+SETTLED = 0.2
 
 
 class Contacts(NamedTuple):
     """Contacts of a run at its samples.
 
     Attributes:
-      force: sum of the normal forces, (K + 1,) N; 0 without contact.
-      depth: of the deepest, (K + 1,) m; 0 without contact.
-      push: on the arm, the normal forces as a vector in space, (K + 1, 3) N.
+      force: sum of the normal forces, N, (K + 1,); 0 without contact.
+      depth: penetration of the deepest contact, m, (K + 1,); 0 without contact.
+      push: sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3).
     """
 
     force: np.ndarray
@@ -65,7 +64,7 @@ def kept(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
 
 
 def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
-    """Return where the tip is, (K, 3) m, at positions of the channels x, (K, n).
+    """Return the tip's positions in space, m, (K, 3), at the channels' positions x, (K, n).
 
     Raises:
       ScenarioError: the plant has no tip.
@@ -85,7 +84,7 @@ def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
 
 @kept
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the tip is and where it is wanted, (K + 1, 3) m each, read-only. Raises like `tip_path`."""
+    """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`."""
     paths = tip_path(trace.scenario.plant, trace.x), tip_path(trace.scenario.plant, trace.r)
     for path in paths:
         path.flags.writeable = False
@@ -93,13 +92,13 @@ def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tip_error(trace: Trace) -> np.ndarray:
-    """Return how far the tip is from where the references want it, (K + 1,) m. Raises like `tip_path`."""
-    is_, wanted = tip_paths(trace)
-    return np.linalg.norm(is_ - wanted, axis=1)
+    """Return the tip's distance from its wanted path, m, (K + 1,). Raises like `tip_path`."""
+    actual, wanted = tip_paths(trace)
+    return np.linalg.norm(actual - wanted, axis=1)
 
 
 def knows_contacts(scenario: Scenario) -> bool:
-    """Return whether a run has contacts, and a trace all that their forces depend on."""
+    """Return whether a scenario has contacts whose forces follow from a trace."""
     return scenario.contact.kind != "none" and not _unknown(scenario)
 
 
@@ -110,7 +109,7 @@ def _unknown(scenario: Scenario) -> list:
 
 @kept
 def contacts(trace: Trace) -> Contacts:
-    """Return the normal forces and depths of a run's contacts, read-only.
+    """Return the normal forces and the penetrations of a run's contacts, read-only.
 
     Raises:
       ScenarioError: the scenario has no contact, or an actuator with a state that a trace lacks.
@@ -178,8 +177,8 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
 def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     """Return the metrics of each joint by itself, {"joint1": {"settling_time": ...}, ...}, in the channels' order.
 
-    Beside the catalogue's there are peak_power, the largest |force of the drive times velocity|, W, and work, the
-    integral of this, J. Raises like `smc.score`.
+    In addition to the catalogue's metrics there are peak_power, the largest |force of the drive times velocity|, W, and
+    work, the integral of |force times velocity|, J. Raises like `smc.score`.
     """
     conventions.refuse(trace)
     found, names = {}, joint_names(trace.scenario.plant)

@@ -1,8 +1,8 @@
 """Tasks of a seven-joint arm, and laws of many joints with gains for them: what the scenes and the study of arms share.
 
-The arm is `panda` with the friction that was identified on a real one, of which the laws know nothing, and what it
-carries, neither. Gains come from `search`: the same number of random draws for each law, on the task "sway" with 1 kg
-of payload and noise of seeds that no figure uses. GAINS holds what it found.
+The arm is `panda` with the friction that was identified on a real one. The laws know neither that friction nor the
+payload. Gains come from `search`: the same number of random draws for each law, on the task "sway" with 1 kg of payload
+and a seed that no figure uses. GAINS has the best draws.
 """
 
 import functools
@@ -23,16 +23,18 @@ from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.waypoints import Waypoints, cartesian_path
 
-NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, of an encoder and a filtered difference
-SWAY, BEAT = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5), 0.6  # rad and s: chosen, up to a rad/s in each joint
-DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # of a search, kg
-ROUGH = 1000.0  # N m/s: a variation of u that counts as much as the error; chosen before any search
+NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, as of an encoder and a filtered difference
+SWAY = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s
+BEAT = 0.6  # s: time from one end of a sway to the other, chosen
+DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # draws of a search, its seed, and kg of payload
+ROUGH = 1000.0  # N m/s: variation of u that doubles the cost of a draw; chosen before any search
 BEFORE, BEHIND, PROBE = 0.0005, 0.004, 0.012  # m, from the wall's face: chosen; the radius of the probe
-SPREAD = 0.05  # rad, of starts about the task's own; chosen
-BLOW = 1.0  # s, of the blow in its task
-PRESS, REACH = 20.0, (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # N; rad, from where the wall's path is found
+SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
+BLOW = 1.0  # s: when the blow comes in its task
+PRESS = 20.0  # N: with which the tip is to press on the wall; chosen
+REACH = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved for
 
-# Law -> gain -> range of the search. Where a joint's own number enters, the gain is the factor on it: see `gains`.
+# Law -> gain -> range of the search. For a gain in BY_LIMIT or BY_INERTIA, the range is that of its factor.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "computed_torque_sliding": {"c": (3.0, 40.0), "k": (3.0, 300.0), "width": (0.03, 1.0)},
     "super_twisting_computed_torque": {"c": (3.0, 40.0), "k1": (1.0, 40.0), "k2": (1.0, 400.0)},
@@ -41,9 +43,9 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "time_delay_sliding": {"c": (3.0, 40.0), "k": (3.0, 300.0), "width": (0.03, 1.0), "m": (0.03, 1.0)},
     "observer_free_joint": {"k1": (3.0, 40.0), "lam": (0.1, 1.0)},
 }
-BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # times the limit of the joint's motor
-BY_INERTIA = {"time_delay_sliding": ("m",)}  # times the joint's own inertia in the ready pose
-GAINS: Mapping[str, Mapping[str, float]] = {  # as `search` found them
+BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # gains: factor times a motor's limit
+BY_INERTIA = {"time_delay_sliding": ("m",)}  # gains: factor times a joint's inertia in the ready pose
+GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as `search` found them
     "computed_torque_sliding": {"c": 36.0, "k": 67.0, "width": 0.4},
     "super_twisting_computed_torque": {"c": 16.0, "k1": 28.0, "k2": 340.0},
     "unit_vector": {"c": 20.0, "rho": 280.0, "eps": 1.8},
@@ -67,7 +69,12 @@ def inertia() -> tuple[float, ...]:
 
 
 def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
-    """Return a law with the gains that a search found, or with others, per joint where a joint's own number enters."""
+    """Return a law with the gains that the search found.
+
+    Args:
+      name: of a law in GAINS.
+      gains: other gains in place of those, with factors for the gains in BY_LIMIT and BY_INERTIA.
+    """
     found = dict(find("law of the arm", name, GAINS) if gains is None else gains)
     for gain in BY_LIMIT.get(name, ()):
         found[gain] = [found[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
@@ -92,21 +99,21 @@ def hybrid(friction: bool = False) -> Law:
 
 @functools.cache
 def sway() -> tuple[Waypoints, ...]:
-    """Return references that swing every joint to and fro, with least jerk, from the ready pose and back."""
+    """Return references that swing every joint to and fro with minimum jerk. They begin and end in the ready pose."""
     times = [BEAT * k for k in range(6)]
     return tuple(Waypoints(times, [x, x + a, x - a, x + a, x - a, x]) for x, a in zip(arm().rest, SWAY, strict=True))
 
 
 @functools.cache
 def pick_and_place() -> tuple[Waypoints, ...]:
-    """Return references that bring the tip down to pick up at 1 s, over to the other side, and down to place at 3 s."""
+    """Return references on which the tip goes down to pick at 1 s, to the other side, and down to place at 3 s."""
     points = [(0.40, -0.25, 0.45), (0.45, -0.25, 0.25), (0.45, 0.0, 0.50), (0.45, 0.25, 0.25), (0.40, 0.25, 0.45)]
     return tuple(cartesian_path(arm(), [0.0, 1.0, 2.0, 3.0, 3.8], points, site="tip", x0=arm().rest))
 
 
 @functools.cache
 def wall_path(behind: float = -BEFORE) -> tuple[Waypoints, ...]:
-    """Return references on which the tip slides along the wall, across and up, at rest until 0.4 s.
+    """Return references on which the tip rests until 0.4 s, and then slides along the wall, across and up.
 
     Args:
       behind: how far the path is behind the wall's face, m; below 0: before it.
@@ -122,10 +129,10 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     """Return the scenario of a task under a law.
 
     Args:
-      task: "sway"; "payload", picked up at 1 s; "wall", pressed on while the tip slides; "behind", the same path 4 mm
-        behind the wall's face; or "blow", at 1 s of a sway.
-      seed: of the noise, and of the start, which is within 0.05 rad of the task's. 0: at the task's own start. At the
-        wall every seed starts there, as the tip must be in front of it.
+      task: "sway"; "payload", a pick and place with 2 kg from 1 s on; "wall", where the tip slides on the wall and
+        presses; "behind", the same path but 4 mm behind the wall's face; or "blow", a sway with a blow at 1 s.
+      seed: of the noise and of the start, which is within SPREAD of the task's own start. Seed 0, and every seed at the
+        wall, starts at the task's own start; at the wall the tip must begin in front of it.
       payload: kg that the arm carries from the start, unknown to the law.
     """
     one = arm()
@@ -154,7 +161,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         x0=tuple(start),
         seed=seed,
         noise=NOISE,
-        model="nominal",  # with it observer_free_joint compensates gravity, of the arm without payload
+        model="nominal",  # so that observer_free_joint compensates the gravity of the arm without payload
         mismatch={"payload": payload} if payload else {},
         friction=one.friction,
         control_period=1e-3,
@@ -163,12 +170,17 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
 
 
 def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
-    """Return how far the tip is from where the references want it at the samples from a time in s on, m."""
+    """Return the tip's distance from its path, m, at the samples from the time `after`, s, on."""
     return tip_error(trace)[trace.t >= after]
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
-    """Return how long after a time in s the tip is within a distance of its path for good, s; inf if it never is."""
+    """Return how long after a time the tip has come within a distance of its path for good, s; inf if it never does.
+
+    Args:
+      distance: m.
+      after: s.
+    """
     t = trace.t[trace.t >= after]
     out = np.flatnonzero(off_path(trace, after) > distance)
     if not len(out):
@@ -177,14 +189,19 @@ def back_within(trace: Trace, distance: float, after: float) -> float:
 
 
 def cost(trace: Trace) -> float:
-    """Return the objective of the search: the tip's rms error, mm, more by the roughness of u."""
+    """Return the cost of the search: the tip's rms error, mm, times 1 + variation of u / ROUGH."""
     if trace.failure is not None:
         return math.inf
     return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + tv_rate(trace) / ROUGH)
 
 
 def search(name: str, draws: int = DRAWS) -> tuple[dict[str, float], float]:
-    """Return the best of random gains of a law, to two digits, and their cost."""
+    """Return the best of random gains of a law, rounded to two digits, and their cost.
+
+    Args:
+      name: of a law in RANGES.
+      draws: number of random draws, uniform in the logarithm of each gain.
+    """
     rng, ranges = np.random.default_rng(SEARCH_SEED), RANGES[name]
     tried = [
         {gain: float(f"{math.exp(rng.uniform(*np.log(bounds))):.2g}") for gain, bounds in ranges.items()}

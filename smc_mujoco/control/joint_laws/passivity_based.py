@@ -1,12 +1,12 @@
 """Passivity-based sliding law: u = M v_r' + C v_r + g - K s - k sat(s / width), v_r = r' - c e, s = v - v_r.
 
-s = de + c e, and g has springs and the nominal damping, too. The law cancels no Coriolis forces but keeps the
-mechanism passive: with M' - 2 C skew-symmetric,
+So s = de + c e. Here g also has springs and the nominal damping. The law does not cancel Coriolis forces but keeps the
+mechanism passive. As M' - 2 C is skew-symmetric,
 
     V = s' M s / 2,    V' = -s' (K s + k sat(s / width) - d),
 
-so that V falls while each |s_i| > width if k_i > |d_i|, in the unit of the force: no bound on M^-1 d is needed. A
-constant d leaves |s| = |d| / (K + k / width) at rest. M need not be inverted.
+so that V falls while each |s_i| > width, if k_i > |d_i|. Both are forces: no bound on M^-1 d is needed, and M is not
+inverted. Under a constant d, |s| = |d| / (K + k / width) remains at rest.
 Gains: K, damping of s [N m s/rad]; k, switching gain [N m]; c, slope of the surface [1/s]; width, of the boundary
 layer [rad/s].
 Source: J.-J. E. Slotine & W. Li, "On the adaptive control of robot manipulators", Int. J. Robotics Research 6(3):49,

@@ -6,10 +6,10 @@ m of each joint. The acceleration obeys
 
     a = v_d + eps,    eps = (1 - M^-1 m) eps_ + what changes within a sample,    v_d = r'' - c de - k sat(s / width),
 
-with m a diagonal matrix. The law is stable if the eigenvalues of 1 - M^-1 m lie in the unit circle, for which 0 < m <
-2 M in the sense of quadratic forms suffices; a smaller m only estimates more slowly. Constant forces leave no error at
-all. Others leave eps = O(dt), and |s| <= width eps / k. Measured velocities must be clean: noise of v enters u as m /
-dt times it.
+with m a diagonal matrix. The law is stable if the eigenvalues of 1 - M^-1 m lie in the unit circle. 0 < m < 2 M in the
+sense of quadratic forms suffices for that; a smaller m estimates more slowly. Under constant forces no error remains.
+Under others eps = O(dt) and |s| <= width eps / k remain. Measured velocities must be clean, because their noise enters
+u multiplied by m / dt.
 Gains: m, inertia [kg m^2]; k, switching gain [rad/s^2]; c, slope of the surface [1/s]; width, of the boundary layer
 [rad/s].
 Sources: K. Youcef-Toumi & O. Ito, "A time delay controller for systems with unknown dynamics", J. Dyn. Syst. Meas.
@@ -35,7 +35,7 @@ from smc_mujoco.control.units import ACCELERATION, INERTIA, RATE, SPEED, Gain
         "width": Gain(0.1, SPEED, positive=True),
     },
     label="Time-delay sliding",
-    memory=3,  # last command, last velocity, whether there was one
+    memory=3,  # last command, last velocity, and 1 once there was a sample
 )
 def time_delay_sliding(y, gains, memory):
     s = y.de + gains.c * y.e

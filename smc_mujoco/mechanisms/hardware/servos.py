@@ -3,11 +3,11 @@
     servo = smc.servo("mx106", "m4")
     scenario = smc.Scenario(plant="pendulum", law=..., actuator=servo.motor, friction=servo.friction)
 
-The load of a gearbox is what acts on its two sides, the torque of its motor and the torque from outside, not their sum:
-a motor that holds a weight has a sum of 0 and a loaded gearbox. Both are read in the callback, before a physics step.
-The motor's torque is that of the joint's drive in the step before. The torque from outside is -qfrc_bias (gravity and
-gyration) + qfrc_spring + disturbances of the joint + qfrc_constraint (contacts and limits, of the step before), without
-a `Push` and the inertia of what it moves. That is where the published code reads them, too; it has no springs and
+The load of a gearbox is the two torques on its sides, that of its motor and that from outside, and not their sum: if a
+motor holds a weight, the sum is 0 and the gearbox is loaded. The callback reads both torques before a physics step. The
+motor's torque is that of the joint's drive in the step before. The torque from outside is -qfrc_bias (gravity and
+gyration) + qfrc_spring + disturbances of the joint + qfrc_constraint (contacts and limits, of the step before). It has
+no `Push` and no inertia of what the joint moves. The published code reads the same torques; it has no springs and
 disturbances.
 """
 
@@ -20,32 +20,34 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.sliding import PerJoint, Sliding
 
-LOADED = ("km", "ke", "kms", "kes", "kmq", "keq")
+LOADED = ("km", "ke", "kms", "kes", "kmq", "keq")  # factors on the two torques of the gearbox
 
 
 @dataclasses.dataclass(frozen=True)
 class ServoFriction(Sliding):
-    """Friction of a servo, by the models M1 to M6, which are this one with some of its numbers 0.
+    """Friction of a servo by model M6. Models M1 to M5 are M6 with some numbers 0, or equal to each other.
 
         F(v) = (kc + |km m - ke e| + w (kcs + |kms m - kes e| + q)) sgn(v) + kv v,    w = exp(-|v/vs|^alpha)
         q = keq e^2 if |m| > |e|,  kmq m^2 if |m| < |e|,  0 if m and e have the same sign or size
 
-    m is the motor's torque, e that from outside: see the module. A servo that drives its load against e and one that is
-    driven back by it have other frictions. At rest it holds up to the sum at v = 0.
+    m is the motor's torque, e that from outside: see the module's docstring. Friction differs between a servo that
+    drives its load against e and one that e drives back. At rest, friction holds up to |F| for v to 0.
 
         M1  kc, kv                M3  M1 and km = ke                    M5  km, ke, kms and kes differ
         M2  M1 and kcs, vs, alpha M4  M2 and km = ke, kms = kes         M6  M5 and kmq, keq
 
     Source: M. Duclusaud, G. Passault, V. Padois and O. Ly, Extended friction models for the physics simulation of servo
-    actuators, arXiv 2410.08650, 2024; signs and q as in their code, Rhoban/bam (Apache-2.0), bam/model.py, where m is
-    in q if the load drives. Their simulator holds by the torque that stops the joint within a step.
+    actuators, arXiv 2410.08650, 2024; signs and q as in their code, Rhoban/bam (Apache-2.0), bam/model.py, where q has
+    m if the load drives. Their simulator holds a joint by the torque that stops it within a step.
 
     Attributes:
-      kv: viscous, N m s/rad.
-      kc, kcs: N m: dry friction, and what it has more near rest.
-      km, ke, kms, kes: N m/N m: dry friction by the torques of motor and outside, and what it has more near rest.
-      kmq, keq: 1/(N m), the same by their squares, near rest.
-      vs, alpha: rad/s, 1: where dry friction falls, and how steeply; greater than 0.
+      kv: viscous friction, N m s/rad.
+      kc, kcs: dry friction at every speed, and its addition near rest, N m.
+      km, ke: dry friction for each N m of the motor's torque and of the torque from outside, at every speed.
+      kms, kes: the same, its addition near rest.
+      kmq, keq: additions near rest for the squares of these torques, 1/(N m).
+      vs: speed at which the additions have fallen to 1/e, rad/s, greater than 0.
+      alpha: how steeply they fall, greater than 0.
     """
 
     kv: PerJoint = 0.0
@@ -70,7 +72,7 @@ class ServoFriction(Sliding):
         near = math.exp(-(abs(v / p.vs) ** p.alpha))
         dry = p.kc + abs(p.km * motor - p.ke * load)
         more = p.kcs + abs(p.kms * motor - p.kes * load)
-        if not motor * load > 0.0:  # one drives, the other resists
+        if not motor * load > 0.0:  # one torque drives, the other resists
             if abs(motor) > abs(load):
                 more += p.keq * load * load
             elif abs(motor) < abs(load):
@@ -90,8 +92,8 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     """Return motor and friction of a servo, as identified by Duclusaud et al.
 
     Args:
-      name: "mx64" or "mx106": Dynamixel MX-64 and MX-106.
-      model: "m1" to "m6", see `ServoFriction`. Each was fitted by itself, with its own motor.
+      name: "mx64" or "mx106", for Dynamixel MX-64 and MX-106.
+      model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
 
     Raises:
@@ -107,7 +109,7 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
 
 
 VOLTAGE = 15.0 * 0.9625  # V: the supply times the largest duty cycle; bam/dynamixel/actuator.py
-THEIRS = {  # name of a number in Rhoban/bam -> ours
+THEIRS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
     "friction_viscous": ("kv",),
     "friction_base": ("kc",),
     "friction_stribeck": ("kcs",),
@@ -122,7 +124,8 @@ THEIRS = {  # name of a number in Rhoban/bam -> ours
     "dtheta_stribeck": ("vs",),
     "alpha": ("alpha",),
 }
-# Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: servo -> model -> N m/A, ohm, kg m^2, and the numbers above
+# Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R in ohm, armature in
+# kg m^2, and the keys of THEIRS in the units of ServoFriction.
 SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "mx64": {
         "m1": {

@@ -1,19 +1,20 @@
 """Friction by a published formula of speed and load, which MuJoCo does not have: the callback evaluates it.
 
-A formula gives the force F that resists a joint which slides at the speed v, and the bounds [low, high] of what holds
-it at rest. The bounds matter where F is a smooth function with F(0) = 0, as in fits to records of moving joints: by F
-alone a joint at rest under a load creeps, at the speed at which F is the load. So a joint slides or sticks:
+A formula gives the force F that resists a joint sliding at the speed v, and the bounds [low, high] of the force that
+holds the joint at rest. The bounds are needed because a fit to records of moving joints is a smooth F with F(0) = 0. By
+F alone, a joint under a load would never rest: it would creep at the speed at which F equals the load. So a joint
+slides or sticks:
 
     slides:  friction = -F(v, motor, load)
     sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high), like a LuGre bristle that does not slip
 
-It sticks from where its speed changes sign, or falls below SLOW; x_s is its position then. It slides again once
-stiffness (x - x_s) is beyond the bounds. So friction is F to the last bit while the joint slides, and at rest it holds
-without creep, because the friction of a stuck joint depends on its position. After a load comes, the joint turns by
-load/stiffness, and its speed decays: as exp(-200 t/s) alone, slower where other joints move with it. A joint that
-slides goes on at the speed at which F is the load.
+A joint sticks when its speed changes sign or falls below SLOW; x_s is its position at that time. It slides again when
+stiffness (x - x_s) leaves the bounds. So friction is F to the last bit while a joint slides, and a stuck joint does not
+creep, because its friction depends on its position. Under a new load a stuck joint turns by load/stiffness. Its speed
+decays as exp(-200 t/s) if it moves alone, and slower if other joints move with it. A joint that slides keeps sliding at
+the speed at which F equals the load.
 
-What the callback computes is the control of an actuator `passive:<joint>`, held over each physics step.
+The callback writes the friction as the control of an actuator `passive:<joint>`, held over each physics step.
 """
 
 import dataclasses
@@ -28,7 +29,7 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joints
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
-SLOW = 1e-4  # rad/s or m/s, chosen: a joint that slows down below this speed sticks
+SLOW = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
 BRISTLE = 200.0  # rad/s, chosen: natural frequency of a stuck joint, which two steps of 1 ms resolve; critically damped
 MOST_EXPONENT = 700.0  # exp of more overflows
 
@@ -39,11 +40,11 @@ PerJoint = float | Sequence[float]  # one number for all channels, or one for ea
 class Sliding(Friction):
     """Base of frictions by a formula.
 
-    A class states its numbers as fields, each one for all joints or a sequence with one for each channel.
+    A class states its numbers as fields. Each is one number for all channels, or a sequence with one for each channel.
 
     Attributes:
-      stiffness: N m/rad (N/m) of a stuck joint. None: that of BRISTLE, with each joint's inertia at the start of the
-        run, at qpos0.
+      stiffness: of a stuck joint, N m/rad (N/m). None: for the natural frequency BRISTLE, with each joint's inertia at
+        the start of the run, in MuJoCo's reference position qpos0.
     """
 
     bristles = True
@@ -65,19 +66,23 @@ class Sliding(Friction):
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
-        """Return F, low and high, N m (N).
+        """Return F and the bounds low and high of the force at rest, N m (N).
 
         Args:
           v: speed of the joint, rad/s (m/s).
           motor: force of its drive in the physics step before, N m (N).
-          load: what all else exerts on it: gravity, gyration, springs and disturbances, and the contacts and limits of
-            the step before.
+          load: sum of the other forces on it, N m (N): gravity, gyration, springs and disturbances, and contacts and
+            limits in the step before.
           p: the numbers of its channel, by name.
         """
         raise NotImplementedError
 
     def check_each(self, *names: str, **bounds: Any) -> None:
-        """Replace fields by floats, or tuples of them. None stays if it is the field's default.
+        """Check fields, and replace each by a float or a tuple of floats. None stays if it is the field's default.
+
+        Args:
+          names: of the fields.
+          bounds: as of `errors.number`.
 
         Raises:
           ScenarioError: a field is not a number, or a sequence of numbers, within these bounds.
@@ -94,7 +99,7 @@ class Sliding(Friction):
             object.__setattr__(self, name, value)
 
     def check(self, plant: Plant) -> None:
-        """Raise ScenarioError if a sequence has not one number for each channel of the plant."""
+        """Raise ScenarioError if a field is a sequence and does not have one number for each channel of the plant."""
         for name in (*self.names, "stiffness"):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != plant.n:
@@ -104,11 +109,15 @@ class Sliding(Friction):
                 )
 
     def parameters(self, i: int) -> tuple[float, ...]:
-        """Return the numbers of channel i that `value` reads, NaN for None."""
+        """Return the numbers of channel i that `value` reads as p; NaN for None."""
         return tuple(math.nan if (one := _of(getattr(self, name), i)) is None else one for name in self.names)
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
-        """Return stiffness and damping of channel i when it sticks, critically damped, for its joint's inertia."""
+        """Return stiffness and critical damping of channel i when it sticks.
+
+        Args:
+          inertia: of the joint, kg m^2 (kg).
+        """
         stiffness = _of(self.stiffness, i)
         stiffness = inertia * BRISTLE**2 if stiffness is None else stiffness
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
@@ -120,7 +129,7 @@ class Sliding(Friction):
 
 
 def _of(value: Any, i: int) -> Any:
-    """Return the value of channel i, from one for all or a tuple."""
+    """Return the value of channel i, from one value for all channels or a tuple with one for each."""
     return value[i] if isinstance(value, tuple) else value
 
 
@@ -134,16 +143,16 @@ class Sigmoid(Sliding):
     Emika Panda robot with retrieval of feasible parameters using penalty-based optimization, IEEE Robotics and
     Automation Letters 4(4), 2019, eq. (11). `smc.plant("panda").friction` has its numbers.
 
-    The published F is 0 at v = 0 and cannot hold a joint at rest: under a load below its limits F(-inf) and F(inf) it
-    creeps at the speed at which F is the load, 0.2 rad/s for half of it on joint 1. How a joint holds here: see the
-    module.
+    The published F is 0 at v = 0, so it cannot hold a joint at rest. Under a load within its limits F(-inf) and F(inf)
+    a joint creeps at the speed at which F equals the load: 0.2 rad/s for joint 1 of the Panda under half of the limit.
+    The module's docstring says how a joint is held here.
 
     Attributes:
       p1: N m (N), F(inf) - F(-inf); 0 or more.
       p2: s/rad (s/m), greater than 0.
       p3: rad/s (m/s), an offset.
-      hold: N m (N), 0 or more: what holds a joint at rest, in both directions. None: the limits of F, which are what
-        dry friction tends to. 0: nothing does; friction is F alone, at rest too.
+      hold: N m (N), 0 or more: largest force that holds a joint at rest, in both directions. None: the limits of F,
+        to which dry friction tends. 0: nothing holds it, and friction is F alone.
     """
 
     p1: PerJoint

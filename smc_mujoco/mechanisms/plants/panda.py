@@ -2,26 +2,26 @@
 
     M(q) q'' + C(q, q') q' + G(q) = u + d
 
-Channel i is the angle of joint i + 1 in rad, as the maker counts it, u the torque of its motor after the gear. M, C and
-G are those of seven rigid links on the maker's modified Denavit-Hartenberg frames, with the axis of joint i the z of
-its frame:
+Channel i, from 0, is the angle of the maker's joint i + 1, rad; u is the torque of its motor after the gear. M, C and G
+are those of seven rigid links on the maker's modified Denavit-Hartenberg frames. The z axis of a frame is the axis of
+its joint:
 
     joint        1      2      3      4       5       6      7      flange
     a, m         0      0      0      0.0825  -0.0825 0      0.088  0
     alpha, rad   0      -pi/2  pi/2   pi/2    -pi/2   pi/2   pi/2   0
     d, m         0.333  0      0.316  0       0.384   0      0      0.107
 
-m is the mass of the links, which scales all their masses and inertias; payload is that of a steel ball whose centre is
-the distance lp along the flange's axis from the flange. A mismatch or a jump adds kg to the payload, which is 0 by
-default. Each channel's nominal f has the others' commands; it is MuJoCo's own. The default reference is the maker's
-ready pose, `rest`; runs start from the home pose of mujoco_menagerie. The joints have no friction by
-default; `friction=smc.plant("panda").friction` is that which Gaz et al. identified.
+m is the mass of all links, and scales their masses and inertias. payload is the mass of a steel ball, whose centre is
+on the flange's axis at the distance lp from the flange. It is 0 by default, and a mismatch or a jump adds kg to it. The
+nominal f of a channel is computed by MuJoCo, with the commands of the other channels. The default reference is the
+maker's ready pose, `rest`; runs start from the home pose of mujoco_menagerie. The joints have no friction by default;
+`friction=smc.plant("panda").friction` is the friction that Gaz et al. identified.
 Source: masses, centres and inertias of the links: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca,
 Dynamic identification of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
 optimization, IEEE Robotics and Automation Letters 4(4), 2019, as in mujoco_menagerie's panda_nohand (Apache-2.0), which
-has the limits of positions and torques too: those of the maker. Steel: 7850 kg/m^3. lp, the probe, and where table and
-wall stand are chosen. Limits: the maker's bounds on speed, 2.175 rad/s (joints 1 to 4) and 2.61 rad/s, stop nothing
-here, and links do not touch each other.
+also has the maker's limits of positions and torques. Steel: 7850 kg/m^3. lp, the probe, and the places of table and
+wall are chosen. Left out: the maker's bounds on speed, 2.175 rad/s (joints 1 to 4) and 2.61 rad/s, and contacts between
+links.
 """
 
 import math
@@ -37,13 +37,13 @@ JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 LINKS = tuple(f"link{i}" for i in range(1, 8))
 MASS = math.fsum((4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.666555, 0.735522))  # kg, of the links
 STEEL = 7850.0  # kg/m^3
-FLANGE = 0.107  # m, of the flange from joint 7
+FLANGE = 0.107  # m, from joint 7 to the flange
 TABLE, WALL = 0.2, 0.65  # m: height of the table, and distance of the wall from the arm's first axis
 RUBBING = 0.2  # coefficient of friction between the probe and table or wall: chosen
 READY = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # rad, the maker's
 RANGES = ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973))
 RANGES += ((-0.0175, 3.7525), (-2.8973, 2.8973))  # rad
-# N m, s/rad, rad/s, of each joint: Gaz et al.
+# Friction of each joint, in N m, s/rad, rad/s: Gaz et al.
 FRICTION = Sigmoid(
     p1=(0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489),
     p2=(5.1181, 9.0657, 10.136, 5.5903, 8.3469, 17.133, 10.336),
