@@ -4,10 +4,10 @@
     cycle = smc.chattering("super_twisting", plant="duffing", actuator=smc.Lag(0.01))
     cycle.amplitude, cycle.frequency          # of s, in its unit, and Hz; NaN where no limit cycle is predicted
 
-A limit cycle e = a sin(omega t) is where N(a, omega) L(j omega) = 1: N is the first harmonic of what the law returns,
-L the answer of the linearised mechanism (`harmonics`). That is exact if the mechanism filters all other harmonics out,
-and if the cycle is not locked to the control samples; `uncertainty` says how much these two may change. Cycles that are
-not stable are left out, by Loeb's criterion.
+A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what the law returns, and
+L the answer of the linearised mechanism (`harmonics`). The solution is exact if the mechanism filters all other
+harmonics out, and if the cycle is not locked to the control samples; `uncertainty` says how much these two may change
+it. Cycles that are not stable by Loeb's criterion are left out.
 Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
 Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
@@ -30,38 +30,42 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-FREQUENCIES, AMPLITUDES = 60, 36  # of the grid on which cycles are sought
-COARSE = 60  # samples of a period there
+FREQUENCIES, AMPLITUDES = 60, 36  # points of the grid on which cycles are sought: chosen
+COARSE = 60  # samples of a period on that grid: chosen
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
-SAME = 0.02  # relative: two cycles nearer than that are one
-WIDER = 1.0  # of the log of an amplitude: a bracket found with few samples is widened by this
-NYQUIST = 0.9  # of half the sampling frequency: faster waves beat with their images, see _of_two_samples
-GROWS = 3.0  # by which a gain is larger at a thousandth of an amplitude, if the law switches
-NEAR, SLOWER = 1e-4, 0.93  # relative: how close the slowest and fastest cycle are found, and steps on the way there
-DAMPED, FINE = 0.01, 2000  # resonances without damping are passed at this distance, in this many steps
+SAME = 0.02  # relative difference below which two cycles are one: chosen
+WIDER = 1.0  # of the log of an amplitude, by which a bracket from the coarse grid is widened: chosen
+NYQUIST = 0.9  # share of half the sampling frequency up to which waves are sought: faster ones beat with their images
+GROWS = 3.0  # least factor by which a gain grows from an amplitude to a thousandth of it, if the law switches: chosen
+NEAR, SLOWER = 1e-4, 0.93  # relative: tolerance of the slowest and the fastest cycle, and step of the search for them
+SMALL = 0.1  # relative change in Loeb's criterion: so large that the places of the samples do not matter; chosen
+DRIFT = 0.05  # relative drift of a law's gain from which a prediction is called a snapshot: chosen
+# Distance at which resonances without damping are passed, relative to the frequency, and points on the way: chosen.
+DAMPED, FINE = 0.01, 2000
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Chattering:
-    """A predicted limit cycle of one channel; all numbers are NaN where none is predicted, or all but the ranges.
+    """A predicted limit cycle of one channel. If none is predicted, its numbers are NaN; the ranges may be known.
 
     Attributes:
       amplitude: of the sliding variable s, half its range, in its unit.
       amplitude_x: of the position, rad or m.
       amplitude_u: of the command, half its range, in its unit: N m, N or V.
       frequency: Hz.
-      power: mean square of s', (amplitude_s omega)^2 / 2 of its first harmonic: for s' = u + d that of the delivered
-        force, per unit of mass.
-      third_harmonic: share of the third harmonic in s, over the first; NaN for two samples in a period. Where it is
-        large the law does not see a sine, and the prediction is rough.
+      power: mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s. For s' = u + d it is the mean
+        square of the delivered force per unit of mass.
+      third_harmonic: third harmonic of s over the first; NaN for two samples in a period. If it is large, the law does
+        not see a sine, and the prediction is rough.
       samples: control samples in a period.
-      amplitude_range, frequency_range: the least and the most that amplitude and frequency may be, if the cycle is
-        locked to the samples, and with the higher harmonics that the law sees: see `Loop.phases`. The largest amplitude
-        includes what one count of an encoder moves s by. Both are also known for a law that switches if the balance has
-        no solution: then a locked cycle is possible.
-      coupling: largest amplitude of another driven channel under this one's command, over amplitude_x; 0 for a single
-        channel. The prediction is for one channel alone: where this is not small, they oscillate together.
-      gain: N, complex; response: L, complex, at the cycle.
+      amplitude_range, frequency_range: least and largest amplitude and frequency that are possible because the cycle
+        may be locked to the samples, and because the law sees higher harmonics: see `Loop.phases`. The largest
+        amplitude includes the change of s by one count of an encoder. If the balance has no solution but the law
+        switches, the ranges are those of a locked cycle, which is possible.
+      coupling: largest amplitude of another driven channel under this channel's command, over amplitude_x; 0 for a
+        single channel. The prediction is for one channel alone. If coupling is not small, the channels oscillate
+        together.
+      gain, response: N and L at the cycle, complex.
       assumptions: what was left out or is doubtful, in sentences.
     """
 
@@ -84,9 +88,9 @@ class Chattering:
 
     @property
     def uncertainty(self) -> float:
-        """How far the amplitude or the frequency may be off, relative to the predicted one: the larger of the two.
+        """Largest relative distance of an end of the two ranges from the predicted amplitude or frequency.
 
-        It is inf if no limit cycle is predicted and one is possible, and NaN for a law that is calm.
+        It is inf if no limit cycle is predicted but one is possible, and NaN if none is possible.
         """
         if not self:
             return math.nan if math.isnan(self.amplitude_range[1]) else math.inf
@@ -98,12 +102,12 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
     """Predict the limit cycle about rest of one driven channel.
 
     Args:
-      law: a Scenario, or the law of one whose other fields follow.
+      law: a Scenario; or a law, with the other fields of a Scenario by name.
       channel: index of a driven channel; the others are at rest.
       fields: of the Scenario, such as plant, actuator, input_delay, control_period.
 
     Returns:
-      The stable limit cycle; the fastest, if there are several: that of a mechanism near rest.
+      The stable limit cycle. If there are several, the fastest, which is that of a mechanism near rest.
 
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
@@ -120,7 +124,11 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
-    """Return what `chattering` returns; without `ranges` those of a predicted cycle are NaN, in half the time."""
+    """Return what `chattering` returns for a scenario.
+
+    Args:
+      ranges: False to leave the ranges of a predicted cycle NaN, which takes half the time.
+    """
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
@@ -132,7 +140,7 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
 
 
 def switches(loop: Loop) -> bool:
-    """Return whether the gain of a law grows without bound towards small amplitudes, so that it is never calm."""
+    """Return whether a law switches: whether its gain grows without bound towards small amplitudes."""
     omega = 0.1 * math.pi / loop.scenario.control_period
     small, smaller = (abs(loop.gain(amplitude, omega, COARSE)) for amplitude in (1e3 * MIN_AMPLITUDE, MIN_AMPLITUDE))
     return smaller > GROWS * small
@@ -141,8 +149,8 @@ def switches(loop: Loop) -> bool:
 def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
-    Such a law switches at most half a control period later than in the mean. The cycle is no larger and no slower than
-    the one with that delay.
+    Such a law switches at most half a control period later than on average. So the cycle is not larger and not slower
+    than that of the same loop with half a control period more delay.
     """
     loop = Loop(scenario, channel, 0.5 * scenario.control_period)
     found = _stable(loop, cycles(loop))
@@ -170,11 +178,11 @@ def cycles(loop: Loop) -> list[Wave]:
     return [loop.wave(*one) for one in (found or _of_two_samples(loop, fastest, amplitudes))]
 
 
-Bracket = tuple[tuple[float, float], tuple[float, float]]  # two omegas and the amplitudes there, ends of a search
+Bracket = tuple[tuple[float, float], tuple[float, float]]  # ends of a search: two omegas, and two amplitudes
 
 
 def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterator[Bracket]:
-    """Yield where a cycle lies between: along the curve |N L| = 1 the phase of N L changes its sign."""
+    """Yield brackets that may contain a cycle: along the curve |N L| = 1, the phase of N L changes its sign there."""
     branches: list[list[tuple[float, float]]] = []  # for each omega: (amplitude, phase) where |N L| = 1
     for omega in omegas:
         response = loop.response(omega)
@@ -196,9 +204,10 @@ def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterato
 
 
 def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, float] | None:
-    """Return amplitude and omega of the cycle in a bracket: nested bisections, as N may jump where samples do.
+    """Return amplitude and omega of the cycle in a bracket, or None.
 
-    The bracket is widened by itself to both sides, as few samples shift the phase of a law that switches.
+    The search is nested bisection, because N may jump, by where the samples fall. The bracket is widened to both sides,
+    because the coarse grid's few samples shift the phase of a law that switches.
     """
     from scipy.optimize import brentq
 
@@ -211,14 +220,19 @@ def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, 
     fastest = math.log(NYQUIST * math.pi / loop.scenario.control_period)
     first, last = 2 * first - last, min(2 * last - first, fastest)
     if phase(first) * phase(last) > 0.0:
-        return None  # found with few samples, and not confirmed with all
+        return None  # the coarse grid's bracket has no cycle with all samples
     omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
     found, _ = _on_curve(loop, omega, low, high)
     return (found, omega) if low < math.log(found) < high else None
 
 
 def _on_curve(loop: Loop, omega: float, low: float, high: float, close: float = 1e-9) -> tuple[float, float]:
-    """Return the amplitude where |N L| = 1, or the end of a range of its log that is nearer to it, and N L's phase."""
+    """Return the amplitude at which |N L| = 1 for an omega, and the phase of N L there.
+
+    Args:
+      low, high: range of the amplitude's log. Without a solution in it, the nearer end is returned.
+      close: tolerance of the amplitude's log.
+    """
     from scipy.optimize import brentq
 
     response = loop.response(omega)
@@ -236,10 +250,14 @@ def _on_curve(loop: Loop, omega: float, low: float, high: float, close: float = 
 
 
 def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
-    """Return the cycle for a law that is late (shift < 0, rad at the cycle's omega) or early.
+    """Return the cycle for a law that acts later or earlier.
 
-    It is sought along the curve |N L| = 1, towards slower waves for a law that is late. The search ends at the slowest
-    wave that counts, and at a wave of two samples.
+    The search follows the curve |N L| = 1, towards slower waves for a later law. It ends at the slowest wave that
+    counts as chattering, or at a wave of two samples.
+
+    Args:
+      wave: the cycle of the law as it is.
+      shift: rad at the cycle's omega; negative for a later law.
     """
     from scipy.optimize import brentq
 
@@ -253,7 +271,7 @@ def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
         return phase + shift * omega / wave.omega
 
     omega, before, step = wave.omega, shift, SLOWER if shift < 0.0 else 1.0 / SLOWER
-    if omega > fastest:  # two samples: these cannot be early
+    if omega > fastest:  # a wave of two samples, which cannot be faster
         omega, before = fastest, excess(fastest) if shift < 0.0 else 0.0
     if before * shift <= 0.0:
         return wave
@@ -271,7 +289,7 @@ def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
 
 
 def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[tuple[float, float]]:
-    """Return the cycles of two samples: there N L is real, and 1 for some amplitude."""
+    """Return amplitude and omega of the cycles of two samples. For them N L is real, so its magnitude decides."""
     from scipy.optimize import brentq
 
     response = loop.response(fastest).real
@@ -292,13 +310,13 @@ def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[
 def _stable(loop: Loop, waves: list[Wave]) -> list[Wave]:
     """Return the stable cycles.
 
-    A larger one decays (Loeb's criterion), and from no slower cycle that does so N L has turned once around 0: a delay
-    gives such cycles one after the other, and all but the slowest give way to it.
+    A cycle is stable if a larger oscillation decays (Loeb's criterion), and if N L has not turned once around 0 between
+    a slower cycle of that kind and this one. A delay gives a row of such cycles, and all give way to the slowest.
     """
     alone = sorted((wave for wave in waves if _decays(loop, wave)), key=lambda wave: wave.omega)
     if len(alone) < 2:
         return alone
-    # a little beside the frequencies, so that resonances without damping have a width
+    # frequencies with a small imaginary part, so that resonances without damping have a width
     omegas = np.geomspace(0.9 * alone[0].omega, 1.1 * alone[-1].omega, FINE)
     phases = np.unwrap([np.angle(loop.response(w * (1.0 - DAMPED * 1j))) for w in omegas])
     turns = np.interp([wave.omega for wave in alone], omegas, phases) / math.tau
@@ -308,27 +326,26 @@ def _stable(loop: Loop, waves: list[Wave]) -> list[Wave]:
 def _decays(loop: Loop, wave: Wave) -> bool:
     """Return whether an oscillation that is a little larger than the cycle decays."""
     if wave.omega >= math.pi / loop.scenario.control_period:
-        return True  # see _of_two_samples: the gain falls with the amplitude
-    small = 0.1  # far enough that it does not matter where samples fall
+        return True  # of two samples: the gain falls with the amplitude
 
     def product(amplitude: float, omega: float) -> complex:
         return complex(np.log(loop.gain(amplitude, omega) * loop.response(omega)))
 
-    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (small, -small))
-    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (small, -small))
+    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (SMALL, -SMALL))
+    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (SMALL, -SMALL))
     return ((up - down) / (fast - slow)).imag < 0.0
 
 
 def _described(loop: Loop, wave: Wave, said: tuple[str, ...], ranges: bool) -> Chattering:
-    """Return the numbers of a limit cycle."""
+    """Return a limit cycle with its numbers. `said` are the assumptions so far."""
     response = loop.response(wave.omega)
     if not math.isnan(wave.third):
         passed = abs(loop.response(3.0 * wave.omega) / response)
         said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
     coupling = loop.coupling(wave.omega)
     if coupling:
-        said += (f"other driven channels are at rest, though this one's command moves one {coupling:.2g} times as far",)
-    if wave.drift > 0.05:
+        said += (f"other driven channels rest, though this command moves one of them {coupling:.2g} times as far",)
+    if wave.drift > DRIFT:
         said += ("gains or memories of the law drift: the prediction is a snapshot",)
     sizes, omegas = [math.nan], [math.nan]
     if ranges:
@@ -352,7 +369,7 @@ def _described(loop: Loop, wave: Wave, said: tuple[str, ...], ranges: bool) -> C
 
 
 def _assumptions(loop: Loop) -> Iterator[str]:
-    """Yield what is left out of the linear part, and what a run has beside it."""
+    """Yield what the prediction assumes, and what a run has but the prediction leaves out."""
     scenario = loop.scenario
     yield "about rest at x = 0, without reference, disturbance and noise"
     if any(isinstance(part, RateLimit) for part in scenario.actuator):
@@ -363,7 +380,7 @@ def _assumptions(loop: Loop) -> Iterator[str]:
         yield "no dry friction"
     if loop.count:
         unit = f"{scenario.plant.units[loop.channel]}/s"
-        yield f"no rounding by the encoder: a count moves s by {loop.count:.2g} {unit}; smaller cycles drown in that"
+        yield f"no rounding by the encoder: a count moves s by {loop.count:.2g} {unit}, which hides smaller cycles"
     resolved = scenario.resolved
     if resolved.integrator != "RK4":
         step, share = 1e3 * resolved.physics_step, 100.0 * resolved.physics_step / resolved.control_period
@@ -382,7 +399,12 @@ def save(
     measured: Sequence[tuple[float, float]],
     path: str | os.PathLike,
 ) -> Path:
-    """Write predictions, and amplitude and frequency measured beside them, to a .json file. Return its path.
+    """Write predictions and measurements to a .json file. Return its path.
+
+    Args:
+      scenarios, cycles: the scenarios, and the predicted cycle of each.
+      measured: amplitude of s in its unit and frequency in Hz, measured in a run of each scenario.
+      path: of the file.
 
     Raises:
       ScenarioError: the file cannot be written.

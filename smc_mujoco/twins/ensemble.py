@@ -1,4 +1,4 @@
-"""Runs of laws over a rig's ensemble of parameter sets, as over conditions: does a ranking survive what is not known?
+"""Rankings of laws over a rig's parameter sets: does a winner win whichever of them is true?
 
 table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
 print(ensemble.verdict(smc.leaderboard(table)))
@@ -16,7 +16,7 @@ from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.twins.rig import Rig, Values
 
-PLANT_ALONE = ("x0", "v0")  # fields that the starts of a grid decide
+BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
 
 
 def runs(
@@ -27,7 +27,7 @@ def runs(
     duration: float = 10.0,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return runs of every law on every parameter set from every seed; the set is the run's condition.
+    """Return scenarios of every law on every parameter set from every seed. The set is the condition.
 
     Args:
       rig: a rig with an ensemble.
@@ -40,15 +40,15 @@ def runs(
     """
     if not rig.ensemble:
         raise ScenarioError(
-            f"{rig.name} has one set of parameters here, and no errors of them to draw others from: choose a rig with "
-            "an ensemble, such as qube_servo, or identify it from records and draw one with Identified.drawn"
+            f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
+            "from records and draw other sets with Identified.drawn"
         )
     if not (chosen := list(rig.laws if laws is None else laws)):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
     found, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
         fields: dict[str, Any] = member.machine(Values(**member.values))
-        own = {key: value for key, value in fields.items() if key not in PLANT_ALONE}
+        own = {key: value for key, value in fields.items() if key not in BY_STARTS}
         plant = own.pop("plant")
         base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
         free: dict[str, Any] = {"u_max": None, "physics_step": None} | own
@@ -57,12 +57,20 @@ def runs(
 
 
 def wins(board: Any) -> dict[str, int]:
-    """Return law -> on how many parameter sets it wins, of a `leaderboard.Board` whose conditions are the sets."""
+    """Return law -> number of parameter sets on which it wins.
+
+    Args:
+      board: a `leaderboard.Board` whose conditions are the sets.
+    """
     return dict(Counter(block.winner for block in board.blocks if block.winner).most_common())
 
 
 def verdict(boards: Sequence[Any]) -> str:
-    """Return in a line for each metric whether one law wins on every parameter set."""
+    """Return a line for each metric: whether one law wins on every parameter set.
+
+    Args:
+      boards: of `smc.leaderboard`, whose conditions are the sets.
+    """
     lines = []
     for board in boards:
         count, found = len(board.blocks), wins(board)

@@ -7,10 +7,8 @@ import numpy as np
 
 from smc_mujoco.twins.records import Record
 
-MEASURED, PREDICTED = (
-    "#444444",
-    ("#1f77b4", "#d55e00", "#009e73", "#cc79a7"),
-)  # colours that the colour-blind tell apart
+MEASURED = "#444444"
+PREDICTED = ("#1f77b4", "#d55e00", "#009e73", "#cc79a7")  # colours that the colour-blind can tell apart
 
 
 def residual_figure(
@@ -25,10 +23,15 @@ def residual_figure(
     """Draw each column of a record, measured and predicted, beside its residuals. Write PATH.svg and PATH.png.
 
     Args:
-      t: s, (K,).
+      title: of the figure.
+      t: times, s, (K,).
       measured: column -> values, (K,).
       predicted, fits: name of a twin -> what it predicts, and its fit of each column, percent.
       units: column -> its unit.
+      path: of the files; its ending is replaced.
+
+    Returns:
+      The paths of both files.
     """
     from matplotlib.figure import Figure
 

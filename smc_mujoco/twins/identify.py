@@ -1,19 +1,19 @@
 """Identification: from records to a rig's quantities, with standard errors, correlations and the fit on each record.
 
-Least squares of what the twin predicts: positions, and in a closed loop u, each relative to its variation in the
-record. A record is first repeated in short pieces, each from its measured state under the recorded command, because
-their cost is smooth; then as a whole, with the loop closed where the controller is known. All runs of a step are one
-batch. The search is scipy's trust region. `mujoco.sysid` is not used: it replays recorded controls in an open loop,
-without controllers, encoders and delays, and needs ten more packages.
+The quantities are found by least squares of what the twin predicts: positions, and in a closed loop u, each relative to
+its variation in the record. A record is first replayed in short pieces, each from its measured state under the recorded
+command, because the cost of pieces is smooth. Then it is replayed as a whole, with the loop closed if the controller is
+known. All runs of a step are one batch. The search is scipy's trust region. `mujoco.sysid` is not used: it replays
+recorded controls in an open loop, without controllers, encoders and delays, and needs ten more packages.
 
-The velocity at the start of a record is that of a cubic through its first samples, which is wrong where the command
-jumps there. So it is found along with the quantities, and in an open loop the position too, unless the residuals begin
-when the start is long forgotten.
+A cubic through the first samples of a record gives the velocity at its start, which is wrong if the command jumps
+there. So that velocity is found along with the quantities, and in an open loop the position too, unless the residuals
+begin when the start has no effect any more.
 
-Standard errors allow for residuals that depend on their neighbours: they are those of a jackknife that leaves out one
-block of time after the other, at first order. A closed loop feeds the noise of its measurement back, and where one
-short transient decides a quantity, the other blocks cannot tell what that does. So closed loops are also repeated in
-simulation with their own noise and rounding, and a standard error is at least the deviation that this causes.
+Standard errors allow for residuals that depend on their neighbours: they come from a jackknife, at first order, that
+leaves out one block of time after the other. A closed loop feeds the noise of its measurement back. If one short
+transient decides a quantity, the other blocks do not show the effect of that noise. So closed loops are also simulated
+with their own noise and rounding, and a standard error is at least the deviation that these cause.
 """
 
 import dataclasses
@@ -38,28 +38,32 @@ from smc_mujoco.twins.records import Columns, Record
 from smc_mujoco.twins.rig import Quantity, Rig, Source
 from smc_mujoco.twins.rig import rig as find_rig
 
-STEP = 2e-3  # of a quantity's scale, for central differences; chosen, as dry friction makes shorter ones rough
-SPREAD = 0.2  # standard deviation of the logarithm of other starts of the search; chosen
-MAX_CORRELATION = 0.98  # correlation from which records cannot tell two quantities apart; chosen
+STEP = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
+SPREAD = 0.2  # standard deviation of the logarithm of a quantity in further starts of the search; chosen
+MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quantities apart; chosen
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
-POOR = 80.0  # percent, of a fit below which the search may have ended in the wrong place; chosen
-BLOCKS = 25  # of time in a record that is repeated as a whole, for standard errors; chosen
-STATE_SCALE = 0.05  # unit of a state at the start, of the standard deviation of its column or rate; chosen
-SAME = 1e-6  # least singular value of the normalised Jacobian whose quantities can be told apart; chosen
-WORST = 1.0  # of a sample's residual, relative to the norm of the record: a run that fails has this
+POOR = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
+BLOCKS = 25  # blocks of time in a record that is replayed as a whole, for standard errors; chosen
+STATE_SCALE = 0.05  # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
+SAME = 1e-6  # below this ratio of the Jacobian's singular values quantities cannot be told apart; chosen
+WORST = 1.0  # largest residual of a sample, relative to the norm of the record; that of a run that fails
+ENDING = 1e-6  # relative changes of cost and point at which the search ends; chosen
+INSIDE = 1e-9  # distance of the search's start from the ends of its ranges, as scipy demands
+# Fields of a run's scenario that a rig made from its plant takes over.
+OF_RUN = ("control_period", "friction", "contact", "actuator", "sensor", "u_max", "input_delay", "velocity", "model")
 
 
 @dataclasses.dataclass(frozen=True)
 class Identified:
-    """What records determine of a rig.
+    """The quantities of a rig that were found from records, and how well they fit.
 
     Attributes:
       rig: the rig with the values found.
-      before: the rig before.
+      before: the rig with the values before.
       values, errors: quantity -> value found, and its standard error.
       correlations: of the errors, (p, p), in the order of `values`.
-      fits, fits_before: percentages of each record, see `Rig.fit`; `fits` start from the states found.
-      predictions: of each record, the predicted columns, the measured ones and their times.
+      fits, fits_before: `Rig.fit` of each record after and before; for `fits` the states at the starts are those found.
+      predictions: of each record, the predicted columns, the measured columns and their times.
       evaluations: how many sets of values were simulated.
     """
 
@@ -75,7 +79,7 @@ class Identified:
 
     @property
     def notes(self) -> list[str]:
-        """What the records cannot determine, in sentences."""
+        """Sentences on what the records cannot determine, and on a poor fit."""
         names, found = list(self.values), []
         for i, one in enumerate(names):
             for j, other in enumerate(names[:i]):
@@ -89,17 +93,20 @@ class Identified:
                 found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
         if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
             found.append(
-                f"the worst fit is {worst:.0f} %: the model lacks something, a column is another or in another unit, "
-                "or the search ended in a valley of its cost; start from other values, with more starts or another seed"
+                f"the worst fit is {worst:.0f} %: the model lacks something, a column is wrong or in another unit, or "
+                "the search ended in a local minimum; start from other values, with more starts or another seed"
             )
         return found
 
     def drawn(self, count: int = 8, seed: int = 0) -> Rig:
-        """Return the rig with an ensemble of other sets that the records allow, for rankings over them.
+        """Return the rig with an ensemble of other sets of values that the records allow, for rankings over them.
 
         Args:
-          count: number of sets, drawn from the normal distribution of the errors and kept within the ranges.
+          count: number of sets. They are drawn from the normal distribution of the errors, and cut to the ranges.
           seed: of the draws.
+
+        Raises:
+          ScenarioError: count or seed is out of range.
         """
         whole("count", count, 1, 1000)
         names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
@@ -116,7 +123,7 @@ class Identified:
         return f"identified({self.rig.name!r}, {found})"
 
     def save(self, path: str | Path) -> Path:
-        """Write values, errors, correlations and fits to a JSON file."""
+        """Write values, errors, correlations and fits to a JSON file. Return its path."""
         quantities = {
             name: {"value": value, "error": self.errors[name], "unit": self.rig.quantities[name].unit}
             for name, value in self.values.items()
@@ -130,7 +137,15 @@ class Identified:
         )  # fmt: skip
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
-        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png."""
+        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png.
+
+        Args:
+          path: of the figure.
+          record: index of the record.
+
+        Returns:
+          The paths of both files.
+        """
         from smc_mujoco.twins.figure import residual_figure
 
         whole("record", record, 0, len(self.fits) - 1)
@@ -152,10 +167,10 @@ def identify(
     """Find a rig's quantities from records.
 
     Args:
-      of: a Rig or the name of one; or a Plant, whose records are traces or columns named as theirs.
+      of: a Rig or its name; or a Plant, whose records are traces, or columns named as those of traces.
       records: one record or several: columns by name (see `Rig.columns`), or traces of simulated runs.
-      quantities: names of those to find; None: the rig's `free`, all parameters of a plant.
-      starts: how many sets of values the search may start from: the present one, and others at random about it.
+      quantities: names of those to find; None: the rig's `free`, or all parameters of a plant that are not 0.
+      starts: number of sets of values from which the search may start: the present one, and random ones about it.
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.
       progress: whether to show a progress bar.
@@ -199,8 +214,8 @@ def identify(
 class Search:
     """Least squares over some quantities of a rig, and over the states at the starts of its records.
 
-    A point of the search, (p + records * s,), has the quantities first, then of each record how far those s numbers of
-    the state at its start that are free are from the measured ones; all in units of their scales.
+    A point z of the search, (p + records * s,), has first the p quantities. Then follow, for each record, the s free
+    numbers of the state at its start, as differences from the measured ones. All are in units of their scales.
     """
 
     def __init__(
@@ -216,10 +231,12 @@ class Search:
         self.scales = np.array([_scale(quantity) for quantity in known])
         n, own = len(twin.columns.x), bool(twin.columns.state) or twin.dynamics is not None
         forgotten = own or twin.score_from > twin.start
-        self.free = np.zeros(0, int) if forgotten else np.arange(2 * n)[n if twin.controller else 0 :]
+        self.free_states = np.zeros(0, int) if forgotten else np.arange(2 * n)[n if twin.controller else 0 :]
         self.measured = [] if own else [self._measured_state(i) for i in range(len(data))]
-        self.state_scales = [self._state_scales(i)[self.free] for i in range(len(data))] if len(self.free) else []
-        unbounded = np.full(len(self.free) * len(data), np.inf)
+        self.state_scales = (
+            [self._state_scales(i)[self.free_states] for i in range(len(data))] if len(self.free_states) else []
+        )
+        unbounded = np.full(len(self.free_states) * len(data), np.inf)
         self.low = np.append([quantity.least for quantity in known] / self.scales, -unbounded)
         self.high = np.append([quantity.most for quantity in known] / self.scales, unbounded)
         self.evaluations = 0
@@ -229,13 +246,13 @@ class Search:
         return self.twin.with_values(self.values(z))
 
     def states(self, z: np.ndarray) -> list[np.ndarray | None]:
-        """Return positions and velocities at the start of each record at a point, (2n,); None: those measured."""
-        if not len(self.free):
+        """Return positions and velocities at the start of each record at a point, (2n,); None if they are not free."""
+        if not len(self.free_states):
             return [None] * len(self.data)
         found = []
         for i, moved in enumerate(z[len(self.names) :].reshape(len(self.data), -1)):
             state = self.measured[i].copy()
-            state[self.free] += moved * self.state_scales[i]
+            state[self.free_states] += moved * self.state_scales[i]
             found.append(state)
         return found
 
@@ -247,18 +264,18 @@ class Search:
         return rest
 
     def _measured_state(self, i: int) -> np.ndarray:
-        """Return positions and velocities at the start of a record as they are measured, (2n,)."""
+        """Return the measured positions and velocities at the start of a record, (2n,)."""
         period = self.twin.step(self.checked[i])
         return np.concatenate(files.state(self.checked[i], self.twin.columns, period, round(self.twin.start / period)))
 
     def _state_scales(self, i: int) -> np.ndarray:
-        """Return the units of positions and velocities at the start of a record, (2n,)."""
+        """Return the scales of positions and velocities at the start of a record, (2n,)."""
         columns, period = [self.checked[i][name] for name in self.twin.columns.x], self.twin.step(self.checked[i])
         varied = [each.std() for each in (*columns, *(files.rate(each, period) for each in columns))]
         return STATE_SCALE * np.array([each or 1.0 for each in varied])
 
     def values(self, z: np.ndarray) -> dict[str, float]:
-        """Return the quantities at a point of the search, within their ranges to the last bit."""
+        """Return the quantities at a point of the search, cut to their ranges."""
         known = [self.twin.quantities[name] for name in self.names]
         found = np.clip(
             z[: len(self.names)] * self.scales, [each.least for each in known], [each.most for each in known]
@@ -266,19 +283,26 @@ class Search:
         return dict(zip(self.names, found.tolist(), strict=True))
 
     def residuals(self, points: Sequence[np.ndarray], stage: str) -> list[np.ndarray]:
-        """Return the residuals at each point, (N,)."""
+        """Return the residuals at each point, (N,) each.
+
+        Args:
+          stage: "pieces" or "whole": how records are replayed.
+        """
         compared = self.compared(points, stage)
         return [np.concatenate([self._relative(*each) for each in one]) for one in compared]
 
     def compared(self, points: Sequence[np.ndarray], stage: str) -> list[list[tuple[Record, Record, Any]]]:
-        """Return what is predicted and what was measured in each piece at each point; all runs are one batch."""
+        """Return, for each point and piece, the predicted columns, the measured columns, and the record's index.
+
+        All runs are one batch.
+        """
         self.evaluations += len(points)
         rigs = [self.rig(z) for z in points]
         if self.twin.dynamics is not None:
             found = [rig.predictions(self.data) for rig in rigs]
         else:
             plan = [(i, at) for i in range(len(self.data)) for at in self._pieces(i, stage)]
-            with warnings.catch_warnings():  # of values that are only tried
+            with warnings.catch_warnings():  # about values that are only tried
                 warnings.simplefilter("ignore", ScenarioWarning)
                 scenarios = [
                     rig.replay(
@@ -301,7 +325,7 @@ class Search:
         return found
 
     def _pieces(self, i: int, stage: str) -> list[tuple[float, float | None]]:
-        """Return start and duration of the pieces of a record, s."""
+        """Return start and duration of the pieces of record i, s; None as duration: to its end."""
         t = self.checked[i][self.twin.columns.time]
         whole, start = float(t[-1] - t[0]), self.twin.start
         count = int((whole - start) / self.twin.window) if stage == "pieces" or self.twin.controller is None else 0
@@ -310,6 +334,7 @@ class Search:
         return [(start + k * self.twin.window, self.twin.window) for k in range(count)]
 
     def _compared(self, rig: Rig, i: int, at: tuple[float, float | None], trace: Trace) -> tuple[Record, Record, int]:
+        """Return an item of `compared`, for the piece `at` of record i, from the trace of its replay."""
         first = round(at[0] / trace.scenario.control_period)
         skipped = 0 if at[1] else round((rig.score_from - rig.start) / trace.scenario.control_period)
         predicted = {name: values[skipped:] for name, values in rig.predicted(trace).items()}
@@ -320,7 +345,11 @@ class Search:
         return predicted, measured, i
 
     def _relative(self, predicted: Record, measured: Record, which: Any) -> np.ndarray:
-        """Return the residuals of all columns, one after the other, relative to each column's variation."""
+        """Return the residuals of all columns, one after the other, relative to each column's variation.
+
+        Args:
+          which: index of the record whose variation counts; otherwise that of `measured` does.
+        """
         found = []
         for name, values in predicted.items():
             column = self.checked[which][name] if isinstance(which, int) else measured[name]
@@ -330,7 +359,7 @@ class Search:
         return np.concatenate(found)
 
     def best_start(self, stage: str, starts: int, seed: int) -> np.ndarray:
-        """Return the point of least cost among the present values and random ones about them."""
+        """Return the point of least cost among the present values and `starts` - 1 random ones about them."""
         rng, p = np.random.default_rng(seed), len(self.names)
         here = np.zeros(len(self.low))
         here[:p] = np.array([self.twin.values[name] for name in self.names]) / self.scales
@@ -342,32 +371,32 @@ class Search:
         return self.better(stage, *points)
 
     def better(self, stage: str, *points: np.ndarray) -> np.ndarray:
-        """Return the point of least cost, the first of equals."""
+        """Return the point of least cost, the first one if several are equal."""
         return points[int(np.argmin([float(np.sum(residual**2)) for residual in self.residuals(points, stage)]))]
 
     def refine(self, stage: str, z: np.ndarray, most: int) -> np.ndarray:
-        """Return the point of least squares near z."""
-        inside = np.clip(z, self.low + 1e-9, self.high - 1e-9)
-        slopes: Any = lambda z: self.jacobian(z, stage)  # noqa: E731  # scipy's stub takes names alone
+        """Return the point of least squares near z, after at most `most` steps."""
+        inside = np.clip(z, self.low + INSIDE, self.high - INSIDE)
+        slopes: Any = lambda z: self.jacobian(z, stage)  # noqa: E731  # typed Any, as scipy's stub allows no function
         found = least_squares(
             lambda z: self.residuals([z], stage)[0], inside, slopes, bounds=(self.low, self.high), max_nfev=most,
-            ftol=1e-6, xtol=1e-6,
+            ftol=ENDING, xtol=ENDING,
         )  # fmt: skip
         return found.x
 
     def refine_from_rest(self, z: np.ndarray, most: int) -> np.ndarray:
-        """Return the point of least squares of the whole records near z, or near z with the machine at rest at first.
+        """Return the better point of least squares: near z, or near z with velocities 0 at the starts of the records.
 
-        Dry friction makes a kink in the cost at rest, where a search from another velocity ends early.
+        Dry friction makes a kink in the cost at velocity 0, before which a search from another velocity ends.
         """
-        if not len(self.free):
+        if not len(self.free_states):
             return self.refine("whole", z, most)
         z = self.refine("whole", self.better("whole", z, self.at_rest(z)), most)
         rest = self.better("whole", z, self.at_rest(z))
         return z if rest is z else self.refine("whole", rest, most)
 
     def jacobian(self, z: np.ndarray, stage: str) -> np.ndarray:
-        """Return the slopes of the residuals, (N, p), by differences that stay in range."""
+        """Return the slopes of the residuals, (N, len(z)), by differences that stay within the ranges."""
         ahead = [np.clip(z + STEP * e, self.low, self.high) for e in np.eye(len(z))]
         back = [np.clip(z - STEP * e, self.low, self.high) for e in np.eye(len(z))]
         both = self.residuals(ahead + back, stage)
@@ -385,7 +414,7 @@ class Search:
         for name, size in zip(self.names, sizes, strict=True):
             if size == 0.0:
                 raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
-        J = J - by_states @ np.linalg.lstsq(by_states, J, rcond=None)[0]  # what no state at a start can do
+        J = J - by_states @ np.linalg.lstsq(by_states, J, rcond=None)[0]  # the part that no state at a start can cause
         _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
         if singular[-1] < SAME * singular[0]:
             raise self._alike(self.names[i] for i in np.argsort(-np.abs(rows[-1]))[:2])
@@ -431,10 +460,10 @@ class Search:
         return (count - 1) / count * moves.T @ moves
 
     def _fed_back(self, J: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the deviation of the solution, (p,), that the noise of the measurement causes through the controller.
+        """Return the deviation of the solution, (p,), that the measurement's noise causes through the controller.
 
-        It is the root mean square over `REPEATS` simulated repetitions of the records, with their noise and rounding,
-        at first order; 0 in an open loop.
+        It is the root mean square over REPEATS simulations of the records with their noise and rounding, at first
+        order; 0 in an open loop.
         """
         if self.twin.controller is None:
             return np.zeros(J.shape[1])
@@ -461,13 +490,18 @@ class Search:
 
 
 def _scale(quantity: Quantity) -> float:
-    """Return the size of a quantity: its value, or for 0 a hundredth of its range."""
+    """Return the scale of a quantity: its magnitude, at least a hundredth of its range; 1e-3 for 0 without a range."""
     span = quantity.most - quantity.least
     return max(abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0))
 
 
 def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
-    """Return the rig to identify, and its records as columns."""
+    """Return the rig to identify, and its records as columns.
+
+    Args:
+      of: as in `identify`.
+      many: the records.
+    """
     if isinstance(of, str):
         of = find_rig(of)
     traces = [one for one in many if isinstance(one, Trace)]
@@ -479,21 +513,14 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
 
 
 def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
-    """Return a rig of a plant's parameters, in the scenario of a run."""
+    """Return a rig whose quantities are a plant's parameters.
+
+    Args:
+      base: scenario of a run, whose parts the rig has; None for none.
+    """
     own = {}
     if base is not None:
-        kept = (
-            "control_period",
-            "friction",
-            "contact",
-            "actuator",
-            "sensor",
-            "u_max",
-            "input_delay",
-            "velocity",
-            "model",
-        )
-        own = {name: getattr(base, name) for name in kept if getattr(base, name) is not None}
+        own = {name: getattr(base, name) for name in OF_RUN if getattr(base, name) is not None}
     least = {name: 1e-6 if name in plant.positive else -np.inf for name in plant.parameters}
     ends = [""] if plant.n == 1 else [str(i) for i in range(plant.n)]
     return Rig(

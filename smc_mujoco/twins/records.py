@@ -1,6 +1,6 @@
-"""Records of rigs: what their columns are, checks, and files.
+"""Records of rigs: their columns, checks and files.
 
-A record is a mapping of columns, each an array over the samples at the rig's control period.
+A record is a mapping from names of columns to arrays, with one value for each control period of the rig.
 """
 
 import csv
@@ -22,10 +22,11 @@ from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
 MIN_SAMPLES = 50  # of a replay; chosen
-STATE_SAMPLES = 15  # on each side of a sample, of the cubic that gives its velocity; chosen: 30 ms at 500 Hz
-RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ; chosen
-MAX_GAP = 10  # periods that an open-loop record may miss, which are interpolated; chosen
-NORMAL_MEDIAN = 0.6745  # of |z| for a standard normal z
+STATE_SAMPLES = 15  # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
+RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ from it; chosen
+MAX_GAP = 10  # periods: a longer gap in an open-loop record is refused, shorter ones are interpolated; chosen
+MAX_GAP_CLOSED = 1.5  # periods: the same for a closed loop, of which no sample may be missing
+NORMAL_MEDIAN = 0.6745  # median of |z| for a standard normal z
 RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
 
 
@@ -37,12 +38,12 @@ class Columns:
       time: s.
       x: position of each channel, rad or m.
       u: command, in the unit of the rig's u.
-      reference: of the driven joint, where the loop is closed.
+      reference: of the driven joint, if the loop is closed.
       feedforward: what is added to the controller's u; records may lack it.
       others: references of the other joints; records may lack them.
-      state: position, then velocity of each channel as they are, without noise and offset: of simulated runs.
+      state: positions, then velocities of all channels, without noise and offset; only simulated runs have them.
       offset: what is subtracted from each channel's column to get the plant's x; empty for 0.
-      torque: of each joint, for records whose torques are predicted from the motion; then x is of these joints.
+      torque: of each joint, for records whose torques are predicted from the motion; x then has these joints.
     """
 
     time: str = "t"
@@ -56,7 +57,11 @@ class Columns:
     torque: tuple[str, ...] = ()
 
     def needed(self, closed: bool) -> tuple[str, ...]:
-        """Return the columns that a record must have; `closed`: that of a closed loop."""
+        """Return the columns that a record must have.
+
+        Args:
+          closed: whether it is of a closed loop, and so needs the reference.
+        """
         command = self.torque or (self.u, self.reference)[: 1 + closed]
         return self.time, *self.x, *command
 
@@ -75,8 +80,8 @@ def load(path: str | os.PathLike, names: Mapping[str, str] | None = None) -> Rec
     """Return the columns of a CSV or npz file, or a saved trace.
 
     Args:
-      path: a CSV file whose first line names the columns, an npz file with an array a column, or a trace's npz file.
-      names: a rig's name of a column -> its name in the file. Default: they are the same.
+      path: a CSV file whose first line names the columns, an npz file with an array for each column, or a saved trace.
+      names: the rig's name of a column -> its name in the file, for columns whose names differ.
 
     Raises:
       ScenarioError: no such file, not a file of columns, or an unknown column.
@@ -102,7 +107,7 @@ def load(path: str | os.PathLike, names: Mapping[str, str] | None = None) -> Rec
 
 
 def _csv(file: Path) -> Record:
-    """Return the columns of a CSV file; a cell that is empty or no number is NaN."""
+    """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as text:
             rows = [row for row in csv.reader(text) if row]
@@ -128,7 +133,7 @@ def _cell(text: str) -> float:
 
 
 def of_trace(trace: Trace, columns: Columns) -> Record:
-    """Return what was measured in a run, with its noise, in a rig's columns."""
+    """Return a run as a record with a rig's columns: what was measured, with its noise and rounding."""
     s, sensor = trace.scenario, trace.scenario.sensor
     offset = columns.offset or (0.0,) * len(columns.x)
     record = {columns.time: trace.t, columns.u: trace.u[:, 0]}
@@ -146,11 +151,14 @@ def of_trace(trace: Trace, columns: Columns) -> Record:
 
 
 def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
-    """Return the record's known columns as float arrays.
+    """Return the record's known columns as float arrays, (K,) each.
 
     Args:
-      period: s, of the rig's controller, at which a closed loop must be recorded; None for an open loop, whose columns
-        are interpolated at constant steps of their own.
+      record: column -> values.
+      columns: names of the rig's columns.
+      period: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
+        are interpolated at the record's own median step.
+      rig: its name, for errors.
 
     Raises:
       ScenarioError: a missing column, values that are not finite numbers, columns of different lengths, time that runs
@@ -184,7 +192,7 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
             f"the record of {rig} is sampled every {step:.4g} s and the rig's controller runs every {period:g} s: "
             "resample it, or record every command"
         )
-    gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else 1.5) * step)
+    gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else MAX_GAP_CLOSED) * step)
     if len(gaps):
         raise ScenarioError(
             f"the record of {rig} has a gap after sample {gaps[0]}, from {t[gaps[0]]:.6g} s to {t[gaps[0] + 1]:.6g} s: "
@@ -204,10 +212,10 @@ def step_of(data: Record, columns: Columns) -> float:
 
 
 def noise(data: Record, columns: Columns) -> float:
-    """Return the standard deviation of the white noise of the positions: the least of all columns, m or rad.
+    """Return the standard deviation of the white noise of the positions, rad or m: the least of all columns.
 
-    It follows from their fourth differences, which a smooth motion hardly has: of noise sigma they have sqrt(70) sigma.
-    Their median does not see short transients.
+    It follows from the fourth differences of a column, which are near 0 for a smooth motion, and have the standard
+    deviation sqrt(70) sigma for white noise of sigma. Their median ignores short transients.
     """
     differences = [np.abs(np.diff(data[name], 4)) for name in columns.x]
     return min(float(np.median(each)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for each in differences)
@@ -233,7 +241,11 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
 def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities at a sample, (n,) each.
 
-    They are those of the columns `state`, or without these those of a cubic through the samples about it.
+    They come from the columns `state`; if there are none, from a cubic through the samples about it.
+
+    Args:
+      period: s.
+      at: index of the sample.
     """
     if columns.state:
         found = np.array([data[name][at] for name in columns.state])
@@ -247,16 +259,20 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
 
 
 def rate(values: np.ndarray, period: float) -> np.ndarray:
-    """Return the rate of a column, (K,), by cubics through the samples about each."""
+    """Return the rate of a column, (K,), from a cubic through the samples about each."""
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=1, delta=period))
 
 
 def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
-    """Return the record with these columns taken for degrees, and converted."""
+    """Return the record with some columns converted from degrees to radians.
+
+    Args:
+      names: of those columns.
+    """
     angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
     return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
 
 
 def percent(fit: Mapping[str, float]) -> str:
-    """Return a fit in words: "96 / 94 / 85 %"."""
+    """Return a fit as text: "96 / 94 / 85 %"."""
     return " / ".join(f"{value:.0f}" for value in fit.values()) + " %"

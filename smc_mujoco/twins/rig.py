@@ -4,8 +4,8 @@
     rig.scenario(law="none", duration=5.0)         # a Scenario of that machine
     rig.fit(record)                                # {"theta": 95.1, ...}, percent
 
-A rig's file states its quantities, each with unit and source, and one function that makes the fields of a Scenario from
-them. Identification changes quantities; everything else is scenarios, runs and traces as elsewhere.
+A rig's file states its quantities, each with unit and source, and a function that makes the fields of a Scenario from
+them. Identification changes the quantities. Everything else is done with scenarios, runs and traces.
 """
 
 import dataclasses
@@ -30,9 +30,9 @@ from smc_mujoco.twins import inverse, records
 from smc_mujoco.twins.records import Columns, Record
 
 Values = SimpleNamespace  # quantities by name
-Source = Mapping[str, Any] | Trace  # a record: columns by name, or a run of which what was measured counts
-FAR_BETTER = 50.0  # percent that a fit must gain, and reach, to take a record's angles for degrees; chosen
-UNSCORED = -1e3  # percent, of a replay that fails or leaves the machine's range
+Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run
+FAR_BETTER = 50.0  # percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
+UNSCORED = -1e3  # percent: fit of a replay that fails or leaves the machine's range
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Quantity:
     """A number of a rig.
 
     Attributes:
-      value: SI units.
-      unit: "kg m^2", "V s/rad", ...; "" for none.
+      value: in SI units.
+      unit: such as "kg m^2" or "V s/rad"; "" for none.
       source: where the number comes from: a publication and its licence, or the records it was identified from.
       least, most: range that identification keeps to.
     """
@@ -55,11 +55,11 @@ class Quantity:
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """How well a set of quantities fits records that were at hand once; tests find it again where they are.
+    """How well a set of quantities fits records that the package does not contain. Tests check it if they have them.
 
     Attributes:
       quantities: "identified", the name of a published set, or "do nothing", see `Rig.idle`.
-      records: which they are, and what the values are of them: their median, ...
+      records: which records, and what the values are, such as their medians.
       values: column or joint -> value, in `unit`.
       unit: "%" of `Rig.fit`, or that of a residual rms.
     """
@@ -78,22 +78,23 @@ class Rig:
       name: as in `smc.rigs()`.
       label: what it is, in a line.
       quantities: name -> Quantity.
-      machine: quantities by name -> fields of a Scenario: plant, actuator, sensor, control period and so on.
-      controller: the rig's own law, if it is known: closed-loop records are replayed with it.
-      columns: what the columns of its records are.
-      commands: (record, index of the start) -> what the rig adds to its controller's u from there on, (K,). None: only
-        the column of the feedforward, if there is one.
-      start, score_from: s after a record's first sample: where a replay starts, and from when its fit counts.
-      dynamics: quantities by name -> plant with the joints of the record, for records whose torques are predicted from
-        the measured motion; None: records are replayed.
+      machine: function of the quantities, by name, that returns fields of a Scenario: plant, actuator, sensor, control
+        period and so on.
+      controller: the rig's own law, if it is known. Closed-loop records are replayed with it.
+      columns: names of its records' columns.
+      commands: function of a record and the index of the start, that returns what the rig adds to its controller's u
+        from there on, (K,). None: only the column of the feedforward, if there is one.
+      start, score_from: s after a record's first sample, at which a replay starts, and from which its fit counts.
+      dynamics: function of the quantities, by name, that returns a plant with the joints of the record, for records
+        whose torques are predicted from the measured motion. None: records are replayed.
       free: names of the quantities that its records determine, which `smc.identify` finds by default.
       window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
-      published: name of a parameter set -> values of quantities in it, with their source under "source".
-      ensemble: sets of quantities that fit about as well, each a mapping name -> value.
+      published: name of a parameter set -> its values of quantities by name, and its source under "source".
+      ensemble: other sets of quantities that fit about as well, each by name.
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
-      reached: how well it fits, of records that the package does not contain.
-      about: licence and history of the data, and what the twin predicts well and what not.
+      reached: how well it fits records that the package does not contain.
+      about: licence and history of the data, and what the twin predicts well or badly.
     """
 
     name: str
@@ -151,7 +152,7 @@ class Rig:
         return self.with_values(chosen, chosen.pop("source"))
 
     def members(self) -> dict[str, "Rig"]:
-        """Return the rig with each of its parameter sets, its own first, by a name for each."""
+        """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of the ensemble."""
         sets = {f"set {i + 2}": self.with_values(each, "ensemble") for i, each in enumerate(self.ensemble)}
         return {"set 1": self} | sets
 
@@ -186,15 +187,15 @@ class Rig:
 
         Args:
           record: column -> values, (K,); see `columns`.
-          start: s after the first sample; None: the rig's.
+          start: s after the first sample; None: the rig's `start`.
           duration: s; None: to the end of the record.
-          rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be
-            predicted, so `fit` leaves rounding out by default.
-          closed: whether to close the loop where the controller is known; else the recorded command is replayed.
-          state: positions and velocities at the start as the record has them, (2n,); None: those measured.
+          rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be predicted, so
+            `fit` leaves rounding out by default.
+          closed: whether to close the loop if the controller is known; else the recorded command is replayed.
+          state: positions and velocities at the start, as in the columns of `checked`, (2n,); None: those measured.
         """
         if self.dynamics is not None:
-            raise ScenarioError(f"records of {self.name} are not repeated, as their torques are predicted: use fit")
+            raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
         data = self.checked(record)
         period = self.step(data)
         first = round((self.start if start is None else start) / period)
@@ -233,7 +234,7 @@ class Rig:
     def measured(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Trace:
         """Return a record as a trace of the machine, for figures and films beside those of twins.
 
-        x and u are what was measured, v is that of cubics through the positions, and what was not measured is 0.
+        x and u are measured, v follows from cubics through the positions, and what was not measured is 0.
 
         Args:
           record, start, duration: as in `replay`, whose scenario the trace has.
@@ -262,7 +263,7 @@ class Rig:
         return self.columns.needed(self.controller is not None)
 
     def checked(self, record: Mapping[str, Any]) -> Record:
-        """Return the columns of a record that a replay reads, (K,) each. Raise ScenarioError as `fit` does."""
+        """Return the columns of a record that a replay reads, (K,) each. Raises as `fit`."""
         return records.checked(record, self.columns, self.period, self.name)
 
     @property
@@ -276,7 +277,7 @@ class Rig:
 
     @functools.cached_property
     def period(self) -> float | None:
-        """The control period of closed-loop records, s; None for records of an open loop, which have their own."""
+        """The control period of closed-loop records, s; None for records of an open loop, whose rate is their own."""
         return None if self.controller is None else self.scenario().control_period
 
     def step(self, data: Record) -> float:
@@ -284,7 +285,9 @@ class Rig:
         return self.period or records.step_of(data, self.columns)
 
     def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
-        """Return the records as columns, and the rig that repeats them: of traces with their law, from their start.
+        """Return the rig that repeats some records, and the records as columns.
+
+        For traces, that rig has their law and starts at their start.
 
         Raises:
           ScenarioError: traces of several laws or of another plant, or traces and columns.
@@ -310,15 +313,16 @@ class Rig:
     def fit(self, record: Source, rounded: bool = False) -> dict[str, float]:
         """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
 
-        The norms are over all samples from `score_from` on; 100 is perfect, 0 is as good as the mean.
+        The norms are over all samples from `score_from` on. 100 is perfect, 0 is as good as the mean.
 
         Args:
-          record: column -> values, (K,), such as a loaded npz file, see `columns`; or a trace, which counts from its
-            start on.
+          record: column -> values, (K,), such as a loaded npz file, see `columns`; or a trace, of which all samples
+            count.
           rounded: whether the prediction is rounded to counts of the encoder.
 
         Returns:
-          Percentage of each joint's column and, in a closed loop, of "u"; of each torque where torques are predicted.
+          Name -> percentage, for each joint's column and, in a closed loop, "u". If torques are predicted, for each
+          torque.
 
         Raises:
           ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
@@ -330,10 +334,13 @@ class Rig:
         return found
 
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
-        """Raise ScenarioError if a record, of this fit, has degrees for radians.
+        """Raise ScenarioError if a record has degrees in place of radians.
 
-        Then it fits far better with all its angles, those of a joint, or the references, in radians. A record that fits
-        well is not simulated again.
+        It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
+
+        Args:
+          record: column -> values.
+          fit: of the record as it is. A record that fits well is not simulated again.
         """
         if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
             return
@@ -357,10 +364,10 @@ class Rig:
     def fits(
         self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
     ) -> list[dict[str, float]]:
-        """Return `fit` of several records, without the check for degrees; they are simulated at once.
+        """Return `fit` of several records, simulated in one batch, without the check for degrees.
 
         Args:
-          states: at the starts, as in `replay`; None: those measured.
+          states: positions and velocities at the start of each, as in `replay`; None: those measured.
         """
         found = [percentages(*each[:2]) for each in self.predictions(many, rounded, states)]
         return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
@@ -368,7 +375,10 @@ class Rig:
     def predictions(
         self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
     ) -> list[tuple[Record, Record, np.ndarray]]:
-        """Return, of each record, the predicted columns, the measured ones and their times, from `score_from` on."""
+        """Return the predicted columns, the measured columns and their times of each record, from `score_from` on.
+
+        Arguments are those of `fits`.
+        """
         data, time = [self.checked(record) for record in many], self.columns.time
         if self.dynamics is not None:
             return [
@@ -393,10 +403,10 @@ class Rig:
         return found
 
     def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
-        """Return the fit, as `fit` does, of a machine that does nothing: a baseline for twins.
+        """Return the fit of a machine that does nothing, as a baseline for twins. Names and unit are those of `fit`.
 
         In a closed loop its joints are where their references are, and u is the feedforward. In an open loop it stays
-        where it is when the fit begins. A predicted torque is 0.
+        where the record is at `score_from`. If torques are predicted, they are 0.
         """
         data, columns = self.checked(record), self.columns
         if self.dynamics is not None:
@@ -416,7 +426,7 @@ class Rig:
         return percentages(predicted, measured)
 
     def predicted(self, trace: Trace) -> Record:
-        """Return what the columns of the record would be in a replay, (K,) each, without the columns' offset."""
+        """Return the columns of a record that a replay gives, (K,) each, without the columns' offset."""
         sensor = trace.scenario.sensor
         found = {}
         for i, name in enumerate(self.columns.x):
@@ -426,7 +436,7 @@ class Rig:
         return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
 
     def torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the torque of each joint that the measured motion of a record takes below 5 Hz, N m."""
+        """Return the torque of each joint that a record's measured motion takes, below 5 Hz, N m."""
         return inverse.torques(self._dynamics(), self.checked(record), self.columns)
 
     def measured_torques(self, record: Mapping[str, Any]) -> Record:
@@ -435,7 +445,7 @@ class Rig:
 
     def _dynamics(self) -> Plant:
         if self.dynamics is None:
-            raise ScenarioError(f"records of {self.name} are repeated, and their torques not predicted: use fit")
+            raise ScenarioError(f"records of {self.name} are replayed, and their torques are not predicted: use fit")
         return self.dynamics(Values(**self.values))
 
 

@@ -39,7 +39,7 @@ def test_the_verdict_says_where_one_law_wins(boards):
 
 
 def test_a_rig_of_one_set_is_refused():
-    sentence = "emps has one set of parameters here, and no errors of them to draw others from: choose a rig with"
+    sentence = "emps has only one parameter set: choose a rig with"
     with pytest.raises(smc.ScenarioError, match=sentence):
         ensemble.runs(smc.rig("emps"), LAWS)
 

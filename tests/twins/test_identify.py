@@ -196,7 +196,7 @@ def test_a_search_without_free_states_looks_for_no_other_start(monkeypatch):
 def test_a_poor_fit_is_said(found):
     assert found.notes == []
     poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
-    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is another")
+    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is wrong")
 
 
 def test_sets_that_the_records_allow_have_the_errors_and_the_correlations_found(found):

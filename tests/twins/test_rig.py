@@ -207,7 +207,7 @@ def test_a_machine_that_does_nothing_follows_its_references(record):
 
 def test_records_of_torques_are_not_repeated():
     rig = smc.rig("realaigym_acrobot")
-    with pytest.raises(smc.ScenarioError, match="records of realaigym_acrobot are not repeated, as their torques are"):
+    with pytest.raises(smc.ScenarioError, match="records of realaigym_acrobot are not replayed, as their torques are"):
         rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
 
 

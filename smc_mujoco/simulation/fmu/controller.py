@@ -1,7 +1,7 @@
 """The controller that an FMU contains: its variables and its C.
 
-The variables are numbers in one array, in the order of their value references: time, inputs, outputs, what is computed
-on the way, parameters, the control period, and the memories of law, surface and estimator. `fmu.c` knows the array and
+The variables are numbers in one array, in the order of their value references: time, inputs, outputs, intermediate
+results, parameters, the control period, and the memories of law, surface and estimator. `fmu.c` knows the array and
 nothing of the law. `controller.c` computes, like the callback,
 
     estimator -> surface -> law -> saturation
@@ -24,7 +24,7 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.units import ACCELERATION, FORCE, INPUT_GAIN, POSITION, SPEED, TIME, Unit
 from smc_mujoco.simulation.controller import MAX_CONTROL
 
-UNBOUNDED = sys.float_info.max  # u_max without a bound, as not every importer reads INF
+UNBOUNDED = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
 # Input -> its unit and description, in the order of the variables.
 INPUTS: dict[str, tuple[Unit | None, str]] = {
@@ -53,11 +53,11 @@ class Variable(NamedTuple):
 
     Attributes:
       name: in modelDescription.xml.
-      kind: of smc_fmu.h, such as SMC_INPUT.
+      kind: a smc_kind of smc_fmu.h, such as SMC_INPUT.
       description: in words.
-      unit: None for a number without a unit, or of an unknown one.
+      unit: None if it has none, or if that is unknown.
       start: its value at the start.
-      least: the smallest value that can be set; -inf for any.
+      least: the smallest value that can be set; -inf for any value.
       positive: whether it must be greater than 0.
     """
 
@@ -92,15 +92,15 @@ class Controller:
 
     @property
     def parts(self) -> dict[str, Component]:
-        """Kind -> component, of those that there are."""
+        """Kind -> component, without those that are None."""
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
         return {kind: part for kind, part in parts.items() if part is not None}
 
     def code(self) -> dict[str, tuple[int, str]]:
-        """Return kind -> memory slots and C of each component.
+        """Return kind -> number of memory slots, and C code, of each component.
 
         Raises:
-          ScenarioError: one uses Python without translation into C.
+          ScenarioError: a component uses Python that cannot be translated into C.
         """
         return {
             kind: export.translated(part, joints=self.joints if kind == "law" else 0)
@@ -109,7 +109,7 @@ class Controller:
 
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
-    """Return the variables in the order of their value references."""
+    """Return the variables in the order of their value references. `code` is `controller.code()`."""
     wanted = {*ALWAYS, *_needed(controller, code, reads(code.values()))}
     inputs = [Variable(name, "SMC_INPUT", words, unit) for name, (unit, words) in INPUTS.items() if name in wanted]
     computed = [
@@ -134,7 +134,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
 
 
 def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: set[str]) -> Iterator[str]:
-    """Yield the inputs that the functions read, beside those of every FMU."""
+    """Yield the inputs that the components read, in addition to ALWAYS. `read` are the fields of y in their C."""
     if controller.estimator is None or "v" in reads([code["estimator"]]):
         yield "v"
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
@@ -171,15 +171,21 @@ def parameter(kind: str, part: Component, name: str, value: float, index: str = 
 
 
 def place(variable: str) -> str:
-    """Return the name of a variable's place in the array."""
+    """Return the name, in C, of a variable's index in the array."""
     return "SMC_AT_" + re.sub(r"\W", "_", variable)
 
 
 def header(listed: Sequence[Variable], controller: Controller, identifier: str, token: str) -> str:
-    """Return controller.h: the sizes, and the places of the variables in their array."""
+    """Return controller.h: the sizes, and the indices of the variables in their array.
+
+    Args:
+      listed: the variables in order.
+      identifier: name of the model in C.
+      token: the instantiation token.
+    """
     memory = next((i for i, one in enumerate(listed) if one.kind == "SMC_STATE"), len(listed))
     lines = [
-        "/* controller.h: sizes of this controller, and the places of its variables. */",
+        "/* controller.h: sizes of this controller, and the indices of its variables. */",
         "#ifndef SMC_CONTROLLER_H",
         "#define SMC_CONTROLLER_H",
         "",
@@ -287,7 +293,7 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
 
 
 def _call(kind: str, measured: str) -> Iterator[str]:
-    """Yield the call of a component, and what follows if it fails."""
+    """Yield the call of a component, and the return if it fails. `measured` is its first argument in C."""
     yield f"failure = smc_{kind}({measured}, {kind}_gains, {kind}_memory, out);"
     yield "if (failure) return failure;"
 
@@ -298,7 +304,7 @@ def _c_number(value: float) -> str:
 
 
 def component_file(component: Component, slots: int, text: str) -> str:
-    """Return the C file of a surface or an estimator."""
+    """Return the C file of a surface or an estimator, with its number of memory slots and its C code."""
     title = f"/* {component.name}: {component.kind}, with {slots} numbers of memory. */"
     names = export.gain_names(component)
     parts = [title, *export.includes(text), '#include "controller.h"', "", *names, "", text, ""]

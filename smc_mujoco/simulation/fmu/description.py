@@ -26,7 +26,7 @@ ROLES = {
 
 
 def unit_name(unit: Unit, joint: str) -> str:
-    """Return a unit in words of FMI, such as N.m.s/rad."""
+    """Return the name of a unit in FMI, such as N.m.s/rad."""
     (force, _), (position, _) = JOINTS[joint]
     powers = {force: unit.force, position: unit.position, "s": unit.time}
     above = [_power(name, n) for name, n in powers.items() if n > 0.0]
@@ -40,7 +40,7 @@ def _power(name: str, n: float) -> str:
 
 
 def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
-    """Return the exponents of the SI's base units; None if one is not whole."""
+    """Return SI base unit -> its exponent in a unit; None if an exponent is not whole."""
     (_, force), (_, position) = JOINTS[joint]
     found: dict[str, float] = {}
     for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
@@ -140,7 +140,7 @@ def build_description(files: Iterable[str], identifier: str) -> str:
 
 
 def written(root: xml.Element) -> str:
-    """Return an element as a file."""
+    """Return an XML element as the text of a file."""
     xml.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{xml.tostring(root, encoding="unicode")}\n'
 
@@ -160,9 +160,9 @@ PAGE = """<!DOCTYPE html>
 <h1>{name}</h1>
 <p>{summary}.</p>
 <p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
-between. With Event Mode, u follows the inputs without delay. Without it, u that is read after a step was computed from
-the inputs that were set before the step: an importer that then applies it has a delay of one step. Gains can be changed
-while it runs. The sources need a C99 compiler and nothing else.</p>
+between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
+from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
+Gains can be changed while it runs. The sources need a C99 compiler and nothing else.</p>
 <table style="border-collapse: collapse; text-align: left">
 <tr><th>variable</th><th>role</th><th>unit</th><th>start</th><th>meaning</th></tr>
 {rows}

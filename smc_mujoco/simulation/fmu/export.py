@@ -1,4 +1,4 @@
-"""Write a law out as an FMU: FMI 3.0 for Co-Simulation, in source code and as a binary, without Python inside.
+"""Writing a law as an FMU: FMI 3.0 for Co-Simulation, as source code and as a binary, without Python.
 
 An FMU is a zip archive of modelDescription.xml, the sources and a shared library. It contains the law with its gains as
 parameters, and on request a surface and a velocity estimator. In double precision it gives the bits of `smc.run`.
@@ -36,7 +36,7 @@ from smc_mujoco.simulation.scenario import Scenario, check_surface
 
 HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
 HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
-# No symbols but those of FMI, and none of where it was built: the same law gives the same bytes.
+# Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
 HIDDEN = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
@@ -71,8 +71,8 @@ def export_fmu(
       joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
-    Inputs are x, v unless an estimator replaces it, the reference r, dr, ddr where the law reads it, and what else the
-    law reads; outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
+    Inputs are x, v unless an estimator replaces it, the reference r and dr, and what else the law reads, such as ddr.
+    Outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
 
     Raises:
       ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no
@@ -106,14 +106,14 @@ def export_fmu(
 
 
 def _of_scenario(scenario: Scenario, given: Mapping[str, Any]) -> tuple[Law, dict[str, Any], str]:
-    """Return the law, the other arguments of `export_fmu`, and the kind of joint of a scenario."""
+    """Return a scenario's law, its other arguments of `export_fmu`, and its kind of joint."""
     if chosen := [name for name, value in given.items() if value is not None]:
         raise ScenarioError(f"a scenario has its own {chosen[0]}: leave {chosen[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
     several = len(limits) > 1 and not s.law.joint
     if several or s.feedforward is not None:
         what = "a bound for each channel" if several else "a feedforward"
-        raise ScenarioError(f"the scenario has {what}, which an FMU has not: give its law, with u_max=")
+        raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
     about = {
         "surface": s.surface,
         "velocity": s.velocity,
@@ -173,7 +173,7 @@ def _identifier(name: str) -> str:
 
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
-    """Return path in the archive -> text, of all but the binary."""
+    """Return path in the archive -> text, for all files but the binary."""
     code, inside = controller.code(), joint_controller if controller.joints else one_joint
     listed = inside.variables(controller, code)
     if joint == MIXED:
@@ -205,14 +205,18 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
 
 
 def platform_tuple() -> tuple[str, str]:
-    """Return this machine in words of FMI, such as x86_64-linux, and the suffix of its libraries."""
+    """Return FMI's name of this machine, such as x86_64-linux, and the suffix of its libraries."""
     system, suffix = SYSTEMS.get(sys.platform, (sys.platform, ".so"))
     machine = platform.machine().lower()
     return f"{MACHINES.get(machine, machine)}-{system}", suffix
 
 
 def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
-    """Return path in the archive -> the sources as a shared library of this machine."""
+    """Return path in the archive -> shared library for this machine, compiled from the sources in `files`.
+
+    Raises:
+      ScenarioError: there is no compiler, or it fails.
+    """
     (machine, suffix), command = platform_tuple(), build.compiler()
     with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as folder:
         sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, Path(folder, "out")

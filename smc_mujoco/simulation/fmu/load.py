@@ -1,7 +1,7 @@
 """Controllers in FMUs as laws: `law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
 
-An FMU from Simulink, Modelica or `export_fmu` keeps its state in itself. So each channel of each run has an instance of
-its own, which is made at the first sample and freed with the run. It is called from Python, in the reference loop. The
+An FMU from Simulink, Modelica or `export_fmu` keeps its own state. So each channel of each run has its own instance,
+which is made at the first sample and freed with the run. The instance is called from Python, in the reference loop. The
 FMU is first tried in a separate process, which may crash or hang.
 """
 
@@ -36,7 +36,7 @@ from smc_mujoco.simulation.fmu import slave
 from smc_mujoco.simulation.fmu.controller import OUTPUTS, UNBOUNDED
 from smc_mujoco.simulation.fmu.slave import REAL, Fault, Slave
 
-# Our name -> names of an FMU's variables that mean it, in any case.
+# Our name -> names of an FMU's variables with that meaning; case is ignored.
 NAMES = {
     "x": ("x", "position", "pos", "q", "phi", "theta", "angle", "y", "measurement", "feedback"),
     "v": ("v", "velocity", "vel", "speed", "omega", "dx", "xdot", "x_dot", "dq", "qdot", "w"),
@@ -49,37 +49,37 @@ NAMES = {
     "s": ("s", "sigma", "sliding", "sliding_variable"),
 }
 INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
-CLOSE = 1e-6  # relative difference of two periods that are the same
-MAX_TIMEOUT = 86_400.0  # s
+CLOSE = 1e-6  # relative difference below which two periods are equal
+MAX_TIMEOUT = 86_400.0  # s: a day
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
-_running: dict[int, "Running"] = {}  # by the number that a run keeps in its memory
+_running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
 _numbers = itertools.count(1)
-_begun: dict[int, int] = {}  # address of a memory -> number of the last instance that began there
+_begun: dict[int, int] = {}  # address of a law's memory -> number of the last instance that it held
 
 
 class Running(NamedTuple):
-    """The instance of one channel of a run."""
+    """The instance of an FMU for one channel of a run."""
 
     law: "FmuLaw"
     slave: Slave
-    start: float  # s
-    last: list[float]  # u and s
+    start: float  # s: time of the first sample
+    last: list[float]  # u and s of the last step
 
 
 @dataclasses.dataclass(frozen=True)
 class FmuLaw(Uncompiled):
-    """The function of a law in an FMU. Two are equal if content and settings are.
+    """The function of a law in an FMU. Two are equal if the content of the file and the settings are.
 
     Attributes:
       path: of the .fmu file.
       digest: of its bytes.
       name: of the law.
-      inputs: our names and the FMU's, of what it measures.
-      outputs: the FMU's names of u, and of s if it has one.
-      constants: the FMU's names and values of inputs that do not change.
+      inputs: pairs of our name and the FMU's name for each input.
+      outputs: the FMU's name of u, and of s if it has s.
+      constants: pairs of the FMU's name and the value for each input that does not change.
       parameters: the FMU's names of its gains.
-      period: s, of its steps; None for the control period.
+      period: of its steps, s; None for the control period.
       once: whether a process can have only one instance.
     """
 
@@ -114,13 +114,13 @@ class FmuLaw(Uncompiled):
         return running.last[0], running.last[1]
 
     def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
-        """Start an instance, which ends with the memory of the run. Return its number."""
+        """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
         fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
         names = [theirs for _, theirs in self.inputs]
         address = memory.__array_interface__["data"][0]
-        _end(_begun.get(address, 0))  # of a run whose memory was set to 0, to begin again
+        _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
             self._make_room()
         made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
@@ -130,17 +130,21 @@ class FmuLaw(Uncompiled):
         return place
 
     def _make_room(self) -> None:
-        """Raise ScenarioError if another instance of an FMU runs that can have only one in a process."""
+        """Raise ScenarioError if the FMU already has an instance. For FMUs that can have only one in a process."""
         gc.collect()  # ends the instances of runs that are over
         if any(other.law == self for other in _running.values()):
             raise ScenarioError(
-                f"FMU {Path(self.path).name!r} has one instance in a process, by its description: "
+                f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
                 "give a plant of one channel"
             )
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
     """Return after how many control periods the FMU steps, and how long each of its steps is, s.
+
+    Args:
+      period: of the FMU's steps, s; None for the control period.
+      dt: control period, s.
 
     Raises:
       ScenarioError: neither period is a multiple of the other.
@@ -158,15 +162,15 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
 
 
 def _end(place: int) -> None:
-    """End an instance. What its library does then must not end the process by an exception."""
+    """End an instance, if it has not ended yet. Exceptions of its library are ignored."""
     try:
-        _running.pop(place).slave.close()  # there is none where it has ended already
+        _running.pop(place).slave.close()
     except Exception:
         return
 
 
 def extracted(law: FmuLaw) -> Path:
-    """Return the folder of an FMU's files, the same in each call.
+    """Return the folder with an FMU's extracted files. It is the same in each call.
 
     Raises:
       ScenarioError: the file has changed since `law_from_fmu`, or is gone.
@@ -202,26 +206,27 @@ def law_from_fmu(
 
     Args:
       path: of an .fmu file: FMI 2.0 or 3.0, Co-Simulation, with a binary for this machine.
-      variables: our name -> the FMU's: {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x, v, e,
-        de, r, dr, ddr, f, g, ...), u and s. Default: by name, as position, speed, reference, torque; case is ignored.
-      constants: the FMU's input -> value, of inputs that mean none of these.
-      period: s; the FMU steps this often, and u is held in between. Default: its own, if it has a fixed one; else the
-        control period.
+      variables: our name -> the FMU's name, as {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x,
+        v, e, de, r, dr, ddr, f, g, ...), u and s. Default: recognised by their names, such as position, speed,
+        reference and torque; case is ignored.
+      constants: name -> value of the FMU's inputs that have none of these meanings.
+      period: s; the FMU steps this often, and u is held in between. Default: its own period if it has a fixed one, else
+        the control period.
       name: of the law. Default: the file's name.
       isolate: whether to try the FMU first in a separate process, for 500 steps on a double integrator.
       timeout: s, for the trial.
 
     Returns:
-      A Template. Its gains are the FMU's real parameters, with _ in place of dots and brackets: law_from_fmu("c.fmu")
-      (law_lam=5.0). Called without gains it keeps the FMU's own values.
+      A Template. Its gains are the FMU's real parameters, with _ in place of dots and brackets:
+      law_from_fmu("c.fmu")(law_lam=5.0). Gains that are not given keep the FMU's own values.
 
     Raises:
       MissingPackageError: FMPy is not installed: pip install 'smc-mujoco[fmu]'.
-      ScenarioError: no FMU, of another version, without Co-Simulation, for other machines, an unknown variable, an
-        input without a meaning, or a trial that fails, crashes or does not end.
+      ScenarioError: the file is not an FMU, or is of another version, without Co-Simulation or for other machines; a
+        variable is unknown; an input has no meaning; or the trial fails, crashes or does not end.
 
-    u is what the FMU returns after a step from the sample's time, on the measurement of that sample. Nothing protects
-    the process while the FMU runs in it.
+    u is what the FMU returns after a step from the sample's time, on the measurement of that sample. In a run the FMU
+    is part of your process: if it crashes, Python ends.
     """
     with extra("fmu", "smc.law_from_fmu"):
         import fmpy  # noqa: F401
@@ -274,10 +279,10 @@ def _file(path: str | os.PathLike) -> Path:
 
 
 def _description(file: Path, digest: str) -> Any:
-    """Return FMPy's description of an FMU that can run here.
+    """Return FMPy's description of an FMU.
 
     Raises:
-      ScenarioError: it cannot.
+      ScenarioError: it is not an FMU, or cannot run here.
     """
     import fmpy
 
@@ -312,7 +317,13 @@ def _description(file: Path, digest: str) -> Any:
 def _meanings(
     file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return our name -> the FMU's, of its inputs, and of its outputs.
+    """Return our name -> the FMU's, for its inputs and for its outputs.
+
+    Args:
+      file: the file's name, for errors.
+      known: name -> variable of the FMU.
+      chosen: our name -> the FMU's, from the user.
+      constants: inputs of the FMU that do not change.
 
     Raises:
       ScenarioError: an unknown name, an input without a meaning, no u, or a variable that is no real number.
@@ -350,7 +361,7 @@ def _meanings(
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
-    """Return our name -> the FMU's, of its variables whose last word is our name or one of NAMES."""
+    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or one of NAMES."""
     words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
     found = {}
     for name in ours:
@@ -361,7 +372,7 @@ def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
 
 
 def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
-    """Return gain -> the FMU's name, and default and range, of its real parameters."""
+    """Return name of a gain -> the FMU's name and the Gain, for its real parameters."""
     gains: dict[str, tuple[str, Gain]] = {}
     for variable in variables:
         if variable.causality != "parameter" or variable.type not in REAL or variable.dimensions:

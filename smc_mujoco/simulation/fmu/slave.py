@@ -1,6 +1,6 @@
-"""One instance of an FMU, through FMPy; and, as a script, a trial of an FMU in a process that may crash.
+"""One instance of an FMU, through FMPy. As a script: a trial of an FMU in a process that may crash.
 
-The script must start quickly, so this file imports nothing of smc_mujoco. It writes its progress to a file. The last
+The script must start quickly, so this file imports nothing of smc_mujoco. It writes its progress to a file, whose last
 line names the step in which the process died, or the fault.
 """
 
@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
-STEPS, PERIOD = 500, 1e-3  # of a trial: steps, and their length if the FMU names none, s
-MAX_POSITION = 3.0  # a stop for the double integrator of a trial, because a law need not stabilise it
+STEPS, PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
+MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
+MAX_COMMAND = 6.0  # bound on u in a trial; chosen
 
 
 class Fault(Exception):
@@ -30,13 +31,13 @@ class Group(NamedTuple):
 
 
 class Slave:
-    """An instance of an FMU, initialised at time `start`.
+    """An instance of an FMU, initialised at a time.
 
     Args:
-      folder: the extracted FMU.
+      folder: with the extracted FMU.
       inputs, outputs: names of its variables, in the order of the values of `step`.
       fixed: name -> value of its parameters and of inputs that do not change.
-      start: s.
+      start: the time, s.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class Slave:
         self._called("initialization", self.fmu.exitInitializationMode)
 
     def step(self, values: Sequence[float], t: float, length: float) -> list[float]:
-        """Set the inputs, make a step of some length from time t, s, and return the outputs."""
+        """Set the inputs, make a step from time t, and return the outputs. `t` and `length` are in s."""
         self._set(self.inputs, values)
         where = {"currentCommunicationPoint": t, "communicationStepSize": length}
         self._called(f"the step from t = {t:g} s", self.fmu.doStep, **where)
@@ -123,7 +124,12 @@ class Slave:
 
 
 def attempt(order: dict[str, Any], progress: Any) -> None:
-    """Run an FMU on a double integrator x'' = u, with a step that the order gives."""
+    """Run an FMU on a double integrator x'' = u.
+
+    Args:
+      order: what `load` wrote: folder, names of variables, fixed values and step, s.
+      progress: the file for the progress.
+    """
     print("instantiation", file=progress)
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
     length, x, v = order["step"] or PERIOD, 0.5, 0.0
@@ -131,11 +137,11 @@ def attempt(order: dict[str, Any], progress: Any) -> None:
         print(f"the step from t = {k * length:g} s", file=progress)
         r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
         seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}
-        seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": 6.0, "model": 1.0}
+        seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
         found = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
         if not all(map(math.isfinite, found)):
             raise Fault(f"{order['outputs'][0]} is {found[0]:g} after {k + 1} steps")
-        v += length * min(max(found[0], -6.0), 6.0)
+        v += length * min(max(found[0], -MAX_COMMAND), MAX_COMMAND)
         x += length * v
         if abs(x) > MAX_POSITION:
             x, v = math.copysign(MAX_POSITION, x), 0.0

@@ -117,7 +117,7 @@ def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp
     fine = smc.run([scenario(law), scenario(law)])
     assert [trace.failure for trace in fine] == [None, None]
     network = smc.run(scenario(law, "pendulum_network"))
-    assert "FMU 'changed.fmu' has one instance in a process" in str(network.failure)
+    assert "FMU 'changed.fmu' can have only one instance in a process" in str(network.failure)
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
