@@ -51,7 +51,7 @@ class Contacts(NamedTuple):
 
 
 def kept(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
-    """Keep what a function returns of a trace as long as the trace: tables, figures and films all ask for it."""
+    """Return a function that remembers its result for each trace, because tables, figures and films ask for the same."""
     found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 
     @functools.wraps(function)
