@@ -47,9 +47,8 @@ def main() -> None:
         for name in arms.GAINS:
             runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in SEEDS]
             print(row(name, np.array([measured(trace) for trace in smc.run(runs)])), flush=True)
-    print(
-        "\nwall\n\n| law | mean force, N | off the wanted force, % | in contact, % of the time | deepest, mm |\n|---|---|---|---|---|"
-    )
+    print("\nwall\n\n| law | mean force, N | off the wanted force, % | in contact, % of the time | deepest, mm |")
+    print("|---|---|---|---|---|")
     laws = {"hybrid": arms.hybrid(), "hybrid, friction known": arms.hybrid(friction=True)}
     for name, law in laws.items():
         runs = smc.run([arms.scenario("wall", law, seed) for seed in SEEDS])

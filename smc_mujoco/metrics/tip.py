@@ -51,7 +51,7 @@ class Contacts(NamedTuple):
 
 
 def kept(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
-    """Return a function that remembers its result for each trace, because tables, figures and films ask for the same."""
+    """Return a function that remembers its result for each trace: tables, figures and films ask for the same."""
     found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 
     @functools.wraps(function)
