@@ -9,6 +9,7 @@ import pytest
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
+from smc_mujoco.control.units import Gain
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.simulation import reference
@@ -94,6 +95,37 @@ def test_joints_at_rest_hold_every_load_below_their_limits_and_no_other(sign):
     assert np.abs(held.x[-1] - held.x[-250]).max() < 1e-6
     np.testing.assert_allclose(held.reaction[-1], -sign * 0.9 * least, rtol=1e-6)
     assert np.abs(slid.v[-1]).max() > 0.1
+
+
+@smc.law_function(joint=True, gains={"torque": 0.0, "rise": Gain(1e-9, shared=True)})
+def pulls(y, gains, memory):
+    """Constant torques, after a rise."""
+    return gains.torque * min(y.t / gains.rise, 1.0), y.e
+
+
+def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
+    """A limit of the bristles: rigid dry friction would hold any load below its limits, however suddenly it comes.
+
+    The load is that mode of M w = L D w, with D the inertias of the bristles, which has the largest L. In it the
+    bristles bend by 1 + exp(-pi z / sqrt(1 - z^2)) times the load, z = L^-1/2.
+    """
+    panda = smc.plant("panda", grav=0.0)
+    M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(7), panda.values({})).M
+    roots = np.sqrt(panda.load().dof_M0[:7])
+    largest, modes = np.linalg.eigh(M / np.outer(roots, roots))
+    damping = largest[-1] ** -0.5
+    overshoot = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
+    assert overshoot == pytest.approx(1.41, abs=0.01)
+    load = roots * modes[:, -1]
+    holds = np.array([limits(i)[int(one > 0.0)] for i, one in enumerate(load)])
+    load = load / (load / holds).max()  # one joint is at its limit
+    runs = [
+        weightless(law=pulls(torque=share * load, rise=rise), x0=panda.rest, friction=panda.friction, duration=1.0)
+        for share, rise in ((0.96 / overshoot, 1e-9), (1.04 / overshoot, 1e-9), (0.97, 0.5))
+    ]
+    held, torn, slow = (np.abs(trace.v[-1]).max() for trace in smc.run(runs))
+    assert max(held, slow) < 1e-6
+    assert torn > 0.01
 
 
 def test_the_formula_alone_creeps_at_the_speed_at_which_it_is_the_load():
