@@ -35,3 +35,14 @@ def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     rms, rate = smc.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
     assert arms.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
     assert np.isfinite(arms.cost(trace))
+
+
+def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
+    """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
+    known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])
+    for trace in (known, unknown):
+        scores = smc.tip_scores(trace)
+        assert abs(scores["force_error"]) < 5.0
+        assert scores["touching"] == 100.0
+        assert scores["depth"] < 1e-3
+    assert smc.tip_scores(known)["force_ripple"] < smc.tip_scores(unknown)["force_ripple"]
