@@ -1,9 +1,11 @@
 """Tables of the command line: scores, leaderboards, boards, advice, margins, chattering, tunings, claims, rigs."""
 
+from __future__ import annotations
+
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
@@ -12,9 +14,6 @@ from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.gains_for import Design
-from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
@@ -27,13 +26,18 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.audit import verdict as verdicts
-from smc_mujoco.studies.audit.verdict import Claim
 from smc_mujoco.studies.board_tables import size, spread
 from smc_mujoco.studies.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
-from smc_mujoco.twins.identify import Identified
+
+if TYPE_CHECKING:
+    from smc_mujoco.analysis.chattering import Chattering
+    from smc_mujoco.analysis.gains_for import Design
+    from smc_mujoco.analysis.margins import Margin
+    from smc_mujoco.studies.advice import Advice
+    from smc_mujoco.studies.audit.verdict import Claim
+    from smc_mujoco.twins.identify import Identified
 
 # Columns of a table of scores: heading -> metric.
 SHOWN = {

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, whole
 from smc_mujoco.common.files import write_json
@@ -376,6 +375,8 @@ class Search:
 
     def refine(self, stage: str, z: np.ndarray, most: int) -> np.ndarray:
         """Return the point of least squares near z, after at most `most` steps."""
+        from scipy.optimize import least_squares
+
         inside = np.clip(z, self.low + INSIDE, self.high - INSIDE)
         slopes: Any = lambda z: self.jacobian(z, stage)  # noqa: E731  # typed Any, as scipy's stub allows no function
         found = least_squares(

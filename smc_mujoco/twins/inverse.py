@@ -8,7 +8,6 @@ Source: M. Gautier, "Dynamic identification of robots with power model", IEEE IC
 
 import mujoco
 import numpy as np
-from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
@@ -32,6 +31,8 @@ class Filter:
         Raises:
           ScenarioError: the record is too short, or is sampled too slowly.
         """
+        from scipy.signal import butter
+
         t = data[columns.time]
         self.data, self.step = data, step_of(data, columns)
         if t[-1] - t[0] < MIN_DURATION or self.step > MAX_STEP:
@@ -44,12 +45,16 @@ class Filter:
 
     def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
         """Return a column or its derivative, (N,), at the samples that are compared, from cubics about each of them."""
+        from scipy.signal import savgol_filter
+
         samples = 2 * max(2, round(WINDOW / self.step / 2)) + 1
         smooth = savgol_filter(self.data[name], samples, ORDER, deriv=derivative, delta=self.step)
         return np.asarray(smooth)[:: self.stride]
 
     def low(self, values: np.ndarray) -> np.ndarray:
         """Return the part of values (N,) below CUTOFF, without the ends."""
+        from scipy.signal import sosfiltfilt
+
         return self.inner(sosfiltfilt(self.poles, values))
 
     def inner(self, values: np.ndarray) -> np.ndarray:

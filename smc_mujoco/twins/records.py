@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.simulation import philox
@@ -260,6 +259,8 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
 
 def rate(values: np.ndarray, period: float) -> np.ndarray:
     """Return the rate of a column, (K,), from a cubic through the samples about each."""
+    from scipy.signal import savgol_filter
+
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=1, delta=period))
 
 
