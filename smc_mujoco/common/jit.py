@@ -5,6 +5,7 @@
 import contextlib
 import functools
 import hashlib
+import importlib
 import io
 import os
 import re
@@ -155,8 +156,25 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
         with contextlib.suppress(RuntimeError):  # nowhere to write
             made._cache = Cache(body, *(() if cache is True else cache))
     with held_back():
+        _load_numba()
         made.compile()
     return made
+
+
+def _load_numba() -> None:
+    """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a process's start.
+
+    Numba would import it only to see whether it is there, and imports it again where a function multiplies matrices.
+    """
+    with global_compiler_lock:
+        if "numba.np.arraymath" not in sys.modules:
+            from numba.np import linalg
+
+            ensure_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+            try:
+                importlib.import_module("numba.np.arraymath")
+            finally:
+                linalg.ensure_blas = ensure_blas
 
 
 _warned: list[str] = []  # while a function was compiled

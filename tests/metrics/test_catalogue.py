@@ -727,7 +727,7 @@ def random_runs(draw):
     return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s, **more)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]))
 def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, c):
     if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
@@ -742,7 +742,7 @@ def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, 
         )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(random_runs(), st.randoms(use_true_random=False))
 def test_permuting_channels_changes_nothing(trace, random):
     order = list(range(trace.x.shape[1]))
@@ -760,7 +760,7 @@ def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
     assert after == pytest.approx(before, rel=1e-12, nan_ok=True)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(random_runs())
 def test_metrics_respect_their_orders(trace):
     scores = m.score(trace)

@@ -256,9 +256,10 @@ def wait(there: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-@pytest.fixture
-def dask(tmp_path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """The address of a scheduler; its process, and those of its two workers."""
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """The address of a scheduler; its process, and those of its two workers. One test kills a worker, the next all."""
+    tmp_path = tmp_path_factory.mktemp("dask")
     file = tmp_path / "scheduler.json"
     common = "--no-dashboard", "--scheduler-file", str(file)
     scheduler = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common]
