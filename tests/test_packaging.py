@@ -2,7 +2,6 @@
 missing, and a set-up that installs what the locks pin or fails in one sentence."""
 
 import email
-import importlib.util
 import os
 import re
 import shutil
@@ -354,8 +353,10 @@ def test_set_up_without_a_fit_python_is_one_sentence(checkout, script, sentence)
 
 def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
     """The environments get pip by a link: unpacking it takes most of the time."""
-    pip = Path(importlib.util.find_spec("pip").origin).parent
-    made = f'"{sys.executable}" -m venv --without-pip --clear .venv && ln -s "{pip}" .venv/lib/python*/site-packages/'
+    import pip
+
+    link = f'ln -s "{Path(pip.__file__).parent}" .venv/lib/python*/site-packages/'
+    made = f'"{sys.executable}" -m venv --without-pip --clear .venv && {link}'
     script = f'case "$*" in "-m venv --clear .venv") {made};; *) exec "{sys.executable}" "$@";; esac'
     offline = {"PIP_INDEX_URL": "http://127.0.0.1:9", "PIP_CONFIG_FILE": os.devnull, "PIP_RETRIES": "1"}
     for _ in range(2):
