@@ -47,7 +47,9 @@ class Setting:
       selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
       rest_x: the plant's rest, from which errors count, (n,).
       low, high: bounds of the initial positions, (n,) each.
-      references: r, r', r'' at every sample, (K + 1, 3); one row of zeros if the task has no reference.
+      references: all r, r' and r'' at every sample, (K + 1, 3 m): of one reference, m = 1, or of each driven channel;
+        one row of zeros if the task has none.
+      rest_r: what r, r' and r'' are at the plant's rest, (3 m,).
       size: number of values in an observation: positions, velocities, and r, r', r'' if the task has a reference.
       shape: of an action.
     """
@@ -93,7 +95,10 @@ class Setting:
         self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
-        self.size, self.shape = 2 * plant.n + 3 * self.task.moving, (plant.driven,)
+        followed = self.references.shape[1]
+        self.size, self.shape = 2 * plant.n + followed * self.task.moving, (plant.driven,)
+        self.rest_r = np.zeros(followed)
+        self.rest_r[: followed // 3] = self.rest_x[: followed // 3] if plant.rest else 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
         """Return the actuators' inputs for an action, (*copies, driven): its saturated values times the limits.
@@ -157,7 +162,7 @@ class Setting:
         qpos[rotor_qpos], qvel[rotor_qvel] = x[channel], v[channel]
 
     def reference(self, k: Any) -> np.ndarray:
-        """Return r, r', r'' at sample k, (..., 3), as a copy."""
+        """Return all r, r' and r'' at sample k, (..., 3 m), as a copy."""
         return np.take(self.references, k, axis=0, mode="clip")
 
     def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
@@ -166,7 +171,7 @@ class Setting:
 
     def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
         """Return the reward for x, v (..., n) at sample k."""
-        return reward(*self.task.errors(x - self.rest_x, v, self.reference(k), self.selected))
+        return reward(*self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected))
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
@@ -238,20 +243,22 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
-    """Return r, r', r'' at the first samples, (samples, 3), or raise ScenarioError."""
+    """Return all r, r' and r'' at the first samples, (samples, 3 m), or raise ScenarioError."""
     if samples == 1:  # the task has none
         return np.zeros((1, 3))
-    times = np.arange(samples) * scenario.control_period
-    if isinstance(scenario.reference, PerChannel):
-        raise ScenarioError("the channels have different references, and an environment has one: give one for all")
-    try:
-        references = np.array([evaluate(scenario.reference, float(t)) for t in times])
-    except Failure as failure:
-        raise ScenarioError(f"reference {failure}: give another") from None
-    if not (finite := np.isfinite(references).all(axis=1)).all():
-        at = f"t = {times[np.argmin(finite)]:.6g} s"
-        raise ScenarioError(f"reference {shown(scenario.reference)} is not a finite number at {at}: give another")
-    return references
+    times = (np.arange(samples) * scenario.control_period).tolist()
+    several = isinstance(scenario.reference, PerChannel) or scenario.plant.rest
+    found = []
+    for signal in scenario.references if several else scenario.references[:1]:
+        try:
+            values = np.array([evaluate(signal, t) for t in times])
+        except Failure as failure:
+            raise ScenarioError(f"reference {failure}: give another") from None
+        if not (finite := np.isfinite(values).all(axis=1)).all():
+            at = f"t = {times[np.argmin(finite)]:.6g} s"
+            raise ScenarioError(f"reference {shown(signal)} is not a finite number at {at}: give another")
+        found.append(values)
+    return np.stack(found, axis=2).reshape(samples, -1)
 
 
 def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:

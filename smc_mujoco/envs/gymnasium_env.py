@@ -40,7 +40,7 @@ def observation_space(setting: Setting) -> spaces.Box:
     """Return the space of observations: the largest state of a run, and for r, r', r'' as much more as they need."""
     high = np.full(setting.size, MAX_STATE)
     if setting.task.moving:
-        high[-3:] = np.maximum(MAX_STATE, np.abs(setting.references).max(axis=0))
+        high[2 * setting.scenario.plant.n :] = np.maximum(MAX_STATE, np.abs(setting.references).max(axis=0))
     return spaces.Box(-high, high, dtype=np.float64)
 
 

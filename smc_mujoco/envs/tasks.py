@@ -12,10 +12,11 @@ for w, are chosen.
     swing_up      1 - cos x of toppling hinges, x of others  x'                 within 0.1 rad of hanging, others at 0
     synchronise   x - mean of the channels                   x' - its mean      the largest of the plant's x0
 
-An arm such as `panda`, whose rest is a pose, has the task `regulate` alone, and x counts from this pose. If joints have
-ranges, starts also lie within these.
+Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose, and r is a reference
+for each joint. An arm is neither swung up nor synchronised. If joints have ranges, starts also lie within these.
 """
 
+import dataclasses
 import functools
 import math
 from typing import Any
@@ -25,15 +26,30 @@ import numpy as np
 
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plant import Plant, Values, as_plant
-from smc_mujoco.simulation.signals import Sine
+from smc_mujoco.simulation.signals import Signal, Sine
 
 LN10 = math.log(10.0)
 RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
 SWING_UP_SPREAD = 0.1  # rad, largest distance from hanging at the start of a swing-up: chosen
 SWING_UP_TORQUE = 0.5  # u_max of a swing-up, of the torque that holds the pendulum level: chosen, too weak for one push
 TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `track`: chosen
+WITHIN = 0.5  # of the way to the end of a joint's range, the largest amplitude of an arm's default reference: chosen
 
 Pair = tuple[np.ndarray, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Swing(Signal):
+    """r(t) = middle + amplitude sin(omega t); omega in rad/s."""
+
+    middle: float
+    amplitude: float
+    omega: float
+
+    @staticmethod
+    def value(t, p):
+        r, angle = p.amplitude * math.sin(p.omega * t), p.omega * t
+        return p.middle + r, p.amplitude * p.omega * math.cos(angle), -p.omega * p.omega * r
 
 
 class Task:
@@ -63,7 +79,12 @@ class Task:
         return -most, most
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return e and w for x and v, (..., n) each; r is the reference with its derivatives, (..., 3)."""
+        """Return e and w for x and v, (..., n) each.
+
+        Args:
+          r: references r, r' and r'', (..., 3 m), m of each: one, or one for each driven channel; x and r count from
+            the plant's rest.
+        """
         return x, v
 
 
@@ -72,21 +93,30 @@ class Track(Task):
 
     moving = True
 
-    def fits(self, plant: Plant) -> bool:
-        """Return whether one reference can be that of all driven channels: the plant rests at 0."""
-        return not plant.rest
-
     def fields(self, plant: Plant) -> dict[str, Any]:
-        """Return the reference."""
-        return {"reference": TRACK_REFERENCE}
+        """Return the reference: for an arm one for each joint, about its rest."""
+        if not plant.rest:
+            return {"reference": TRACK_REFERENCE}
+        least, most = _ranges(plant)
+        room = WITHIN * np.minimum(most - plant.rest, plant.rest - least)
+        amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)[: plant.driven].tolist()
+        return {
+            "reference": [
+                Swing(middle, amplitude, TRACK_REFERENCE.omega)
+                for middle, amplitude in zip(plant.rest, amplitudes, strict=False)
+            ]
+        }
 
     def selected(self, plant: Plant) -> np.ndarray:
         """Return the channels with an actuator."""
         return np.arange(plant.n) < plant.driven
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return the distance of the driven channels from the reference, and the state of the others."""
-        return x - r[..., :1] * selected, v - r[..., 1:2] * selected
+        """Return the distance of the driven channels from their references, and the state of the others."""
+        m, e, w = r.shape[-1] // 3, np.array(x), np.array(v)
+        e[..., selected] -= r[..., :m]
+        w[..., selected] -= r[..., m : 2 * m]
+        return e, w
 
 
 class SwingUp(Task):

@@ -244,6 +244,31 @@ def test_an_environment_is_copied_and_sent_away_as_it_stands():
         assert np.array_equal(other.reset()[0], copy.deepcopy(one).reset()[0])  # the generator of starts, too
 
 
+def test_an_arm_tracks_a_reference_of_each_joint():
+    """By default each swings about its pose at rest, within its range; or the user's own."""
+    arm = smc.plant("panda")
+    one = PlantEnv(arm, "track", {"duration": 2.0})
+    found, rest = one.setting, np.array(arm.rest)
+    assert one.reset(seed=0)[0].shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
+    r, dr, ddr = found.reference(300).reshape(3, 7)
+    swing = (r - rest) / np.sin(0.3)
+    assert 0.05 < swing.min() < swing.max() <= 0.5 * (1 + 1e-12)
+    np.testing.assert_allclose(dr, swing * np.cos(0.3))
+    np.testing.assert_allclose(ddr, rest - r)
+    low, high = np.array([each[1:] for each in arm.ranges]).T
+    assert np.all((low < rest - swing) & (rest + swing < high))
+    assert found.reward(r, dr, 300) == pytest.approx(1.0)
+    for i in range(7):
+        off = np.eye(7)[i]
+        assert found.reward(r + off, dr, 300) < 0.9
+        assert found.reward(r, dr + 5.0 * off, 300) < 0.99
+    several = [smc.Sine(0.1 * i, 2.0) for i in range(7)]
+    own = PlantEnv(arm, "track", {"reference": several, "duration": 0.5}).setting.reference(100)
+    np.testing.assert_allclose(own[:7], 0.1 * np.arange(7) * np.sin(0.2))
+    both = PlantEnv(arm, "track", {"reference": smc.Sine(0.1, 2.0), "duration": 0.5}).setting.reference(100)
+    np.testing.assert_allclose(both[:7], 0.1 * np.sin(0.2))
+
+
 def test_a_reference_beyond_the_finite_world_is_in_the_space_of_observations():
     one = PlantEnv("duffing", "track", {"reference": smc.Sine(1.0, 5000.0), "duration": 0.01})
     one.reset(seed=0)
