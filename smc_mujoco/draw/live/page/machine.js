@@ -9,7 +9,7 @@ const TILES = 80; // along an edge of the floor
 const SEAM = 2; // px between two machines
 const PAD = 3; // px around what moves
 // Qualities of the picture, from the finest to the fastest: px of the canvas per px of the page, and shadows. Chosen.
-const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.75, shadows: false }];
+const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }];
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
 const PATIENCE = 1.5; // s over which frames are counted: chosen
 const STIFFNESS = 12; // of the spring by which a pointer pulls, in u_max per extent of the plant squared: chosen
@@ -89,6 +89,40 @@ function tiles() {
   return texture;
 }
 
+// Set a matrix to a pose of MuJoCo: position i of p, and rotation i of m. Return it.
+function pose(matrix, p, m, i) {
+  const [a, b] = [3 * i, 9 * i];
+  return matrix.set(
+    m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
+  );
+}
+
+// Return the matrix of geom i in the frame of its body.
+function placeOnBody({ geom_pos, geom_quat }, i) {
+  const [w, x, y, z] = geom_quat.subarray(4 * i, 4 * i + 4);
+  const position = new THREE.Vector3(...geom_pos.subarray(3 * i, 3 * i + 3));
+  return new THREE.Matrix4().compose(position, new THREE.Quaternion(x, y, z, w), new THREE.Vector3(1, 1, 1));
+}
+
+// Return the geometry of several parts, {geometry, colour} each.
+function merged(parts) {
+  const [position, normal, color, index] = [[], [], [], []];
+  for (const { geometry, colour: { r, g, b } } of parts) {
+    const before = position.length / 3;
+    for (const vertex of geometry.index.array) index.push(before + vertex);
+    for (const value of geometry.attributes.position.array) position.push(value);
+    for (const value of geometry.attributes.normal.array) normal.push(value);
+    for (let i = 0; i < geometry.attributes.position.count; i++) color.push(r, g, b);
+  }
+  const whole = new THREE.BufferGeometry();
+  for (const [name, values] of Object.entries({ position, normal, color })) {
+    whole.setAttribute(name, new THREE.Float32BufferAttribute(values, 3));
+  }
+  whole.setIndex(index);
+  whole.computeBoundingBox();
+  return whole;
+}
+
 // Return the mesh of a skin, such as a spring. `bend` moves its vertices: a GPU would do it faster, a processor slower.
 function skinned({ vertices, faces, weights, bones, rgba: [r, g, b] }) {
   const geometry = new THREE.BufferGeometry();
@@ -121,17 +155,20 @@ function bend({ geometry, userData: { bones, bodies } }, xpos, xmat) {
     }
   });
   position.needsUpdate = true;
-  geometry.computeBoundingBox();
 }
 
 const noBounds = () => ({ left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity });
-const corner = new THREE.Vector3();
+const point = new THREE.Vector3();
 
-// Spread bounds over a mesh's box. `flat` gives x and y of its corners, after they are multiplied by `matrix`.
-function spread(bounds, { geometry: { boundingBox: { min, max } } }, matrix, flat) {
-  for (let c = 0; c < 8; c++) {
-    corner.set(c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z).applyMatrix4(matrix);
-    const { x, y } = flat(corner);
+// Return the eight corners of a geometry's box, as an array of x, y, z of each.
+function cornersOf({ boundingBox: { min, max } }) {
+  return Array.from({ length: 8 }, (_, c) => [c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z]).flat();
+}
+
+// Spread bounds over points, x, y, z of each. `flat` gives x and y in the bounds, after a point is multiplied by `matrix`.
+function spread(bounds, points, matrix, flat) {
+  for (let i = 0; i < points.length; i += 3) {
+    const { x, y } = flat(point.set(points[i], points[i + 1], points[i + 2]).applyMatrix4(matrix));
     bounds.left = Math.min(bounds.left, x);
     bounds.right = Math.max(bounds.right, x);
     bounds.bottom = Math.min(bounds.bottom, y);
@@ -145,24 +182,33 @@ class Machine {
     this.simulation = simulation;
     this.scene = new THREE.Scene();
     this.meshes = [];
-    const { model, mujoco } = simulation;
+    const { model, data, mujoco } = simulation;
     const accent = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL.value, "accent");
+    const bodies = new Map(); // the geoms of a body are one mesh, and so are all that do not move: few meshes draw fast
     for (let i = 0; i < model.ngeom; i++) {
       const material = model.geom_matid[i];
       const geometry = shape(model, i);
       const source = material >= 0 ? model.mat_rgba : model.geom_rgba;
       const at = 4 * (material >= 0 ? material : i);
       if (!geometry || source[at + 3] === 0) continue;
+      const [r, g, b] = source.subarray(at, at + 3);
+      const body = model.body_weldid[model.geom_bodyid[i]] === 0 ? 0 : model.geom_bodyid[i];
       const flat = model.geom_type[i] === HFIELD;
-      const mesh = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({
-        color: material === accent ? colour : new THREE.Color().setRGB(source[at], source[at + 1], source[at + 2], THREE.SRGBColorSpace),
-        shininess: 60, specular: flat ? 0x111111 : 0x333333, side: flat ? THREE.DoubleSide : THREE.FrontSide,
+      const key = `${body} ${flat}`;
+      if (!bodies.has(key)) bodies.set(key, { body, flat, parts: [] });
+      bodies.get(key).parts.push({
+        geometry: geometry.applyMatrix4(body ? placeOnBody(model, i) : pose(new THREE.Matrix4(), data.geom_xpos, data.geom_xmat, i)),
+        colour: material === accent ? new THREE.Color(colour) : new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace),
+      });
+    }
+    for (const { body, flat, parts } of bodies.values()) {
+      const mesh = new THREE.Mesh(merged(parts), new THREE.MeshPhongMaterial({
+        vertexColors: true, shininess: 60, specular: flat ? 0x111111 : 0x333333, side: flat ? THREE.DoubleSide : THREE.FrontSide,
       }));
       mesh.castShadow = !flat;
       mesh.receiveShadow = true;
       mesh.matrixAutoUpdate = false;
-      geometry.computeBoundingBox();
-      mesh.userData = { geom: i, body: model.geom_bodyid[i] };
+      mesh.userData = { body, corners: cornersOf(mesh.geometry) };
       this.scene.add(mesh);
       this.meshes.push(mesh);
     }
@@ -173,12 +219,12 @@ class Machine {
       this.scene.add(mesh);
       return mesh;
     });
-    this.moving = this.meshes.filter((mesh) => model.body_weldid[mesh.userData.body] !== 0);
+    this.moving = this.meshes.filter((mesh) => mesh.userData.body !== 0);
     this.arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 1, css("--focus"), 0.1, 0.05);
     this.arrow.visible = false;
     this.light();
     this.scene.add(this.arrow);
-    this.place(this.meshes);
+    this.place();
   }
 
   // Free the memory of the graphics card.
@@ -218,15 +264,11 @@ class Machine {
     scene.fog = new THREE.Fog(css("--stage"), 5 * extent, 12 * extent);
   }
 
-  // Put meshes where MuJoCo's geoms are, and skins where its bodies are.
-  place(meshes = this.moving) {
-    const { geom_xpos: p, geom_xmat: m, xpos, xmat } = this.simulation.data;
-    for (const mesh of meshes) {
-      const i = mesh.userData.geom;
-      const [a, b] = [3 * i, 9 * i];
-      mesh.matrix.set(
-        m[b], m[b + 1], m[b + 2], p[a], m[b + 3], m[b + 4], m[b + 5], p[a + 1], m[b + 6], m[b + 7], m[b + 8], p[a + 2], 0, 0, 0, 1,
-      );
+  // Put meshes and skins where MuJoCo's bodies are.
+  place() {
+    const { xpos, xmat } = this.simulation.data;
+    for (const mesh of this.moving) {
+      pose(mesh.matrix, xpos, xmat, mesh.userData.body);
       mesh.matrixWorldNeedsUpdate = true;
     }
     for (const skin of this.skins) bend(skin, xpos, xmat);
@@ -238,8 +280,8 @@ class Machine {
     const toPicture = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);
     const matrix = new THREE.Matrix4();
     const same = (point) => point;
-    for (const mesh of this.moving) spread(seen, mesh, matrix.multiplyMatrices(toPicture, mesh.matrix), same);
-    for (const skin of this.skins) spread(seen, skin, toPicture, same);
+    for (const mesh of this.moving) spread(seen, mesh.userData.corners, matrix.multiplyMatrices(toPicture, mesh.matrix), same);
+    for (const skin of this.skins) spread(seen, skin.geometry.attributes.position.array, toPicture, same);
     return seen;
   }
 
@@ -256,14 +298,14 @@ class Machine {
         data.qpos[channel.qpos] = reach * (-1 + (2 * k) / (POSES - 1));
       });
       mujoco.mj_kinematics(model, data);
-      this.place(this.meshes);
+      this.place();
       for (const mesh of k === 0 ? this.meshes : this.moving) {
-        spread(seen, mesh, toCamera.clone().multiply(mesh.matrix), toTangents);
+        spread(seen, mesh.geometry.attributes.position.array, toCamera.clone().multiply(mesh.matrix), toTangents);
       }
     }
     data.qpos.set(kept);
     mujoco.mj_kinematics(model, data);
-    this.place(this.meshes);
+    this.place();
     return seen;
   }
 }
