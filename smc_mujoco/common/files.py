@@ -1,4 +1,4 @@
-"""Files: folders of the package, atomic writing, reading of damaged files, JSON with NaN and infinity."""
+"""Files: the package's folders, atomic writing, reading of files that may be damaged, JSON with NaN and infinity."""
 
 import contextlib
 import json
@@ -16,7 +16,11 @@ WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbe
 
 
 def shipped(folder: str) -> Path:
-    """Return the folder models/ or scenes/, of a checkout or of an installed wheel."""
+    """Return the folder models/ or scenes/, of a checkout or of an installed wheel.
+
+    Raises:
+      ScenarioError: there is no such folder.
+    """
     here = Path(__file__).parents[1]
     for place in (here / folder, here.parent / folder):
         if place.is_dir():
@@ -25,7 +29,7 @@ def shipped(folder: str) -> Path:
 
 
 def ended(path: str | os.PathLike, ending: str) -> Path:
-    """Return the path if its name ends in `ending`, such as ".json", else raise ScenarioError."""
+    """Return the path if its name ends in `ending`, such as ".json"; raise ScenarioError otherwise."""
     path = Path(path)
     if path.suffix != ending or "\0" in path.name:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {ending}")
@@ -54,10 +58,10 @@ def _writing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
-    """Read a file that may be damaged: an exception in the block becomes one sentence.
+    """Turn an exception in the with block, which reads a file, into one sentence. Yield the path.
 
     Args:
-      path: of a regular file; a pipe or a device, which may never end, is refused.
+      path: of a regular file. A pipe or a device is refused, because it may never end.
       kind: what the file should be, such as "trace".
       cure: what to give instead.
 
@@ -79,9 +83,9 @@ def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words for NaN and infinities, which JSON lacks.
+    """Return the data with words in place of NaN and infinities, which JSON lacks.
 
-    A text that is such a word itself gets the prefix ', which `from_json` removes.
+    A text that equals such a word gets the prefix ', which `from_json` removes.
     """
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
@@ -106,14 +110,14 @@ def _restored(data: Any) -> Any:
 
 
 def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> str:
-    """Return the data as strict JSON, see `plain`."""
+    """Return the data as JSON, made `plain`."""
     return json.dumps(plain(data), indent=indent, sort_keys=sort_keys, allow_nan=False)
 
 
 def from_json(text: str) -> Any:
-    """Return the data in a JSON text, with numbers for the words of `plain`.
+    """Return the data in a JSON text, with numbers in place of the words of `plain`.
 
-    It also reads bare NaN and Infinity, which older files have.
+    It also reads NaN and Infinity without quotes, which older files have.
     """
     return _restored(json.loads(text))
 

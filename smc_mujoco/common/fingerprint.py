@@ -1,6 +1,6 @@
 """Hashes of code: of a user's functions, of this package, and of the machine's arithmetic.
 
-    of(my_law.function)        # "5f0c..."; another one after an edit of it, or of a helper that it calls
+    of(my_law.function)        # "5f0c..."; it changes with the function, and with every helper that the function calls
 
 A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches by a global name:
 constants by value, functions by their own code, objects by their class and by what pickle keeps of them. Functions and
@@ -40,10 +40,10 @@ VALUES += (tuple, list, set, frozenset, Mapping)
 
 @functools.cache
 def arithmetic() -> str:
-    """Return a hash of what the C library's functions give on this machine.
+    """Return a hash of values of the C library's functions on this machine.
 
-    Their last bits differ between C libraries, and between processors with and without FMA (fused multiply-add). All
-    else that a run computes is fixed by IEEE 754.
+    The last bits of these values differ between C libraries, and between processors with and without FMA (fused
+    multiply-add). IEEE 754 fixes everything else that a run computes.
     """
     inputs = [1e-3 * 1.01**k for k in range(1000)]  # 1 mrad to 20 rad
     functions = math.sin, math.cos, math.tan, math.atan, math.tanh, math.exp, math.log, lambda x: x**0.7
@@ -71,11 +71,11 @@ def package(*without: str) -> str:
 def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
-    That of a function or a class of this package is computed once. That of another one is what it is now, until it is
-    compiled: see `hold`.
+    The hash of a function or class of this package is computed once. That of another one is computed at every call,
+    until `hold` keeps it.
 
     Raises:
-      ScenarioError: it holds something that can be neither read nor pickled.
+      ScenarioError: it contains something that can be neither read nor pickled.
     """
     try:
         return _held[thing] if thing in _held else _cached(thing) if _ours(thing) else now(thing)
@@ -84,9 +84,9 @@ def of(thing: Any) -> str:
 
 
 def hold(thing: Any) -> None:
-    """Keep the hash that a function or a class has as it is compiled: its code keeps the globals that it has now.
+    """Keep the present hash of a function or class that is compiled, because compiled code keeps its present globals.
 
-    The first one stays. What has no hash keeps none.
+    Only the first call counts. A thing that cannot be hashed is ignored.
     """
     with contextlib.suppress(ScenarioError):
         _held.setdefault(thing, of(thing))
@@ -104,11 +104,12 @@ def now(thing: Any) -> str:
     return hashlib.sha256(buffer.getvalue()).hexdigest()
 
 
-_held: dict[Any, str] = {}  # functions and classes that were compiled, and their hashes then
+_held: dict[Any, str] = {}  # function or class -> its hash when it was compiled
 _cached = functools.cache(now)
 
 
 def _ours(thing: Any) -> bool:
+    """Return whether a thing is a function or class of this package."""
     return isinstance(thing, FunctionType | type) and thing.__module__.startswith(f"{PACKAGE.name}.")
 
 
@@ -116,12 +117,15 @@ class _CodePickler(pickle._Pickler):
     """Pickler that writes the contents of functions and classes, not their names. The result is never loaded."""
 
     def memoize(self, obj: Any) -> None:
-        """Note an object as written, unless equal ones may or may not be the same object, as constants."""
+        """Note an object as written, so that it is written only once.
+
+        Constants are always written, because whether two equal constants are one object depends on the compiler.
+        """
         if not isinstance(obj, tuple | str | bytes | CodeType):
             super().memoize(obj)
 
     def persistent_id(self, obj: Any) -> str | None:
-        """Return the name of an object that is identified by its name; None for others."""
+        """Return the name of an object that is written by its name; None for others."""
         obj = _as_written(obj)
         if isinstance(obj, ModuleType):
             return f"module {obj.__name__}"
@@ -130,7 +134,7 @@ class _CodePickler(pickle._Pickler):
         return f"{obj.__module__}.{obj.__qualname__}" if _versioned(obj) else None
 
     def reducer_override(self, obj: Any) -> Any:
-        """Return how an object is written: a kind, and contents that may lead back to the object."""
+        """Return how an object is written: its kind, and its contents, which may contain the object itself."""
         obj, kind = _as_written(obj), ""
         contents: Any = NotImplemented
         if isinstance(obj, FunctionType):
@@ -160,12 +164,13 @@ def _as_written(thing: Any) -> Any:
 
 
 def _versioned(thing: Any) -> bool:
-    """Return whether a thing is a function or class of a package that its version identifies."""
+    """Return whether a thing is a function or class of a package in VERSIONED."""
     module = getattr(thing, "__module__", None)
     return hasattr(thing, "__qualname__") and isinstance(module, str) and module.split(".")[0] in VERSIONED
 
 
 def _function_contents(function: FunctionType) -> list[Any]:
+    """Return everything that a function's result may depend on."""
     names = names_in(function.__code__)
     closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
     return [
@@ -179,13 +184,19 @@ def _function_contents(function: FunctionType) -> list[Any]:
 
 
 def _overloads(function: FunctionType) -> list[Any]:
-    """Return the functions that numba compiles in place of this one, given to `numba.extending.overload`."""
+    """Return the functions that numba compiles in place of this one, as declared by `numba.extending.overload`."""
     kinds = (kind for known, kind in builtin_registry.globals if known is function)
     return [vars(each)["_overload_func"] for kind in kinds for each in kind.templates if "_overload_func" in vars(each)]
 
 
 def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list[Any]:
-    """Return the values that these names have in a namespace, and in the modules that some of them are."""
+    """Return the values of some names in a namespace, and in the modules among those values.
+
+    Args:
+      space: the namespace.
+      names: in it. Those that it lacks are skipped.
+      known: ids of modules that were read already; new ones are added.
+    """
     found: list[Any] = []
     for name in sorted(names & space.keys()):
         value = space[name]
@@ -205,7 +216,7 @@ def _cell_contents(cell: Any) -> Any:
 
 
 def _class_contents(kind: type) -> list[Any]:
-    """Return the bases of a class, and the functions and values that it was written with."""
+    """Return the bases of a class, and the functions and values in its definition."""
     found: list[Any] = [base for base in kind.__bases__ if not _versioned(base)]
     for name, value in sorted(vars(kind).items()):
         content = _as_written(value.fget if isinstance(value, property) else value)

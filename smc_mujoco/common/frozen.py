@@ -1,4 +1,4 @@
-"""An immutable dict: data that were checked cannot change afterwards."""
+"""An immutable dict, for data that must not change after they were checked."""
 
 from collections.abc import Mapping
 from typing import NoReturn, TypeVar
@@ -7,7 +7,7 @@ V = TypeVar("V")
 
 
 class Frozen(dict[str, V]):
-    """A mapping that reads, compares and prints as a dict, hashes, pickles, and refuses to change."""
+    """A dict that cannot be changed. It can be hashed and pickled."""
 
     def __hash__(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
         return hash(frozenset(self.items()))

@@ -1,8 +1,8 @@
-"""The OpenGL backend that pictures are rendered with: EGL, OSMesa, or one that opens a window.
+"""The OpenGL backend that renders pictures: EGL, OSMesa, or one that opens a window.
 
-MuJoCo reads MUJOCO_GL when it is imported; if the variable is unset it takes a backend that needs a display.
-Importing smc_mujoco does not change it. The backend is chosen when the first picture is rendered: the one that
-MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even if MuJoCo took another one.
+MuJoCo reads MUJOCO_GL when it is imported; if the variable is unset, it takes a backend that needs a display.
+Importing smc_mujoco does not change the variable. The backend is chosen when the first picture is rendered: the one
+that MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even if MuJoCo took another one.
 
 `import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load. `choose_gl` prevents that;
 the command line calls it. Only Linux has a choice of backends. This module imports mujoco only when it is needed.
@@ -22,13 +22,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import mujoco
 
-OFF = ("disable", "disabled", "off", "false", "0")
-DISPLAY = ("enable", "enabled", "on", "true", "1", "glfw", "glx")
-LIBRARIES = {  # what mujoco loads for each backend: one library of each group
+OFF = ("disable", "disabled", "off", "false", "0")  # values of MUJOCO_GL that turn rendering off
+DISPLAY = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # values for a backend that needs a display
+LIBRARIES = {  # backend -> groups of libraries, of each of which mujoco loads one
     "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1")),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
 }
 PACKAGES = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
+TIMEOUT = 60.0  # s, for a probe: chosen
+# Python code that fails if a backend cannot render.
 PROBE = """
 import mujoco
 context = mujoco.GLContext(16, 16)
@@ -60,8 +62,8 @@ def choice() -> Choice:
 def choose_gl() -> str:
     """Set MUJOCO_GL to a backend that loads here, and return its name ("disabled" for none).
 
-    Call it before mujoco is imported, if you make your own renderers. Later, and on other systems than Linux, it sets
-    nothing. Films, stills and environments of this package do not need it.
+    Call it before you import mujoco if you make your own renderers. After the import, and on systems other than Linux,
+    it sets nothing. Films, stills and environments of this package do not need it.
     """
     backend = choice().backend
     if sys.platform == "linux" and "mujoco" not in sys.modules:
@@ -79,7 +81,7 @@ def usable(backend: str) -> bool:
 
 
 def loads(library: str) -> bool:
-    """Return whether the dynamic linker finds this library and all that it needs."""
+    """Return whether the dynamic linker finds a library and all libraries that it needs."""
     try:
         ctypes.CDLL(library)
     except OSError:
@@ -99,7 +101,7 @@ def note() -> str | None:
 
 @functools.cache
 def missing() -> str | None:
-    """Return None if pictures can be rendered, else one sentence: why not, and what to do.
+    """Return None if pictures can be rendered, else one sentence that says why not and what to do.
 
     It renders an empty model in a child process, because a broken driver can end the process that it runs in.
     """
@@ -122,13 +124,18 @@ def missing() -> str | None:
 
 
 def probe(backend: str, code: str = PROBE) -> str | None:
-    """Return None if a new process can draw an empty model with this backend, or run other code, else how it failed."""
+    """Return None if a new process can run some code with a backend, else the last line of its error.
+
+    Args:
+      backend: for MUJOCO_GL; "" to leave the variable as it is.
+      code: Python; by default it renders an empty model.
+    """
     import subprocess
 
     environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"a trial failed: {error}"
     if done.returncode == 0:
@@ -137,7 +144,7 @@ def probe(backend: str, code: str = PROBE) -> str | None:
 
 
 def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "mujoco.Renderer":
-    """Return a mujoco.Renderer with the backend that was chosen, whichever one MuJoCo took when it was imported.
+    """Return a mujoco.Renderer with the backend of `choice`, even if MuJoCo took another one when it was imported.
 
     A mujoco.Renderer takes its context class from the module `gl_context`. The class is replaced there while the
     renderer is made, and put back.
@@ -147,7 +154,7 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
       height, width: size of the picture, px.
 
     Raises:
-      ScenarioError: no backend renders here; the sentence of `missing`.
+      ScenarioError: no backend renders here. Its message is the sentence of `missing`.
     """
     import mujoco
 
@@ -174,7 +181,7 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
                 del theirs.GLContext
     _RENDERERS.add(made)
     atexit.unregister(_close_all)
-    atexit.register(_close_all)  # runs before MuJoCo's own function, registered by now, which ends EGL
+    atexit.register(_close_all)  # registered after MuJoCo's function that ends EGL, so that it runs before that one
     return made
 
 

@@ -13,7 +13,7 @@ def path() -> Path:
     """Return the path of the library's file.
 
     Raises:
-      ScenarioError: it is not in the package's folder.
+      ScenarioError: it is not in the folder of the package mujoco.
     """
     folder = Path(mujoco.__file__).parent
     names = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
@@ -23,12 +23,12 @@ def path() -> Path:
 
 
 def plugins() -> list[Path]:
-    """Return the paths of the plugins that the package loads when it is imported."""
+    """Return the paths of the plugins that the package mujoco loads when it is imported."""
     folder = Path(mujoco.__file__).parent / "plugin"
     return sorted(path for path in folder.glob("*") if path.suffix in (".so", ".dylib", ".dll"))
 
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """Return the library, for its C functions."""
+    """Return the loaded library."""
     return ctypes.CDLL(str(path()))

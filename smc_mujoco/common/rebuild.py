@@ -1,7 +1,7 @@
-"""Copies of functions in which every compiled helper is replaced, by one with bounds checks or by plain Python.
+"""Copies of functions in which every compiled helper is replaced: by one with bounds checks, or by plain Python.
 
-A law's author compiles its helpers, and numba checks array bounds only on request. So the callback runs a law with
-copies of its helpers that are compiled with checks, and the reference loop with the helpers' plain Python.
+The author of a law may compile its helpers, and numba checks array bounds only on request. So the callback runs a law
+with copies of its helpers that are compiled with checks. The reference loop runs it with the helpers' plain Python.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,8 @@ def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, An
 
     Args:
       function: plain Python or compiled.
-      finish: called with the plain Python of each copy, such as numba.njit; returns what is used in its place.
-      made: function -> its copy, of copies that exist already. New ones are added.
+      finish: function, such as numba.njit, that is called with the plain Python of each copy; its result is used.
+      made: function -> its copy, for copies that exist already. New ones are added.
     """
     return _rebuild(getattr(function, "py_func", function), finish, {} if made is None else made)
 
@@ -39,7 +39,11 @@ def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
 
 
 def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
-    """Return the copy of a compiled function, a copy of a module with its functions of these names, or the value."""
+    """Return what replaces a value in a copy.
+
+    That is a copy of a compiled function, a copy of a module in which compiled functions with these names are copied,
+    or else the value itself.
+    """
     if isinstance(value, Dispatcher):
         return _rebuild(value.py_func, finish, made)
     if isinstance(value, ModuleType) and _holds(value, names):
@@ -59,9 +63,10 @@ def _calls_compiled(function: FunctionType) -> bool:
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
+    """Return whether a module has a compiled function with one of these names."""
     return any(isinstance(vars(module).get(name), Dispatcher) for name in names)
 
 
 def names_in(code: CodeType) -> set[str]:
-    """Return the names that code uses, with those of the functions within it."""
+    """Return the names that code uses, and those that functions defined in it use."""
     return set(code.co_names).union(*(names_in(c) for c in code.co_consts if isinstance(c, CodeType)))

@@ -5,15 +5,17 @@ from collections.abc import Iterable, Sequence
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number with this many significant digits; "never" for inf, "none" for NaN, "<1e-9" for rounding."""
+    """Return a number with so many significant digits; "never" for inf, "none" for NaN, "<1e-9" if it is that small."""
     if math.isnan(value):
         return "none"
     if math.isinf(value):
         return "never"
     if 0.0 < abs(value) < 1e-9:
         return "<1e-9"
-    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
-        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}" if value else "0"
+    if value == 0.0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 
@@ -25,7 +27,7 @@ def joined(parts: Iterable[str]) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as plain text."""
+    """Return a table as plain text, with columns two spaces apart."""
     lines = [tuple(headings), *map(tuple, rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

@@ -1,6 +1,6 @@
 """Cart on a spring: M x'' = -k x - b x' + u + d.
 
-Its mechanism is models/sprung_cart.xml. Numbers: chosen, for a template.
+The mechanism is models/sprung_cart.xml. The numbers are chosen for this template.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ def build(n):
 
 def fields(model, p):
     yield Field("body_mass", model.body("cart").id, p.M)
-    yield Field("dof_M0", 0, p.M)  # MuJoCo reads a lone slide's inertia here
+    yield Field("dof_M0", 0, p.M)  # from where MuJoCo takes the inertia of a single slide joint
     yield Field("jnt_stiffness", 0, p.k)
     yield Field("dof_damping", 0, p.b)
 

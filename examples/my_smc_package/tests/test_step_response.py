@@ -1,4 +1,4 @@
-"""The package is found by name, its plant moves as its equation says, and its law does what it is for."""
+"""Tests that the package is found by name, that its plant obeys its equation, and that its law brings it to a step."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import smc_mujoco as smc
 
 
-def test_the_catalogue_has_the_package_s_entries():
+def test_the_catalogue_lists_the_entries():
     assert "arctan_switching" in smc.laws("sprung_cart")
     assert "sprung_cart" in smc.plants()
 

@@ -1,7 +1,7 @@
 """EMPS: an electro-mechanical positioning system, a carriage on a ball screw that a voltage drives.
 
-The records are closed loops of the published cascade at 1 kHz. The amplifier is current-controlled, so there is no
-back-EMF: the motor here has one too small to notice.
+Its records are of closed loops with the published cascade at 1 kHz. The amplifier controls the current, so there is no
+back-EMF; that of the motor here is too small to have an effect.
 """
 
 import math
@@ -16,8 +16,8 @@ from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.twins.records import Columns, Record
 from smc_mujoco.twins.rig import Quantity, Rig
 
-PERIOD, STEP = 1e-3, 5e-4  # s, under RK4: in steps h of first order positions lead by h/2 v, which biases friction
-BACK_EMF = 1e-6  # V s/m: too small to notice
+PERIOD, STEP = 1e-3, 5e-4  # s, under RK4. With steps h of first order, positions lead by h/2 v, which biases friction.
+BACK_EMF = 1e-6  # V s/m: too small to have an effect
 PUBLISHED = "A. Janot, M. Gautier and M. Brunot, Data set and reference models of EMPS, 2019 (no licence stated)"
 
 
@@ -40,9 +40,9 @@ def machine(q):
 
 
 def commands(record: Record, first: int) -> np.ndarray:
-    """Return what the machine's controller adds to the replay's: at the start, a velocity, as the replay has no past.
+    """Return what the machine's controller adds to the replay's: the velocity term at the start, V, (K,).
 
-    The first recorded command tells it.
+    The replay does not know the samples before its start, so that term follows from the first recorded command.
     """
     gains, found = cascade.defaults, np.zeros(len(record["t"]) - first)
     found[0] = record["u"][first] - gains["kv"] * gains["kp"] * (record["r"][first] - record["x"][first])
@@ -65,6 +65,6 @@ EMPS = Rig(
     commands=commands,
     columns=Columns(x=("x",), u="u", reference="r"),
     free=("mass", "viscous", "coulomb", "offset"),
-    about="No records are at hand here: the numbers are the published ones, without their standard errors, so there is "
-    "no ensemble. The direction of dry friction changes up to 0.5 ms late.",
+    about="The numbers are the published ones. No records are at hand here. There is no ensemble, because no standard "
+    "errors are published. The direction of dry friction changes up to 0.5 ms late.",
 )

@@ -1,6 +1,6 @@
-"""Quanser's rigs by their published parameters alone: QUBE-Servo 2 and 3, IP02 cart, SRV02 rotary pendulum.
+"""Quanser's rigs with their published parameters: QUBE-Servo 2 and 3, IP02 cart, SRV02 rotary pendulum.
 
-No records of them are at hand, so nothing here is identified. Their amplifiers' dead band is left out.
+No records of them are at hand, so nothing is identified. The dead bands of their amplifiers are left out.
 """
 
 import math
@@ -18,7 +18,10 @@ SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stat
 
 
 def motor(q):
-    """Return the motor and gearbox of a rig. Losses of a gearbox count as more resistance, which acts alike."""
+    """Return the motor and gearbox of a rig.
+
+    The efficiency of the gearbox divides resistance and inductance, which reduces the torque per volt as losses do.
+    """
     return DCMotor(
         resistance=q.resistance / q.efficiency, inductance=q.inductance / q.efficiency,
         torque_constant=q.torque_constant, gear=q.gear, rotor_inertia=q.rotor_inertia, voltage=q.voltage,
@@ -48,7 +51,7 @@ def linear(q):
 
 
 def electric(source, resistance, inductance, torque_constant, rotor, gear=1.0, efficiency=1.0, voltage=10.0):
-    """Return the quantities of a motor and gearbox, (value, unit) of one source."""
+    """Return name -> Quantity of a motor and gearbox, from numbers of one source in the units below."""
     return {
         "resistance": Quantity(resistance, "ohm", source, 1e-3),
         "inductance": Quantity(inductance, "H", source, 0.0),
@@ -61,7 +64,7 @@ def electric(source, resistance, inductance, torque_constant, rotor, gear=1.0, e
 
 
 def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia, damping, counts):
-    """Return the quantities of an arm and a pendulum of one source."""
+    """Return name -> Quantity of an arm and a pendulum, from numbers of one source in the units below."""
     return {
         "arm_inertia": Quantity(arm_inertia, "kg m^2", source, 1e-7),
         "arm_length": Quantity(arm_length, "m", source, 1e-3),
@@ -75,7 +78,13 @@ def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia
 
 
 def qube(version, source, motor, divisor, arm_damping, pendulum_damping, about):
-    """Return a QUBE-Servo with its rotary pendulum; `divisor`: what divides m r^2 in the inertia of its arm."""
+    """Return a QUBE-Servo with its rotary pendulum.
+
+    Args:
+      motor: arguments of `electric` after the source.
+      divisor: number that divides m r^2 in the inertia of the arm.
+      arm_damping, pendulum_damping: N m s/rad.
+    """
     arm, pole = (0.095, 0.085), (0.024, 0.129)  # kg, m
     return Rig(
         name=f"qube_servo_{version}",
@@ -92,11 +101,11 @@ def qube(version, source, motor, divisor, arm_damping, pendulum_damping, about):
 
 QUBE_SERVO_2 = qube(
     2, DRIVER, (8.4, 1.16e-3, 0.042, 4e-6), 12.0, 5e-5, 2.5e-6,
-    "The arm's inertia is m r^2/12: with m r^2/3 a controller that balances the machine lets the twin fall.",
+    "The arm's inertia is m r^2/12. With m r^2/3 a controller that balances the machine lets the twin fall.",
 )  # fmt: skip
 QUBE_SERVO_3 = qube(
     3, QUBE_3, (7.5, 1.15e-3, 0.0422, 1.4e-6), 3.0, 1e-3, 5e-5,
-    "As published, with m r^2/3 for the arm, which records of the first QUBE-Servo speak against.",
+    "As published, with m r^2/3 for the arm. Records of the first QUBE-Servo contradict that inertia.",
 )  # fmt: skip
 SRV02_PENDULUM = Rig(
     name="srv02",
@@ -119,5 +128,6 @@ IP02_CART = Rig(
     },
     machine=linear,
     about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
-    "hinge. The cart is read with the pendulum's 4096 counts, a metre in place of a turn; the machine's are 22.75 um.",
+    "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn; the machine has counts of "
+    "22.75 um.",
 )

@@ -1,7 +1,7 @@
 """QUBE-Servo (first version): a rotary pendulum upright, driven by a voltage, as identified from public records.
 
-The records are 20 s at 500 Hz of decargroup/closed_loop_koopman (MIT, 2023). The pendulum's mass is the published one;
-one mass must be known, since records of motions under a voltage determine the others only relative to it.
+The records are of 20 s at 500 Hz, from decargroup/closed_loop_koopman (MIT, 2023). The pendulum's mass is the published
+one. One mass must be known, because records of motions under a voltage determine the others only relative to it.
 """
 
 import math
@@ -46,10 +46,10 @@ def machine(q):
 
 
 def commands(record: Record, first: int) -> np.ndarray:
-    """Return what the records' controller adds to its feedback: feedforward, the pendulum's reference, old filters.
+    """Return what the records' controller adds to the replay's feedback, V, (K,).
 
-    The controller is linear, so the effect of the pendulum's reference and of what its filters hold at the start can be
-    computed beforehand.
+    That is the feedforward, the effect of the pendulum's reference, and the effect of the states of the controller's
+    filters at the start. The controller is linear, so these effects can be computed beforehand.
     """
     gains, n = state_feedback.defaults, len(record["t"]) - first
     lag = 1.0 + gains["cutoff"] * PERIOD
@@ -74,7 +74,7 @@ SURFACE = {"c1": -4.78884, "c2": -52.8660, "c3": -2.25578, "c4": -4.37611}
 
 
 def law(name, k, phi, k1=0.0, k2=0.0):
-    """Return a law on that surface. Its gains are those of scene furuta, in N m, over the torque per volt."""
+    """Return a law on SURFACE, with gains in volts: those of scene furuta, in N m, over the torque per volt."""
     force = 1.0 / TORQUE_PER_VOLT
     gains = {"k": k * force, "phi": phi * force, "k1": k1 * math.sqrt(force), "k2": k2 * force}
     return rotary_swing_up(**gains, w_max=0.03 * force, catch=0.05 * force, **SURFACE).named(name)

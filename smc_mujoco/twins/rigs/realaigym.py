@@ -1,7 +1,7 @@
 """RealAIGym's double pendulum, design C.1: as a pendubot, driven at the shoulder, and as an acrobot, at the elbow.
 
-Records have the torques of both motors, and identification compares them with those that the measured motion takes. The
-rig's numbers are identified from two records. The published fits of one machine, models 1.0 to 3.0, disagree.
+Records have the torques of both motors. Identification compares them with the torques that the measured motion takes.
+The rig's numbers are identified from two records. The published fits of the machine, models 1.0 to 3.0, disagree.
 """
 
 import math
@@ -23,7 +23,7 @@ IDENTIFIED = {
     "r1": 0.149695, "r2": 0.250753, "I1": 0.0241934, "I2": 0.0474307, "Ir": 5.68305e-5, "b1": 0.00213092,
     "b2": 0.00398775, "cf1": 0.249115, "cf2": 0.162908,
 }  # fmt: skip
-DRY = math.pi / 2  # of the published friction cf arctan(100 q') at speed
+DRY = math.pi / 2  # factor on cf in the published friction cf arctan(100 q'), at speed
 SETS = {
     "model_1_0": MODEL_1_0 | {"source": f"{SOURCE}, model 1.0"},
     "model_1_1": MODEL_1_1 | {"source": f"{SOURCE}, model 1.1"},
@@ -36,7 +36,7 @@ SETS = {
 
 
 def quantities():
-    """Return the numbers that were found, those of model 1.0 that a motion cannot tell, and the board's torque."""
+    """Return name -> Quantity: identified numbers, else those of model 1.0, and the boards' limit of torque."""
     found = {
         name: Quantity(IDENTIFIED.get(name, value), UNITS[name], FOUND if name in IDENTIFIED else SOURCE, 0.0)
         for name, value in MODEL_1_0.items()
@@ -50,7 +50,7 @@ def plant_of(name, q):
 
 
 def fields(name, x0):
-    """Return the function that makes the fields of a scenario, which starts hanging."""
+    """Return a `Rig.machine` for the plant `name`, which starts hanging at rest."""
 
     def machine(q):
         return {
@@ -76,7 +76,8 @@ COMMON = {
         Reached("model_3_0", UNUSED, {"shoulder": 0.197, "elbow": 0.094}, "N m"),
         Reached("do nothing", UNUSED, {"shoulder": 0.348, "elbow": 0.313}, "N m"),
     ),
-    "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, as torques tell only moments.",
+    "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques determine only "
+    "moments.",
 }
 PENDUBOT = Rig(
     name="realaigym_pendubot", label="RealAIGym's double pendulum, driven at the shoulder", quantities=quantities(),

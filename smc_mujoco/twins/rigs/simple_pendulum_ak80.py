@@ -1,7 +1,8 @@
 """Torque-limited simple pendulum on an AK80-6 motor, which takes torques.
 
-Its links' masses and lengths count only by the inertia J and the moment m c of their weight. The plant has them as a
-point mass m = (m c)^2 / J at l = J / (m c). Records have the position from hanging, the plant that from upright.
+The masses and lengths of its links matter only through the inertia J and the moment m c of their weight. The plant has
+a point mass (m c)^2 / J at the distance J / (m c) instead. Positions are 0 hanging in records, and 0 upright in the
+plant.
 """
 
 import math
@@ -30,7 +31,7 @@ def machine(q):
     }
 
 
-# Found by smc.tune on these quantities: 96 sets of gains, seed 0, from 0.3 rad and 20 % about it, |u| <= 6 N m.
+# Found by smc.tune on the quantities below: 96 sets of gains, seed 0, starts within 20 % of 0.3 rad, |u| <= 6 N m.
 LAWS = (
     law("observer_free", lam=2.749, k1=18.27),
     law("classical", k=1.578, c=16.55),

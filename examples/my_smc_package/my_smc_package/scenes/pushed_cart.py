@@ -1,7 +1,7 @@
-"""Does the arctangent hold the cart against a push as well as a relay does, without its chattering?
+"""Does the arctangent hold the cart against a push as well as a relay does, without the relay's chattering?
 
-Compare u: the relay's jumps at every sample, the arctangent's does not. Compare x at the end: under the arctangent the
-cart rests a little off 0.
+Compare u: under the relay it jumps at every sample, under the arctangent it does not. Compare x at the end: under the
+arctangent the cart rests a little off 0.
 """
 
 import smc_mujoco as smc

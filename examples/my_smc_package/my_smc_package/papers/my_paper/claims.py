@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 
 def rest(runs):
-    """Return the last position as a share of the one that the force balance predicts."""
+    """Return the last position as a share of the position that the force balance predicts."""
     (scenario,) = runs.grid().values()
     (trace,) = runs.traces([scenario])
     p, g, push = scenario.plant.parameters, scenario.law.gains, scenario.disturbance[0].amplitude
