@@ -128,6 +128,6 @@ IP02_CART = Rig(
     },
     machine=linear,
     about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
-    "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn. The machine's counts are "
-    "22.75 um.",
+    "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn. The counts of the "
+    "machine are 22.75 um.",
 )
