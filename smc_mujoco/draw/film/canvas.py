@@ -19,8 +19,10 @@ MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn a
 MARGIN = 3  # px around what has changed, for smoothed edges
 FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, as each shape in it; fitted to two films
 SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
+FINE, LEAST = 0.35, 6  # px between an arc and its chords, and the least number of chords; chosen
 GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
+CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 NOTHING = mujoco.mjtGeom.mjGEOM_NONE
 Add = Callable[[mujoco.MjvScene], None]
 Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bottom
@@ -36,8 +38,10 @@ class Canvas:
         self.steady = not any(model.light_castshadow & model.light_active)  # where lamps' shadows fall is not foretold
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
         self.casts = shadows.casting(model, middle * camera.pixel(size))
-        if roundness(model) < SMALL * middle * camera.pixel(size):
-            model.vis.quality.numstacks = FEW  # of cylinders too, which are drawn in half the time
+        ball, widest = roundness(model) / (middle * camera.pixel(size))
+        quality = model.vis.quality
+        quality.numstacks = FEW if ball < SMALL else facets(ball, np.pi, quality.numstacks)  # of cylinders, too
+        quality.numslices = facets(widest, 2 * np.pi, quality.numslices)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
         bounded = [model.geom_type != scene.PLANE, np.ones(model.nskin, bool), self.casts & (self.sun is not None)]
@@ -205,12 +209,16 @@ def pixels(area: Area) -> int:
     return (area[2] - area[0]) * (area[3] - area[1])
 
 
-def roundness(model: mujoco.MjModel) -> float:
-    """Return the largest radius of the model's round shapes, m; 0 without any."""
-    size = np.where(
-        model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE, model.geom_size[:, 0], model.geom_size.max(axis=1)
-    )
-    return float(size[np.isin(model.geom_type, ROUND)].max(initial=0.0))
+def roundness(model: mujoco.MjModel) -> np.ndarray:
+    """Return the largest radius, m, of the model's shapes that are round on all sides, and of these and cylinders."""
+    long = np.isin(model.geom_type, [mujoco.mjtGeom.mjGEOM_CAPSULE, CYLINDER])
+    size = np.where(long, model.geom_size[:, 0], model.geom_size.max(axis=1))
+    return np.array([size[np.isin(model.geom_type, kinds)].max(initial=0.0) for kinds in (ROUND, [*ROUND, CYLINDER])])
+
+
+def facets(radius: float, angle: float, most: int) -> int:
+    """Return how many chords of an arc, at most `most`, are within FINE of it: its radius in px, its angle in rad."""
+    return int(np.clip(np.ceil(angle * np.sqrt(radius / (8 * FINE))), min(LEAST, most), most))
 
 
 def outside(boxes: np.ndarray, area: Area) -> np.ndarray:

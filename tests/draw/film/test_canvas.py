@@ -85,6 +85,16 @@ def test_cylinders_have_few_stacks_unless_the_model_has_large_round_shapes():
             assert (shown.model.vis.quality.numstacks == canvas.FEW) is few
 
 
+def test_arcs_have_as_many_chords_as_can_be_told_apart():
+    """The middle of a chord is r (1 - cos(a / 2)) from its arc, a: its angle."""
+    for radius, angle in ((15.0, np.pi), (60.0, 2 * np.pi)):
+        count = canvas.facets(radius, angle, 99)
+        gaps = [radius * (1.0 - np.cos(angle / n / 2)) for n in (count, count - 1)]
+        assert gaps[0] <= canvas.FINE < gaps[1] * 1.01
+    assert canvas.facets(1e3, np.pi, 10) == 10
+    assert canvas.facets(0.0, np.pi, 10) == canvas.LEAST
+
+
 def test_a_picture_in_which_nothing_moves_is_not_drawn_again(monkeypatch):
     with stage("inverted_pendulum") as shown:
         pictures(shown, False)
