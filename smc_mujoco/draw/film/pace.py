@@ -22,7 +22,7 @@ FAST = 4.0  # times real time, where everything rests
 AROUND = 0.1  # s before and after fast motion that are shown as slowly
 BLOW = 0.04  # s around the start of a contact
 REST = 0.3  # s after motion, and before it, that are not shown faster
-MAX_LENGTH = 2.0, 6.0  # duration of a film: in durations of the run, or in s if that is more
+MAX_LENGTH = 1.85, 8.0  # duration of a film: in durations of the run, or in s if that is more; chosen
 SPEEDS = 0.01, 100.0
 
 

@@ -59,11 +59,13 @@ def test_the_fastest_machine_and_its_own_channel_s_range_count(base):
     assert at([quick], (0.05,)) == [0.125]
 
 
-def test_films_are_at_most_twice_as_long_as_runs(base):
+def test_films_have_a_longest_duration(base, monkeypatch):
     trace = moving(base, lambda t: np.sin(20.0 * t))  # more than a fifth of its range a frame, all the time
     found = pace.clock([trace], FPS)
     assert 4.0 < len(found.times) / FPS <= 8.1
     assert set(found.speeds) == {0.5}
+    monkeypatch.setattr(pace, "MAX_LENGTH", (1.5, 2.0))
+    assert set(pace.clock([trace], FPS).speeds) == {1.0}
 
 
 def test_frames_ascend_from_start_to_end_and_tell_their_speed(base):
