@@ -39,6 +39,11 @@ def ends(a, part):
 
 
 @njit
+def scaled(a):
+    return a[0] * a
+
+
+@njit
 def inside(a, b):
     if a[0] > 0.0:
         return b
@@ -51,6 +56,13 @@ def turns(y, gains, memory):
     n = len(y.x)
     s, twice = y.de + gains.c * y.e, np.zeros(n)
     s = s + 0.1 * product(y.M, s)
+    s = s - s[0] * y.e  # reads an element that it changes
+    square = np.zeros((n, n))
+    square[:, :] = y.M
+    turned = y.e.copy()
+    turned = scaled(product(square, turned))
+    turned = scaled(turned)
+    s = s + 0.01 * turned
     twice += 2 * s
     twice[0] = twice[n - 1] ** 2 + s[1]
     memory[:, 0] += y.dt * saturate(s)
@@ -177,6 +189,33 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
         for ours, wanted in zip(found, expected, strict=True):
             scale = 1e3 if name == "time_delay_sliding" else 1.0  # it divides a difference of velocities by dt
             np.testing.assert_allclose(ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0)
+
+
+@smc.law_function(joint=True)
+def edges(y, gains, memory):
+    """What numpy's functions make of zeros and NaN."""
+    low, high, sign = np.minimum(y.x, y.v), np.maximum(y.x, y.v), np.sign(y.x)
+    return np.array([low[0], high[1], sign[2]]), np.where(y.x > y.v, low, high)
+
+
+@pytest.mark.parametrize(
+    "x", [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)]
+)
+def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
+    (path := folder / "edges.c").write_text(smc.law_to_c(edges, joints=3))
+    c, zero = smc.law_from_c(path, flags=STRICT).function, np.zeros(3)
+    for v in ((0.0, 0.0, 0.0), (-0.0, -0.0, 1.0), (2.0, math.nan, math.nan)):
+        x_, v_ = np.array(x), np.array(v)
+        y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)
+        numbers = extremes(x_, v_)
+        found, _ = c(y, (), np.zeros((3, 8)))
+        np.testing.assert_array_equal(found, numbers)
+        np.testing.assert_array_equal(np.signbit(found[:2]), np.signbit(numbers[:2]))
+
+
+@njit
+def extremes(x, v):
+    return np.array([np.minimum(x, v)[0], np.maximum(x, v)[1], np.sign(x)[2]])
 
 
 class Nothing:
