@@ -36,7 +36,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, users_frame
 from smc_mujoco.control import units
-from smc_mujoco.control.component import Component
+from smc_mujoco.control.component import Component, written
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
 
@@ -81,7 +81,7 @@ def unit(law: Component, name: str) -> Unit | None:
     """
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
-        cure = f'write gains={{"{name}": Gain({gain.default:g}, RATE)}} in its decorator, with its own unit'
+        cure = f'write gains={{"{name}": Gain({written(gain.default)}, RATE)}} in its decorator, with its own unit'
         raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {cure}")
     return gain.unit  # pyright: ignore[reportReturnType]
 

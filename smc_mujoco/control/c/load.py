@@ -313,21 +313,22 @@ def _about(
     """Return the properties of a library's law: the arguments, or else what the file states."""
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    facts, file, gains = sandbox.load(library), library.path.name, dict(gains or {})
+    gains = {name: tuple(value) if isinstance(value, list) else value for name, value in (gains or {}).items()}
+    facts, file = sandbox.load(library), library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:
         raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")
     if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
         raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
     if (text := facts.get("smc_law_gains")) is not None:
-        own = parsed_gains(text, what := f"{file}'s smc_law_gains")
-        for name, value in own.items():
-            if isinstance(value, tuple) and len(value) != joints:
-                each = f", or {joints}" * bool(joints)
-                raise ScenarioError(f"{what} is {shown(text)}: give {name} one number{each}")
+        own = parsed_gains(text, f"{file}'s smc_law_gains")
         for name in gains:
             errors.find(f"gain of {file}", name, own)
         gains = own | gains
+    for name, value in ((name, default(gain)) for name, gain in gains.items()):
+        if isinstance(value, tuple) and len(value) != joints:
+            each = f", or {joints}" * bool(joints)
+            raise ScenarioError(f"gain {name} of {file} is {written(value)}: give it one number{each}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, gains)
         gains[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)

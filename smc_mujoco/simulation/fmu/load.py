@@ -342,6 +342,11 @@ def _meanings(
     taken = {*chosen.values(), *constants}
     inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUTS}
     inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUTS if n not in chosen])
+    if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
+        raise ScenarioError(
+            f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C, or "
+            f"say what it is, as in variables={{'x': {joints[0]!r}}}"
+        )
     for theirs in ins:
         if theirs not in {*inputs.values(), *constants}:
             raise ScenarioError(

@@ -16,7 +16,7 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.control.c import build, export
+from smc_mujoco.control.c import build, export, sandbox
 from smc_mujoco.control.joint_law import JointMeasurement, catalogue, coriolis, norm, product, saturate, solve, torque
 from smc_mujoco.control.units import Gain
 from smc_mujoco.simulation import reference
@@ -107,6 +107,7 @@ def compiled(folder):
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
         patch.setattr(export, "_measured", lambda code: "not measured")
+        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
         return {name: (laws[name], made()) for name, made in zip(laws, pool.map(make, laws), strict=True)}
 
 
@@ -250,7 +251,7 @@ MISTAKES = {
     "nan": (own("out[1] = gains[0] / memory[0];"), "smc_law returned u = inf, s = 0.0 of joint 1 at t = 0"),
     "gains": (
         own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2 3";'),
-        "smc_law_gains is 'k=1 2 3': give k one number, or 2",
+        "gain k of mine.c is (1, 2, 3): give it one number, or 2",
     ),
 }  # fmt: skip
 

@@ -199,6 +199,13 @@ def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+def test_it_is_no_law_of_one_channel(made):
+    said = r"unit_vector\.fmu has inputs of many joints, such as 'x\[2\]': give an FMU of one channel, or the law in C"
+    with pytest.raises(smc.ScenarioError, match=said) as error:
+        smc.law_from_fmu(made["unit_vector"][0])
+    assert "\n" not in str(error.value)
+
+
 def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
     out = tmp_path / "c.fmu"
     with pytest.raises(SystemExit) as end:
