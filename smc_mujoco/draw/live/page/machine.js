@@ -373,7 +373,8 @@ export class Stage {
     this.camera.matrixWorld.copy(this.camera.matrix);
     this.camera.matrixWorldInverse.copy(this.camera.matrix).invert();
     this.seen = this.machines[0].bounds(this.camera);
-    this.near = simulations[0].plant.extent / 50;
+    // far enough from the camera that a depth buffer of 16 bits tells a mark from what it lies on
+    this.near = new THREE.Vector3(...p).distanceTo(new THREE.Vector3(...simulations[0].plant.center)) / 8;
   }
 
   // Replace the simulations that the machines show.
