@@ -128,7 +128,7 @@ def _link_up(plant: str) -> str:
 
 
 def _figure(svg: bytes, caption: str) -> str:
-    return f"<figure>{svg.decode()}<figcaption>{caption}</figcaption></figure>"
+    return f"<figure data-search-exclude>{svg.decode()}<figcaption>{caption}</figcaption></figure>"
 
 
 def _display(formula: str, names) -> str:

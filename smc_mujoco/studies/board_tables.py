@@ -16,6 +16,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 if TYPE_CHECKING:
     from smc_mujoco.studies.leaderboard import Board
 
+FIT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
 TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
@@ -78,7 +79,7 @@ def as_latex(boards: Iterable["Board"]) -> str:
     """Return a tabular for each group of runs, below comments that say what it is of."""
     tables = []
     for name, own in _groups(boards).items():
-        lines = [f"% {text}" for text in (name, *_verdicts(own), f"{key(own)}; needs booktabs")]
+        lines = [f"% {text}" for text in (name, *_verdicts(own), f"{key(own)}; needs booktabs", FIT)]
         lines += [f"\\begin{{tabular}}{{l{'r' * len(own)}}}", "\\toprule"]
         lines += [_tex_line(["law", *(_tex(heading(board)) for board in own)]), "\\midrule"]
         lines += [_tex_line([_tex(law), *map(_tex_cell, cells)]) for law, cells in _laws(own).items()]
