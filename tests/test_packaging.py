@@ -50,7 +50,19 @@ def binaries(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("environment")
     venv.create(home)
     python = home / "bin" / "python"
-    done = run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=home)
+    done = run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        python,
+        "install",
+        "--no-deps",
+        "--no-index",
+        "--no-compile",
+        wheel,
+        cwd=home,
+    )
     assert done.returncode == 0, done.stderr
     (site,) = home.glob("lib/python*/site-packages")
     # a path named in a .pth file is added, the .pth files in it (the editable install) are not read

@@ -391,8 +391,8 @@ def verdicts():
 
 
 def test_the_same_audit_twice_gives_the_same(verdicts):
-    again = {one.id: one for one in claims(only=CHEAP, gains="study", quick=True, threads=1)}
-    assert again == verdicts
+    again = claims(only=["3", "18"], gains="study", quick=True, threads=1)
+    assert again == [verdicts[one] for one in ("3", "18")]
 
 
 def test_the_true_law_passes_what_its_mutants_fail(verdicts):
