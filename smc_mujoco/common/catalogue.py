@@ -4,10 +4,10 @@
     my_law = "my_package.laws:my_law"
 
 The names of other packages' entries are read from the packages' metadata. An entry is imported when it is asked for by
-its name, or when all entries are listed. So a package that nobody asks for costs nothing, and cannot fail.
+its name, or when all entries are listed. So a package costs nothing, and cannot fail, until somebody asks for it.
 
-What is wrong with an entry is one sentence. It is an error where the entry is asked for, and a `PackageWarning` where
-all are listed, because the others still work.
+If an entry is wrong, one sentence says why. It is an error if the entry was asked for by its name, and a
+`PackageWarning` if all are listed, because the others still work.
 """
 
 import dataclasses
@@ -80,7 +80,7 @@ class Added(Generic[T_co]):
 
     @functools.cached_property
     def _loaded(self) -> T_co | ScenarioError:
-        """What `_load` returned first: a package that fails is imported once, not at each look at the list."""
+        """The first result of `_load`, so that a failing package is imported only once."""
         return self._load()
 
     def _load(self) -> T_co | ScenarioError:
@@ -97,7 +97,7 @@ class Added(Generic[T_co]):
 
 
 def _being_imported(module: str) -> bool:
-    """Return whether a module, or a package around it, is being imported, so that its entries may not be there yet."""
+    """Return whether a module, or a package around it, is being imported. Its entries may not exist yet."""
     around = itertools.accumulate(module.split("."), "{}.{}".format)
     specs = (getattr(sys.modules.get(name), "__spec__", None) for name in around)
     return any(getattr(spec, "_initializing", False) for spec in specs)  # importlib's own mark
@@ -132,7 +132,7 @@ class Catalogue(Mapping[str, T_co]):
         return name in self.own or name in self.added
 
     def __iter__(self) -> Iterator[str]:
-        _warn_of_groups()
+        _warn_of_unknown_groups()
         for name in sorted({*self.own, *self.added}):
             try:
                 self[name]
@@ -168,7 +168,7 @@ class Catalogue(Mapping[str, T_co]):
         return Catalogue({**self.own, **other.own}, both)
 
     def taken(self, name: str) -> bool:
-        """Return whether an entry has this name. One whose module is being imported is just being made."""
+        """Return whether an entry has this name. An entry whose module is being imported does not count."""
         return name in self.own or any(not _being_imported(one.point.module) for one in self.added.get(name, ()))
 
     def package(self, name: str) -> str:
@@ -185,21 +185,26 @@ def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[
 
 
 def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
-    """Return a function that imports the object which an entry point names, and checks its kind and its name."""
+    """Return a function that imports the object that an entry point names, and checks its kind and its name.
+
+    Args:
+      kind: class of the object.
+      fits: what else must hold for it.
+    """
 
     def make(point: EntryPoint) -> T:
         found = point.load()
         if not isinstance(found, kind) or not fits(found):
             raise ScenarioError(f"it is {shown(found)}: give {KINDS[point.group][1]}")
         if (own := NAME(found)) != point.name:
-            raise ScenarioError(f"its own name is {own!r}: give both one name")
+            raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
         return found
 
     return make
 
 
 def source(point: EntryPoint) -> ModuleSpec:
-    """Return where the module is that an entry point names. It imports the packages around it, not the module itself.
+    """Return the spec of the module that an entry point names. It imports the packages around the module alone.
 
     Raises:
       ScenarioError: there is no such module, or the entry point names something in it.
@@ -209,7 +214,7 @@ def source(point: EntryPoint) -> ModuleSpec:
     if (found := importlib.util.find_spec(point.module)) is None:
         raise ScenarioError(f"there is no module {point.module}: update or uninstall that package")
     if (own := point.module.rpartition(".")[2]) != point.name:
-        raise ScenarioError(f"its own name is {own!r}: give both one name")
+        raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
     return found
 
 
@@ -236,7 +241,7 @@ def warn(message: str) -> None:
         warnings.warn(message, PackageWarning, users_frame())
 
 
-def _warn_of_groups() -> None:
+def _warn_of_unknown_groups() -> None:
     """Warn of entry points in groups that do not exist."""
     for group, (point, *_) in _points().items():
         if group not in KINDS:

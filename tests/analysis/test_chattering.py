@@ -165,7 +165,7 @@ def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
 
 
 @pytest.mark.parametrize("counts", [2_000, 20_000])
-def test_one_count_of_a_coarse_encoder_moves_s_as_far_as_s_moves_in_a_run(counts):
+def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     scenario = smc.Scenario(
         plant="duffing", law="super_twisting", actuator=smc.Lag(0.01), sensor=smc.Encoder(counts), duration=5.0
     )
@@ -222,7 +222,7 @@ def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
 RELAY = smc.law("classical", k=4.0, c=2.5)
 
 
-def test_samples_shift_the_phase_of_a_relay_by_half_a_period_and_that_of_a_smooth_law_by_nothing():
+def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
     scenario = smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=RELAY, actuator=smc.Lag(0.01))
     cycle = chattering(scenario)
     omega = math.tau * cycle.frequency
@@ -233,7 +233,7 @@ def test_samples_shift_the_phase_of_a_relay_by_half_a_period_and_that_of_a_smoot
 
 
 @pytest.mark.parametrize("lag", [0.007, 0.01, 0.03])
-def test_a_relay_that_locks_to_the_samples_is_within_the_range_that_is_told(lag):
+def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
     scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.Lag(lag), x0=0.02, duration=6.0)
     cycle, (amplitude, frequency) = chattering(scenario), measured(smc.run(scenario))
     assert cycle.uncertainty > 1.0
@@ -242,7 +242,7 @@ def test_a_relay_that_locks_to_the_samples_is_within_the_range_that_is_told(lag)
     assert cycle.frequency_range[0] > 0.6 * cycle.frequency
 
 
-def test_a_relay_behind_a_motor_may_take_any_period_from_two_samples_to_the_range_that_is_told():
+def test_a_relay_behind_a_motor_may_have_any_period_in_its_range():
     scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.DCMotor(), duration=4.0)
     cycle, score = chattering(scenario), smc.score(smc.run(scenario))
     assert cycle.frequency_range == pytest.approx((229.0, 500.0), rel=0.01)
@@ -250,7 +250,7 @@ def test_a_relay_behind_a_motor_may_take_any_period_from_two_samples_to_the_rang
     assert cycle.amplitude_range[0] < score["chattering_amplitude"] < cycle.amplitude_range[1]
 
 
-def test_where_the_told_uncertainty_is_small_the_prediction_is_good():
+def test_a_prediction_with_small_uncertainty_is_good():
     for law in ("super_twisting", "quasi_continuous", "twisting"):
         scenario = smc.Scenario(plant="duffing", law=law, x0=0.02, duration=6.0, actuator=smc.Lag(0.01))
         cycle, (amplitude, frequency) = chattering(scenario), measured(smc.run(scenario))
@@ -259,7 +259,7 @@ def test_where_the_told_uncertainty_is_small_the_prediction_is_good():
         assert error < max(cycle.uncertainty, 0.05)
 
 
-def test_a_physics_step_as_long_as_the_control_period_hides_the_limit_cycle_and_a_finer_one_shows_it():
+def test_too_long_a_physics_step_hides_the_limit_cycle():
     """MuJoCo's steps lead by half a step, the hold is late by half a period: behind one lag nothing else is late."""
     coarse = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.Lag(0.01), control_period=1e-4, duration=4.0)
     assert not chattering(coarse)
@@ -276,7 +276,7 @@ def test_a_physics_step_as_long_as_the_control_period_hides_the_limit_cycle_and_
     assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1]
 
 
-def test_channels_that_move_each_other_are_told():
+def test_coupled_channels_are_named_in_the_assumptions():
     pair = chattering("classical", plant="double_pendulum", actuator=smc.Lag(0.01))
     assert pair.coupling > 1.0
     assert any(f"moves one of them {pair.coupling:.2g} times" in said for said in pair.assumptions)
@@ -284,7 +284,7 @@ def test_channels_that_move_each_other_are_told():
     assert chattering("classical", plant="pendulum_network", actuator=smc.Lag(0.01)).coupling < 0.01
 
 
-def test_a_smooth_law_is_predicted_to_be_calm_below_its_critical_delay_and_to_oscillate_above():
+def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     plant = smc.plant("duffing")
     law = smc.law("observer_free", lam=6.0, k1=2.5)
     critical = critical_delay(plant, lam=6.0, k1=2.5, control_period=1e-3)
@@ -297,7 +297,7 @@ def test_a_smooth_law_is_predicted_to_be_calm_below_its_critical_delay_and_to_os
     assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
-def test_a_law_of_the_users_own_is_predicted_with_its_memory():
+def test_a_user_s_law_is_predicted_with_its_memory():
     @smc.law_function(gains={"k": 2.0}, memory=1)
     def mine(y, gain, m):
         s = y.v + 0.01 * y.x

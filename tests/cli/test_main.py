@@ -135,7 +135,7 @@ def test_list_names_everything_there_is(call):
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_no_line_about_a_thing_ends_where_its_formula_would_begin(call, monkeypatch):
+def test_no_line_of_the_list_ends_in_a_colon_or_comma(call, monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
     _, out, _ = call("list")
     assert "differentiator of order n = 1, 2, 3 (with n = 1 the super-twisting one)" in out
@@ -162,7 +162,7 @@ def test_with_its_output_closed_a_command_does_its_work(trace, folder):
 # run
 
 
-def test_run_of_a_scene_file_prints_its_scores_and_writes_its_files_where_it_says(call, scene, folder):
+def test_run_prints_scores_of_a_scene_file_and_writes_its_files(call, scene, folder):
     code, out, err = call("run", scene, "--no-video", "--out", "results")
     assert (code, err) == (0, "")
     assert {path.name for path in (folder / "results").iterdir()} == FILES
@@ -198,7 +198,7 @@ def test_run_hands_the_speed_and_the_camera_to_the_film(call, undrawn, scene, fo
     assert "give the name of a camera of the model, or (azimuth, elevation)" in err
 
 
-def test_results_go_to_videos_and_the_scene_s_name_when_nothing_else_is_asked_for(call, scene, folder):
+def test_results_go_to_videos_and_the_scene_s_name_by_default(call, scene, folder):
     assert call("run", scene, "--no-video")[0] == 0
     assert {path.name for path in (folder / "videos" / "mine").iterdir()} == FILES
 
@@ -233,7 +233,7 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, f
     assert all(word in headings for head, name in tables.SHOWN.items() if name in values for word in head.split())
 
 
-def test_a_failing_law_is_named_below_the_table_and_the_others_keep_their_scores(call, undrawn, folder):
+def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, folder):
     (folder / "sour.py").write_text(
         "import smc_mujoco as smc\n"
         "@smc.law_function\n"
@@ -253,7 +253,7 @@ def test_a_failing_law_is_named_below_the_table_and_the_others_keep_their_scores
     assert tables.number(score(smc.load("out/nominal-good.npz"))["ultimate_bound"]) in told
 
 
-def test_a_seed_of_its_own_changes_what_is_random_and_the_same_seed_nothing(call, undrawn, scene):
+def test_another_seed_changes_random_numbers_and_the_same_seed_nothing(call, undrawn, scene):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
         assert call("run", scene, "--no-video", "--out", out, "--seed", seed)[0] == 0
     a, b, c = (smc.load(f"{out}/noisy-rough.npz") for out in "abc")
@@ -286,9 +286,7 @@ def test_timing_names_the_stretches_and_they_add_up(call, scene):
     assert spent[" figures"] > 0.0
 
 
-def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_to_install(
-    call, scene, folder, monkeypatch
-):
+def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(call, scene, folder, monkeypatch):
     monkeypatch.setattr(gl, "choice", lambda: gl.Choice(wish="", backend="disabled"))
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     gl.missing.cache_clear()
@@ -300,7 +298,7 @@ def test_without_a_renderer_all_but_the_film_is_written_and_one_line_says_what_t
     assert "install" in line
 
 
-def test_where_rendering_is_turned_off_all_but_the_film_is_written_and_one_line_says_so(scene, folder):
+def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
     """And the next process loads the law of the scene's file from numba's cache."""
     code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
     undrawn = f"from smc_mujoco.cli import scene; scene.figures = lambda *_: []; {code}"
@@ -388,7 +386,7 @@ scene = smc.Scene(
 """
 
 
-def test_answers_are_a_table_a_metric_with_a_line_a_label_and_a_column_a_condition(call, undrawn, folder):
+def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn, folder):
     (folder / "blocks.py").write_text(ANSWERS)
     code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
     assert (code, err) == (0, "")
@@ -578,7 +576,7 @@ def test_a_seed_too_large_is_refused(call, scene):
     ],
     ids=" ".join,
 )
-def test_a_command_put_wrongly_ends_with_code_2_and_shows_how_it_is_put(words, call):
+def test_a_wrong_command_line_ends_with_code_2_and_shows_the_usage(words, call):
     code, out, err = call(*words)
     assert (code, out) == (2, "")
     assert "Usage: smc-mujoco" in err
@@ -604,7 +602,7 @@ print(*({"mujoco", "numba", "llvmlite", "matplotlib", "scipy", "PIL"} & set(sys.
 """
 
 
-def test_help_and_version_answer_without_the_simulator_the_compiler_and_the_plots(tmp_path):
+def test_help_and_version_import_neither_mujoco_numba_nor_matplotlib(tmp_path):
     done = python("-c", HELP, cwd=tmp_path)
     assert done.stderr == ""
     *said, heavy = done.stdout.split("\n")[:-1]
@@ -656,7 +654,7 @@ def test_a_scene_run_as_a_script_is_executed_once(script):
     assert done.stdout.count("the file runs") == 1
 
 
-def test_a_scene_imports_a_module_beside_it_and_writes_below_the_working_folder(script):
+def test_a_scene_imports_its_neighbour_and_writes_to_the_working_folder(script):
     folder, _ = script
     assert {path.name for path in (folder / "videos" / "once").iterdir()} == {
         "nominal-plain.npz",
@@ -765,7 +763,7 @@ def test_json_to_a_file_leaves_tables_where_they_are(capsys):
 # chatter
 
 
-def test_chatter_prints_predicted_beside_measured_and_writes_what_was_asked_for(call, folder):
+def test_chatter_prints_predictions_and_measurements_and_writes_files(call, folder):
     words = ["--laws", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
     code, out, _ = call("chatter", "duffing", *words, "--json", "cycles.json", "--out", "chatter.pdf")
     assert code == 0

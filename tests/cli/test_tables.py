@@ -42,7 +42,7 @@ def test_a_film_tells_the_arrow_of_the_control_in_volts():
     assert any("2 V" in line for line in caption.key([VOLTS], scales))
 
 
-def test_a_table_of_tips_looks_for_the_worst_joint_only_where_it_has_room(monkeypatch):
+def test_a_table_of_tips_has_the_worst_joint_only_if_there_is_room(monkeypatch):
     asked = []
     monkeypatch.setattr(tables, "worst_joint", lambda trace, metric: asked.append(metric) or ("joint4", 12.5))
     law, start = smc.arms.hybrid(), smc.arms.scenario("wall", smc.arms.hybrid()).x0

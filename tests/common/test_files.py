@@ -174,7 +174,7 @@ def test_what_is_no_regular_file_is_not_opened(tmp_path):
 
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
-def test_what_a_report_kept_is_computed_again_where_it_is_damaged(damage, tmp_path):
+def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
     odd, made = margin(0.1, 0.2), []
 
     def make() -> list[Margin]:

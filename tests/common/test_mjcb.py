@@ -173,7 +173,7 @@ def test_a_model_that_does_not_compile_leaves_the_callback():
     assert in_thread(lambda: mjcb.compiled(mujoco.MjSpec())).wait(60)
 
 
-def test_what_is_wrong_with_a_file_is_still_told_within_a_policy(tmp_path):
+def test_a_wrong_model_is_an_error_also_within_a_policy(tmp_path):
     (tmp_path / "bad.xml").write_text(MODEL.replace('size=".03"', 'size="-1"'))
     found = []
 
@@ -250,7 +250,7 @@ def foreign(*arguments):
 
 
 @pytest.mark.parametrize("name", [name for name in mjcb.CALLBACKS if name != "control"])
-def test_another_callback_of_a_user_s_is_not_called_in_a_run_and_put_back(name):
+def test_a_user_s_other_callback_is_removed_in_a_run_and_restored(name):
     alone = run_of("classical")
     getattr(mujoco, f"set_mjcb_{name}")(foreign)
     try:

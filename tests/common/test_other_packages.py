@@ -127,7 +127,7 @@ def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
     assert plant.catalogue()["early_plant"] is early_plants.early_plant
 
 
-def test_a_package_that_lists_the_catalogue_before_its_entry_is_there_has_it_afterwards(install):
+def test_an_entry_made_after_its_package_listed_the_catalogue_is_found(install):
     """As a script does that compares its own law with all others."""
     install(
         "forward",
@@ -249,7 +249,7 @@ BROKEN = {
     "exits": ("bad_exits:exits", "SystemExit: 3"),
     "nowhere": ("bad_nowhere:nowhere", "ModuleNotFoundError: No module named 'bad_nowhere'"),
     "number": ("bad_law:number", "it is 3: give a function decorated with smc.law_function"),
-    "other": ("bad_law:renamed", "its own name is 'renamed': give both one name"),
+    "other": ("bad_law:renamed", "its own name is 'renamed': give the entry point the same name"),
     "flat": ("bad_law:flat", "give a function decorated with smc.law_function"),
 }
 
@@ -399,7 +399,7 @@ if __name__ == "__main__":
 """
 
 
-def test_the_template_is_built_installed_without_network_and_passes_its_own_tests(tmp_path):
+def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
     target, clean = tmp_path / "site", {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))}
 
     def run(*command: object) -> str:

@@ -36,7 +36,7 @@ def test_every_joint_law_names_gains_units_and_source(name):
         assert gain.unit is not None or gain.held
 
 
-def test_computed_torque_sliding_reaches_its_layer_when_it_should():
+def test_computed_torque_sliding_reaches_its_layer_at_the_predicted_time():
     k, width = 5.0, 0.05
     trace = run(smc.law("computed_torque_sliding", k=k, c=4.0, width=width), control_period=2e-4, duration=0.8)
     for i in range(3):
@@ -47,7 +47,7 @@ def test_computed_torque_sliding_reaches_its_layer_when_it_should():
         np.testing.assert_allclose(np.abs(trace.s[before, i]), start - k * trace.t[before], atol=2e-3 * start)
 
 
-def test_computed_torque_sliding_leaves_the_layer_times_the_share_of_the_disturbance():
+def test_computed_torque_sliding_leaves_width_times_d_over_k():
     """At rest |s| = width M^-1 d / k and |e| = |s| / c, joint by joint, with gains of its own for each."""
     k, c, width, d = np.array([8.0, 20.0, 15.0]), np.array([4.0, 6.0, 5.0]), 0.1, 0.3
     law = smc.law("computed_torque_sliding", k=k, c=c, width=width)
@@ -79,7 +79,7 @@ def test_super_twisting_reaches_and_stays_at_second_order_in_the_period():
     assert residuals[0] < 3.0 * L * 1e-6
 
 
-def test_passivity_based_lets_v_fall_as_its_theorem_says():
+def test_passivity_based_lowers_v_as_its_theorem_says():
     """V' of V = s' M s / 2 along a run is -s' (K s + k sat(s / width) - d), under a disturbance known to us alone."""
     K, k, width, dt = 1.5, np.array([0.6, 0.9, 0.4]), 0.2, 1e-4
     law = smc.law("passivity_based", K=K, k=k, c=4.0, width=width)
@@ -131,7 +131,7 @@ def test_unit_vector_keeps_its_direction_and_reaches_all_surfaces_at_once():
     assert (length[trace.t > 1.02 * end] < 2.0 * rho * 2e-4).all()
 
 
-def test_unit_vector_leaves_the_share_of_the_disturbance():
+def test_unit_vector_leaves_the_predicted_s_under_a_disturbance():
     rho, eps, d = 12.0, 0.1, 0.3
     trace = run(
         smc.law("unit_vector", rho=rho, eps=eps), reference=smc.Constant(0.3), disturbance=smc.Constant(d), duration=5.0

@@ -203,7 +203,7 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
     assert touched
 
 
-def test_the_friction_of_a_surface_is_its_simulations_own():
+def test_the_friction_of_a_surface_is_that_of_its_scenario():
     common = {"plant": "panda", "law": "none", "v0": (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), "duration": 0.6}
     scenarios = [smc.Scenario(**common, contact=smc.Contact("table", friction=mu)) for mu in (0.1, 0.5)]
     together = smc.run(scenarios)

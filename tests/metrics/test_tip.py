@@ -88,7 +88,7 @@ def test_contact_forces_know_a_jump_between_two_samples(pressed):
     assert np.all(before.force[501:] != after.force[501:])
 
 
-def test_contact_forces_are_unknown_behind_parts_with_a_state_of_their_own(pressed):
+def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
         with pytest.raises(smc.ScenarioError, match=f"the state of {type(part).__name__} is not in a trace"):
             tip.contacts(changed(pressed, actuator=part))

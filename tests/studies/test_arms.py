@@ -11,7 +11,7 @@ from smc_mujoco.studies import arms
 LAW = arms.gained("computed_torque_sliding")
 
 
-def test_seeds_move_the_start_but_at_the_wall():
+def test_seeds_move_the_start_except_at_the_wall():
     for task in ("sway", "payload", "blow"):
         own, other = (np.array(arms.scenario(task, LAW, seed).x0) for seed in (0, 3))
         assert own.tolist() == [signal.values[0] for signal in arms.scenario(task, LAW).references]

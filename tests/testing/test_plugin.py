@@ -233,7 +233,7 @@ def pole(step_response):
     return step_response("cart_pole", "hierarchical", step=0.3, model="nominal", duration=1.0)
 
 
-def test_a_pole_on_a_cart_has_metrics_of_its_own_in_its_own_unit(pole):
+def test_a_pole_on_a_cart_has_its_own_metrics_in_its_own_unit(pole):
     assert (pole.trace.r == [0.3, 0.0]).all()
     assert {name: float(value) for name, value in pole.scores["free"].items()} == smc.scores(pole.trace)["free"]
     assert pole.metrics.keys() == pole.scores["driven"].keys() == smc.score(pole.trace).keys()
@@ -253,7 +253,7 @@ def test_check_takes_metrics_of_a_group_by_its_name(pole):
         pole.check(**{"free max_u": 1.0})
 
 
-def test_a_golden_metric_that_there_is_no_longer_is_told_with_its_cure(pole, tmp_path):
+def test_a_golden_metric_that_no_longer_exists_is_named_with_the_cure(pole, tmp_path):
     golden.record(tmp_path / "a.json", "test", pole, None, {"free peak": 0.1})
     text = (tmp_path / "a.json").read_text().replace("free peak", "hinge peak")
     (tmp_path / "a.json").write_text(text)
@@ -275,7 +275,7 @@ def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
         golden.compare(tmp_path / "a.json", "test", pole, None, {})
 
 
-def test_a_condition_sets_its_fields_and_the_test_s_own_go_before_them(step_response):
+def test_fields_of_a_test_replace_those_of_its_condition(step_response):
     r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, seed=7)
     assert (r.scenario.noise, r.scenario.seed) == (smc.Noise(0.01, 0.05), 7)
     r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, noise=smc.Noise(0.5))
@@ -404,7 +404,7 @@ def test_where_nothing_can_be_recorded_is_one_sentence(step_response, tmp_path, 
     ("rel", "tolerances", "off"),
     [(None, {}, False), (1e-6, {}, True), (None, {"tv": 9}, False), (1e-6, {"tv": 9}, True), (None, {"tv": 0}, True)],
 )
-def test_what_a_test_says_goes_before_the_tolerances_of_the_file(step_response, tmp_path, rel, tolerances, off):
+def test_tolerances_of_a_test_replace_those_of_the_file(step_response, tmp_path, rel, tolerances, off):
     runs = [step_response("duffing", smc.law("boundary_layer", k=k), step=0.1, duration=0.5) for k in (3.0, 3.001)]
     golden.record(tmp_path / "a.json", "test", runs[0], None, {})
     try:
@@ -416,9 +416,7 @@ def test_what_a_test_says_goes_before_the_tolerances_of_the_file(step_response, 
 
 
 @pytest.mark.parametrize(("recorded", "off"), [(1e-12, False), (1e-6, True)])
-def test_of_a_metric_that_is_zero_no_share_is_asked_but_more_than_rounding_is_told(
-    step_response, tmp_path, recorded, off
-):
+def test_a_golden_metric_of_0_allows_rounding_and_no_more(step_response, tmp_path, recorded, off):
     response, file = step_response("duffing", "none", step=0.1, duration=0.01), tmp_path / "a.json"
     assert response.overshoot == 0
     golden.record(file, "test", response, None, {"overshoot": 1.0})

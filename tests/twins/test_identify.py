@@ -94,7 +94,7 @@ def test_the_published_axis_is_found_within_two_percent(found):
     assert found.rig.quantities["mass"].source == "identified from records"
 
 
-def test_the_same_seed_gives_the_same_result_and_several_starts_end_where_one_does(moved, found):
+def test_equal_seeds_give_equal_results_and_starts_agree(moved, found):
     free = ("mass", "offset")
     one, again = (smc.identify(found.rig.with_values({"mass": 80.0}), moved, free, starts=3, seed=5) for _ in range(2))
     assert one.values == again.values
@@ -111,7 +111,7 @@ def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
         assert result.errors[name] < 0.05 * PENDULUM.values[name]
 
 
-def test_a_transient_of_a_closed_loop_gives_a_quantity_within_three_standard_errors():
+def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
     """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
 
     The noise of the second sample, which the controller takes for a velocity, decides most of the error. Where it is
@@ -176,7 +176,7 @@ def test_bad_questions_get_one_sentence(make, sentence, moved):
     assert sentence in str(error.value)
 
 
-def test_a_search_at_the_end_of_a_range_stays_within_it_to_the_last_bit():
+def test_a_search_stays_within_its_ranges_to_the_last_bit():
     """1e-4 / 0.042 * 0.042 is less than 1e-4."""
     rig = smc.rig("qube_servo", back_emf=0.042)
     search = Search(rig, ["back_emf"], [], [], lambda count: None)
@@ -199,7 +199,7 @@ def test_a_poor_fit_is_said(found):
     assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is wrong")
 
 
-def test_sets_that_the_records_allow_have_the_errors_and_the_correlations_found(found):
+def test_drawn_sets_have_the_errors_and_correlations_found(found):
     rig = found.drawn(1000, seed=1)
     names = list(found.values)
     sets = np.array([[each[name] for name in names] for each in rig.ensemble])

@@ -26,7 +26,7 @@ def test_the_twin_fits_records_that_it_was_not_identified_from(records):
         assert fit["u"] > 86.0
 
 
-def test_with_counts_the_command_fits_less_and_the_joints_alike(records):
+def test_rounding_to_counts_lowers_the_fit_of_u_but_not_of_joints(records):
     for fit in RIG.fits(records, rounded=True):
         assert fit["theta"] > 91.0
         assert fit["alpha"] > 91.0

@@ -19,12 +19,13 @@ def which(
         typer.Option(
             help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot; default "
             "fast,accurate,calm. And what the law must have: no-velocity, continuous, two-gains, finite-time, ..., "
-            "as of `laws --needs`."
+            "as for `smc-mujoco laws --needs`."
         ),
     ] = None,
     condition: options.Conditions = None,
     conditions: Annotated[
-        str | None, typer.Option(help="Conditions that `list` shows, as a,b; default nominal,noise,sine.")
+        str | None,
+        typer.Option(help="Conditions from `smc-mujoco list`, as a,b; default nominal,noise,sine."),
     ] = None,
     laws: Annotated[str | None, typer.Option(help=f"Laws, as a,b; default all that suit. {options.OWN_GAINS}")] = None,
     quick: Annotated[
@@ -45,8 +46,8 @@ def which(
     All laws that suit are compared, with gains that were tuned for the plant by one rule: those of the package, or else
     found now, which takes some seconds for each law. A first round with few starts selects the finalists. They run from
     new starts and noises, and are compared by the rules of `bench`: a law is better only if its median is lower by more
-    than 3 % and a test over the starts, corrected for all comparisons, confirms it. Where no law is better than
-    another, the answer says so. If stopped, it continues when started again.
+    than 3 % and a test over the starts, corrected for all comparisons, confirms it. If no law is better than another,
+    the answer says so. If you stop the command, it continues when you start it again.
 
     Example: smc-mujoco which duffing --conditions noise,coulomb --needs calm,fast
 

@@ -130,7 +130,7 @@ def test_a_live_page_is_replaced_and_another_folder_is_not(vendor, tmp_path):
         smc.live("duffing", out=tmp_path / "page")
 
 
-def test_a_namesake_of_the_library_and_what_is_no_law_are_refused(vendor, tmp_path):
+def test_the_name_of_a_library_law_and_a_non_law_are_refused(vendor, tmp_path):
     @smc.law_function(gains={"k": 1.0})
     def classical(y, gains, memory):
         return -gains.k * y.e, y.e

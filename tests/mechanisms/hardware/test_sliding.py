@@ -60,7 +60,7 @@ def test_the_pandas_friction_is_the_published_one_in_a_thousand_states():
     assert np.ptp([trace.v for trace in traces]) > 2.0
 
 
-def test_friction_takes_what_it_should_of_a_coasting_joint():
+def test_a_coasting_joint_slows_down_by_the_formula():
     """v' = -F(v)/M for 1 s, against the formula's integral."""
     from scipy.integrate import solve_ivp
 
@@ -128,7 +128,7 @@ def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
     assert torn > 0.01
 
 
-def test_the_formula_alone_creeps_at_the_speed_at_which_it_is_the_load():
+def test_without_holding_a_joint_creeps_where_friction_equals_the_load():
     """Why joints stick here: with hold=0 half of the limit moves a joint at F^-1, about 0.2 rad/s."""
     p, load = (P1[0], P2[0], P3[0]), 0.5 * limits(0)[1]
     common = {"disturbance": smc.Constant(load), "duration": 5.0}
@@ -139,7 +139,7 @@ def test_the_formula_alone_creeps_at_the_speed_at_which_it_is_the_load():
 
 
 @pytest.mark.parametrize("hold", [None, 0.4])
-def test_a_joint_breaks_away_at_what_holds_it(hold):
+def test_a_joint_breaks_away_at_the_holding_force(hold):
     """Under a load that grows by 0.2 N a second, in both directions."""
     low, high = limits(0) if hold is None else (-hold, hold)
     for most, slope in ((high, 0.2), (low, -0.2)):
@@ -150,7 +150,7 @@ def test_a_joint_breaks_away_at_what_holds_it(hold):
         assert np.abs(trace.reaction[:start]).max() <= abs(most) * (1 + 1e-9)
 
 
-def test_a_joint_that_comes_to_rest_stays_and_one_that_is_torn_loose_slides():
+def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
     """A push of 0.1 s, then rest under a load that the limits hold; then a push after which F balances the load."""
     push = (smc.Pulse(2.0, time=0.0, width=0.1), smc.Constant(-0.15), smc.Pulse(-2.0, time=1.5, width=0.05))
     trace = flywheel(0.5, 0.0, friction=smc.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0)

@@ -98,7 +98,7 @@ def test_runs_have_instances_of_their_own_which_end_with_them(folder):
     assert load._running == {}
 
 
-def test_a_memory_that_is_set_to_0_begins_again_and_ends_what_ran(folder):
+def test_a_memory_set_to_0_starts_a_new_instance_and_ends_the_old(folder):
     law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "written_again.fmu"), isolate=False)()
     assert law.function is not None
     y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
@@ -195,7 +195,7 @@ def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
     assert "\n" not in str(error.value)
 
 
-def test_a_step_that_fails_in_a_run_ends_that_run_with_the_reason(foreign):
+def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
     law = smc.law_from_fmu(foreign, constants={"mode": 4.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
