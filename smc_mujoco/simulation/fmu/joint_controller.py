@@ -1,8 +1,8 @@
 """The controller of an FMU with a law of many joints: its variables, and the function that runs all parts at a sample.
 
 Every vector and matrix is one variable for each element, x[1], x[2], M[1,1], M[1,2], counted from 1 as in FMI's
-structured names. FMI 3.0 has arrays, too, but FMPy's `simulate_fmu` cannot be given inputs of several shapes. The
-elements lie in the array of variables in a row, so C reads them as the arrays that they are.
+structured names. The arrays of FMI 3.0 are not used, because FMPy's `simulate_fmu` takes no inputs of several shapes.
+The elements of a vector or matrix follow each other in the array of variables, so C reads them as an array.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ MODEL = ("M", "h", "g")
 
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
-    """Return the variables in the order of their value references."""
+    """Return the variables in the order of their value references. `code` is `controller.code()`."""
     joints, wanted = range(1, controller.joints + 1), inputs(controller, code)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in VECTORS.items():
@@ -42,7 +42,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
     for name, (unit, words) in MATRICES.items():
         rows = range(1, 4) if name == "J" else joints
         for i in rows if name in wanted else ():
-            starts = [float(name == "M" and i == j) for j in joints]  # M can be inverted from the start on
+            starts = [float(name == "M" and i == j) for j in joints]  # M starts as the identity, which has an inverse
             listed += [Variable(f"{name}[{i},{j}]", "SMC_INPUT", words, unit, starts[j - 1]) for j in joints]
     listed += [Variable(f"u[{i}]", "SMC_COMPUTED", f"command within u_max, joint {i}", FORCE) for i in joints]
     listed += [Variable(f"s[{i}]", "SMC_COMPUTED", f"sliding variable, joint {i}") for i in joints]
@@ -67,7 +67,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
 
 
 def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[str]:
-    """Return the inputs that the functions read."""
+    """Return the names of the inputs that the components read, without indices."""
     read, wanted = reads(code.values()), set[str](ALWAYS)
     if controller.estimator is None or "v" in reads([code["estimator"]]):
         wanted.add("v")
@@ -80,7 +80,7 @@ def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[s
 
 
 def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
-    """Yield the lines of the functions that the law calls: C(x, v) w and the Jacobian."""
+    """Yield the lines of the C functions that the law calls: coriolis, for C(x, v) w, and jacobian."""
     wanted, asked = inputs(controller, code), reads([code["law"]])
     if "coriolis" in asked:
         yield "/* out = C w */"

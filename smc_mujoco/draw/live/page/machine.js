@@ -7,7 +7,7 @@ const POSES = 9; // of the machine over its range, all of which the picture show
 const MARGIN = 1.06; // size of the picture, relative to what it shows: chosen
 const TILES = 80; // along an edge of the floor
 const SEAM = 2; // px between two machines
-const PAD = 3; // px around what moves
+const PAD = 3; // px around the box of the moving parts that is redrawn: chosen
 // Qualities of the picture, from the finest to the fastest: px of the canvas per px of the page, and shadows. Chosen.
 const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { ratio: 1, shadows: false }];
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
@@ -104,7 +104,7 @@ function placeOnBody({ geom_pos, geom_quat }, i) {
   return new THREE.Matrix4().compose(position, new THREE.Quaternion(x, y, z, w), new THREE.Vector3(1, 1, 1));
 }
 
-// Return the geometry of several parts, {geometry, colour} each.
+// Return one geometry with vertex colours, made of several parts, {geometry, colour} each.
 function merged(parts) {
   const [position, normal, color, index] = [[], [], [], []];
   for (const { geometry, colour: { r, g, b } } of parts) {
@@ -123,12 +123,13 @@ function merged(parts) {
   return whole;
 }
 
-// Return the mesh of a skin, such as a spring. `bend` moves its vertices: a GPU would do it faster, a processor slower.
+// Return the mesh of a skin, such as a spring, whose vertices `bend` moves. That is done here and not in a shader, because
+// without a GPU a shader is slower.
 function skinned({ vertices, faces, weights, bones, rgba: [r, g, b] }) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.Float32BufferAttribute(vertices, 3).setUsage(THREE.DynamicDrawUsage));
   geometry.setIndex(faces);
-  geometry.computeVertexNormals(); // they stay: bodies that bear skins do not turn
+  geometry.computeVertexNormals(); // once, because the bodies of a skin do not turn
   const colour = new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace);
   const mesh = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({ color: colour, shininess: 60, specular: 0x333333 }));
   mesh.userData.bones = bones.map(({ position, quaternion: [w, x, y, z] }, k) => {
@@ -165,7 +166,8 @@ function cornersOf({ boundingBox: { min, max } }) {
   return Array.from({ length: 8 }, (_, c) => [c & 1 ? max.x : min.x, c & 2 ? max.y : min.y, c & 4 ? max.z : min.z]).flat();
 }
 
-// Spread bounds over points, x, y, z of each. `flat` gives x and y in the bounds, after a point is multiplied by `matrix`.
+// Extend bounds so that they contain points, given as x, y, z of each. A point is multiplied by `matrix`, and `flat` returns
+// its x and y.
 function spread(bounds, points, matrix, flat) {
   for (let i = 0; i < points.length; i += 3) {
     const { x, y } = flat(point.set(points[i], points[i + 1], points[i + 2]).applyMatrix4(matrix));
@@ -341,7 +343,7 @@ export class Stage {
     this.drawAll();
   }
 
-  // Let the next picture be drawn as a whole.
+  // Redraw the whole picture in the next frame.
   drawAll() {
     for (const machine of this.machines ?? []) machine.drawn = null;
   }
@@ -427,8 +429,9 @@ export class Stage {
     });
   }
 
-  // Return which box of a machine's part must be drawn, in px: around what moves, where it is and where it was. Without a
-  // GPU, the pixels take the time. With one, the whole part is drawn, because shadows move as well. Null: nothing moved.
+  // Return the box of a machine's part of the canvas that must be redrawn, in px; null if nothing moved. Without a GPU,
+  // where every pixel takes time, it contains the moving parts where they are and where they were. With a GPU it is the
+  // whole part, because shadows move as well.
   changed(machine, part) {
     const { simulation: { step }, arrow: { visible: pulled }, drawn } = machine;
     if (drawn?.step === step && !drawn.pulled && !pulled) return null;

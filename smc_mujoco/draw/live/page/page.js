@@ -211,7 +211,7 @@ function frame(now) {
   requestAnimationFrame(frame);
 }
 
-// Draw two of the four plots, in turn.
+// Draw two of the four plots: in every frame the other two.
 function plot() {
   const palette = { grid: css("--grid"), muted: css("--muted"), bound: css("--bound") };
   const now = Math.max(...running.map(({ simulation }) => simulation.time));

@@ -6,18 +6,20 @@ const BINS = 1000; // parts of a history: chosen, more than a plot has px
 const SIGNALS = ["x", "v", "u", "s", "q"]; // q: position of a free joint
 const LETTERS = "11px system-ui, 'DejaVu Sans', sans-serif";
 
-// The last `seconds` of a simulation, in parts of equal time: of each signal the lowest, highest and last value.
+// The last `seconds` of a simulation, in BINS parts of equal time. Each part has the lowest, highest and last value of each
+// signal.
 export class History {
   constructor(seconds) {
     this.seconds = seconds;
-    this.t = new Float64Array(BINS + 1); // of the last sample of a part
+    this.t = new Float64Array(BINS + 1); // time of the last sample of each part, s
     for (const name of SIGNALS) {
       this[name] = { low: new Float64Array(BINS + 1), high: new Float64Array(BINS + 1), last: new Float64Array(BINS + 1) };
     }
-    this.count = 0; // of parts with samples
-    this.part = -1; // of the last sample
+    this.count = 0; // number of parts with samples
+    this.part = -1; // number of the part of the last sample, counted from t = 0
   }
 
+  // Add a sample.
   add({ t, x, v, u, s }) {
     const part = Math.floor((t * BINS) / this.seconds + 1e-9);
     const fresh = part !== this.part;
@@ -37,7 +39,7 @@ export class History {
     put(this.q, x[1] ?? 0);
   }
 
-  // The index of the last part.
+  // Index of the last part in the arrays.
   get latest() {
     return (this.count - 1) % (BINS + 1);
   }
