@@ -6,6 +6,7 @@ An environment has no law, and nothing that a Scenario puts between plant and la
 disturbances, contacts or jumps.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -14,11 +15,12 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.envs.rubbing import Rubbing
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.plant import Plant, as_plant, ready
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import callback, coerce
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
@@ -78,11 +80,6 @@ class Setting:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
-        if self.scenario.sliding is not None:
-            raise ScenarioError(
-                f"friction {type(self.scenario.sliding).__name__} is computed by the runs of a law, and an environment "
-                "has MuJoCo's frictions alone: give Viscous, Coulomb or LuGre"
-            )
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)
@@ -136,6 +133,10 @@ class Setting:
             ctrl[..., self.ctrl], first[:] = tandem(command, first)
             yield 1
 
+    def rubbing(self, count: int = 1) -> Rubbing | None:
+        """Return the friction by a formula of so many copies; None without one."""
+        return None if self.scenario.sliding is None else Rubbing(self.scenario, self.model, count)
+
     def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0.
 
@@ -185,6 +186,7 @@ class Episode:
       setting: the plant with its task.
       sample: control samples since the episode began.
       first: output of the first of two drives in series, (driven,).
+      rubbing: a friction by a formula, or None.
       x, v: positions and velocities, (n,) each.
       over: whether the plant has diverged, which ends the episode without a reward.
     """
@@ -192,6 +194,7 @@ class Episode:
     def __init__(self, setting: Setting):
         self.setting, self.sample, self.first, self.over = setting, 0, np.zeros(setting.shape), False
         self.x = self.v = np.zeros(setting.scenario.plant.n)
+        self.rubbing = setting.rubbing()
 
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
@@ -199,7 +202,13 @@ class Episode:
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.place(data.qpos, data.qvel, x, v)
         self.sample, self.first[:] = 0, 0.0
+        if self.rubbing:
+            self.rubbing.begin([0])
         self.look(data)
+
+    def acting(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
+        """Return a context in which physics steps are taken: with a friction by a formula, if there is one."""
+        return self.rubbing.acting(data) if self.rubbing else contextlib.nullcontext()
 
     def stretches(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
         """Apply an action, as `Setting.stretches` does."""
@@ -208,7 +217,7 @@ class Episode:
     def look(self, data: mujoco.MjData) -> None:
         """Read the state."""
         self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
-        self.over = bool(self.setting.lost(self.x, self.v))
+        self.over = bool(self.setting.lost(self.x, self.v)) or bool(self.rubbing and self.rubbing.failed[0])
 
     def reward(self) -> float:
         """Return the reward of the state, in [0, 1]."""
@@ -265,7 +274,7 @@ def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     """Return the model of a scenario, with its mechanism edited."""
     spec = assembly.spec([scenario])
     edit(spec)
-    model = ready(spec, 0)
+    model = ready(spec, 0 if scenario.sliding is None else callback.USERDATA)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
     return assembly.with_values(model, scenario)

@@ -42,18 +42,22 @@ class PlantPhysics(Physics):
 
     Attributes:
       stretches: numbers of physics steps to come, from `Setting.stretches`.
+      acting: the context in which they are taken, from `Episode.acting`.
     """
 
     stretches: Iterable[int] = ()
+    acting: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
 
     def step(self, nstep: int = 1) -> None:
         """Take physics steps, in stretches where a command goes through two drives."""
         stretches, self.stretches = self.stretches, ()
-        for steps in stretches:
-            super().step(steps)
-            nstep -= steps
-        if nstep > 0:  # a user may step without a command
-            super().step(nstep)
+        acting, self.acting = self.acting, contextlib.nullcontext()
+        with acting:
+            for steps in stretches:
+                super().step(steps)
+                nstep -= steps
+            if nstep > 0:  # a user may step without a command
+                super().step(nstep)
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
@@ -78,7 +82,7 @@ class PlantTask(Episode, control.Task):
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Apply the action."""
-        physics.stretches = self.stretches(physics.data.ptr, action)
+        physics.stretches, physics.acting = self.stretches(physics.data.ptr, action), self.acting(physics.data.ptr)
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample and read the state."""

@@ -108,8 +108,9 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take one control period. Return observation, reward, terminated, truncated and an empty info."""
-        for steps in self.stretches(self.data, action):
-            mujoco.mj_step(self.setting.model, self.data, steps)
+        with self.acting(self.data):
+            for steps in self.stretches(self.data, action):
+                mujoco.mj_step(self.setting.model, self.data, steps)
         self.sample += 1
         self.look(self.data)
         observation = self.setting.observe(self.x, self.v, self.sample)

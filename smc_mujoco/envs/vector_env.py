@@ -20,7 +20,7 @@ from smc_mujoco.envs.core import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
-from smc_mujoco.simulation import callback  # noqa: F401  # imports mujoco.batch without a callback
+from smc_mujoco.simulation import callback  # also imports mujoco.batch without a callback
 from smc_mujoco.simulation.run import cores
 
 # isort: split
@@ -40,6 +40,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
       setting: the plant with its task.
       batch: the simulations.
       first: output of the first of two drives in series, (num_envs, driven).
+      rubbing: a friction by a formula, or None.
       samples: control samples since the episode began, (num_envs,).
       over: the copies for which the episode has ended, (num_envs,) of bool.
       last: the sample at which an episode is truncated.
@@ -85,7 +86,10 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
+        self.rubbing = self.setting.rubbing(self.num_envs)
+        # persistent, if a friction reads the forces of the step before
+        workers, kept = min(cores(threads), self.num_envs), self.rubbing is not None
+        self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=kept)
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
         self.first = np.zeros((self.num_envs, *self.setting.shape))
         self.randoms: list[np.random.Generator] = []
@@ -144,18 +148,22 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         for i in ids:
             self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
         self.samples[mask], self.over[mask], self.first[mask] = 0, False, 0.0
+        if self.rubbing:
+            self.rubbing.begin(ids)
+            self.batch.bind("userdata")[ids] = self.rubbing.userdata[ids]
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
         """Step copies, None for all. Return the copies in which MuJoCo gave up, (num_envs,) of bool."""
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.stretches(self.ctrl, commands, self.first):
             try:
-                with mjcb.installed(None):  # a Batch refuses Python callbacks, which runs of other threads may have set
+                # a Batch refuses Python callbacks, which runs of other threads may have set
+                with callback.installed() if self.rubbing else mjcb.installed(None):
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
-        return failed
+        return failed | self.rubbing.failed if self.rubbing else failed
 
     def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
         """Return the observations of all copies, (num_envs, size). `lost` marks those that diverged, if known."""

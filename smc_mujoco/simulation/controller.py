@@ -63,6 +63,9 @@ def control(at, sim, data):
     sim.calls = calls + 1
     if sim.failure != record.FINE:
         return
+    if sim.agent != 0:
+        sim.failure = _rub(at, sim, data)
+        return
     stages, steps = sim.stages, sim.steps
     step, stage = calls // stages, calls % stages
     k, within = step // steps, step % steps

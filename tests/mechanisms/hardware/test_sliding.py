@@ -380,12 +380,6 @@ def test_bad_numbers_are_one_sentence(make, says):
     assert str(error.value) == says
 
 
-def test_an_environment_refuses_a_friction_by_a_formula():
-    core = pytest.importorskip("smc_mujoco.envs.core")
-    with pytest.raises(smc.ScenarioError, match="friction Sigmoid is computed by the runs of a law"):
-        core.Setting("duffing", changes={"friction": smc.Sigmoid(1.0, 5.0)})
-
-
 def test_a_formula_that_raises_ends_its_own_run_with_a_sentence():
     trace = smc.run(smc.Scenario(plant="duffing", law="none", v0=1.0, duration=0.1, friction=Failing()))
     assert "friction Failing" in (trace.failure or "")

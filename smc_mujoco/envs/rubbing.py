@@ -1,0 +1,76 @@
+"""Frictions by a formula in environments: the callback of smc.run computes them, and the agent gives all commands."""
+
+import contextlib
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation.channels import channels
+from smc_mujoco.simulation.prepare import pack, prepare
+from smc_mujoco.simulation.scenario import Resolved
+
+
+class Rubbing:
+    """The friction by a formula of copies of a mechanism.
+
+    Args:
+      model: the compiled mechanism, with callback.USERDATA numbers of userdata.
+
+    Raises:
+      ScenarioError: a function of the scenario does not compile.
+    """
+
+    def __init__(self, scenario: Resolved, model: mujoco.MjModel, count: int):
+        prepared = prepare(scenario)
+        if prepared.why_not:
+            name = type(scenario.sliding).__name__
+            raise ScenarioError(f"friction {name} needs functions that compile, but {prepared.why_not}")
+        self.scenario, self.model, self.count = scenario, model, count
+        self.channels, self.log = channels(model), np.zeros((1, scenario.plant.n), state.LOG)
+        self.records, self.packed = np.zeros(count, state.SIMULATION), []  # the arrays whose addresses are in records
+        for i in range(count):
+            self.records[i], packed = pack(prepared, self.channels, self.log, model)
+            self.packed.append(packed)
+        self.records["agent"] = 1
+
+    @property
+    def userdata(self) -> np.ndarray:
+        """What mjData.userdata of each copy holds, (copies, 2)."""
+        addresses = state.address(self.records) + np.arange(self.count) * self.records.itemsize
+        return np.column_stack([np.full(self.count, callback.magic()), addresses])
+
+    @property
+    def failed(self) -> np.ndarray:
+        """The copies in which the formula raised an exception, (copies,) of bool."""
+        return self.records["failure"] != state.FINE
+
+    def states(self, i: int) -> np.ndarray:
+        """Return where the joints of a copy stick and how fast they were, as numbers of CHANNEL_STATE; writeable."""
+        size = state.CHANNEL_STATE.itemsize // 8 * self.scenario.plant.n
+        return state.view(self.packed[i].numbers, int(self.records["states"][i]), (size,))
+
+    def begin(self, copies: Iterable[int]) -> None:
+        """Begin episodes: no joint sticks."""
+        for i in copies:
+            self.states(i)[:] = 0.0
+            self.records["failure"][i] = state.FINE
+
+    def acting(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
+        """Return a context in which the steps of a single copy have friction."""
+        data.userdata[:] = self.userdata[0]
+        return callback.installed()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but addresses, for copies and other processes."""
+        states = [self.states(i).copy() for i in range(self.count)]
+        return {"of": (self.scenario, self.model, self.count), "states": states, "failed": self.failed}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        self.__init__(*kept["of"])
+        for i, numbers in enumerate(kept["states"]):
+            self.states(i)[:] = numbers
+        self.records["failure"] = np.where(kept["failed"], state.FRICTION_RAISED, state.FINE)
