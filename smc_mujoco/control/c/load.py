@@ -313,7 +313,8 @@ def _about(
     """Return the properties of a library's law: the arguments, or else what the file states."""
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    gains = {name: tuple(value) if isinstance(value, list) else value for name, value in (gains or {}).items()}
+    given = {} if gains is None else gains
+    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     facts, file = sandbox.load(library), library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:
@@ -322,18 +323,18 @@ def _about(
         raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
     if (text := facts.get("smc_law_gains")) is not None:
         own = parsed_gains(text, f"{file}'s smc_law_gains")
-        for name in gains:
+        for name in named:
             errors.find(f"gain of {file}", name, own)
-        gains = own | gains
-    for name, value in ((name, default(gain)) for name, gain in gains.items()):
+        named = own | named
+    for name, value in ((name, default(gain)) for name, gain in named.items()):
         if isinstance(value, tuple) and len(value) != joints:
             each = f", or {joints}" * bool(joints)
             raise ScenarioError(f"gain {name} of {file} is {written(value)}: give it one number{each}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
-        gain = errors.find(f"shared gain of {file}", name, gains)
-        gains[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)
+        gain = errors.find(f"shared gain of {file}", name, named)
+        named[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)
     return About(
-        gains,
+        named,
         whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
         whole("degree", (facts.get("smc_law_degree") or 1) if degree is None else degree, 1, 3),
         bool(facts.get("smc_law_modelled")) if modelled is None else modelled,
