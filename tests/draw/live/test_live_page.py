@@ -249,6 +249,22 @@ def test_springs_follow_the_cart(seen):
     seen.page.locator("#play").click()
 
 
+def test_an_arrow_points_where_u_pushes(seen):
+    seen.open("plant=van_der_pol")
+    seen.page.wait_for_function("live.stage.machines[0].u !== 0")
+    seen.page.locator("#play").click()
+    seen.page.wait_for_timeout(500)  # two frames
+    u, mean, bound, shown, along = seen.page.evaluate(
+        "[live.running()[0].simulation].map(({ latest, s }) => [latest.u, live.stage.machines[0].u, s.u_max,"
+        " live.stage.machines[0].force.visible, live.stage.machines[0].force.children[0].matrixWorld.elements[4]])[0]"
+    )
+    seen.page.locator("#play").click()
+    assert u < -3.0  # it begins at x = 2
+    assert shown
+    assert mean * bound == pytest.approx(u, abs=1.0)  # over a frame of 0.1 s
+    assert along < -0.05  # m: the arrow's shaft along x
+
+
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     """Without a GPU only the part of the picture in which something moves is drawn."""

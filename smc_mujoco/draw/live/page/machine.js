@@ -13,6 +13,9 @@ const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { rati
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
 const PATIENCE = 1.5; // s over which frames are counted: chosen
 const STIFFNESS = 12; // of the spring by which a pointer pulls, in u_max per extent of the plant squared: chosen
+// Of the arrow of u, as in films: length at the bound on u, of a pendulum's or of the plant's extent; and its thickness.
+const [ARC, PUSH, THIN] = [0.425, 0.2, 0.018];
+const SHORT = 0.05; // of the bound on u: a smaller u has no arrow
 const REACH = 0.25; // of the plant's extent: a spring longer than that pulls no harder: chosen
 
 function css(name) {
@@ -226,6 +229,16 @@ class Machine {
     this.arrow.visible = false;
     this.light();
     this.scene.add(this.arrow);
+    this.joint = model.jnt_dofadr.indexOf(simulation.plant.channels[0].dof);
+    const geoms = Array.from(model.geom_bodyid, (body, i) => (body === model.jnt_bodyid[this.joint] ? i : -1)).filter((i) => i >= 0);
+    this.handle = geoms.find((i) => model.geom_matid[i] === accent) ?? geoms[0]; // what bears the arrow of u
+    this.u = 0; // mean of the last frame, of the bound on u
+    const material = new THREE.MeshPhongMaterial({ color: colour, shininess: 60, specular: 0x333333 });
+    this.force = new THREE.Group().add(
+      new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 16).translate(0, 0.5, 0), material),
+      new THREE.Mesh(new THREE.ConeGeometry(2.2, 1, 20).translate(0, 0.5, 0), material),
+    );
+    this.scene.add(this.force);
     this.place();
   }
 
@@ -276,6 +289,39 @@ class Machine {
     for (const skin of this.skins) bend(skin, xpos, xmat);
   }
 
+  // Point the arrow of u: along a pendulum's arc beyond the bob, or along the rail above the cart.
+  pointForce() {
+    const { force, joint, handle, simulation: { model, data, plant: { extent, channels } } } = this;
+    const vector = (array, i) => new THREE.Vector3(...array.subarray(3 * i, 3 * i + 3));
+    const [axis, foot] = [vector(data.xaxis, joint), vector(data.geom_xpos, handle)];
+    const share = Math.min(Math.max(this.u, -1), 1);
+    let [along, out, reach, width] = [axis, new THREE.Vector3(0, 0, 1), PUSH * extent, THIN * extent];
+    if (channels[0].unit === "rad") {
+      out = foot.clone().sub(vector(data.xanchor, joint));
+      const length = out.length();
+      out.normalize();
+      along = axis.clone().cross(out);
+      [reach, width] = [ARC * length, 0.16 * model.geom_rbound[handle] + 0.024 * Math.min(length, 0.5)];
+      foot.addScaledVector(out, model.geom_rbound[handle] + 1.6 * width);
+    } else {
+      const [, depth, height] = model.geom_aabb.subarray(6 * handle + 3, 6 * handle + 6);
+      foot.addScaledVector(out, height + 2.2 * width);
+      if (channels.length > 1) foot.y -= depth + width; // before what the cart carries
+    }
+    const length = reach * Math.abs(share);
+    force.visible = Math.abs(share) > SHORT && along.lengthSq() > 0.5;
+    if (!force.visible) return;
+    const head = Math.min(3 * width, length / 2);
+    const radius = Math.min(width, head) / 2;
+    const [shaft, tip] = force.children;
+    shaft.scale.set(radius, length - head, radius);
+    tip.scale.set(radius, head, radius);
+    tip.position.y = length - head;
+    force.position.copy(foot);
+    force.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.multiplyScalar(Math.sign(share)));
+    force.updateMatrixWorld();
+  }
+
   // Return the bounds, from -1 to 1 across the camera's picture, of what moves.
   movingBounds(camera) {
     const seen = noBounds();
@@ -283,6 +329,7 @@ class Machine {
     const matrix = new THREE.Matrix4();
     const same = (point) => point;
     for (const mesh of this.moving) spread(seen, mesh.userData.corners, matrix.multiplyMatrices(toPicture, mesh.matrix), same);
+    if (this.force.visible) spread(seen, cornersOf({ boundingBox: new THREE.Box3().setFromObject(this.force) }), toPicture, same);
     for (const skin of this.skins) spread(seen, skin.geometry.attributes.position.array, toPicture, same);
     return seen;
   }
@@ -419,6 +466,7 @@ export class Stage {
     this.parts().forEach((part, i) => {
       const machine = this.machines[i];
       machine.place();
+      machine.pointForce();
       this.pointArrow(machine);
       this.open(part);
       const box = this.changed(machine, part);

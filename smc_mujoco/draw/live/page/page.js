@@ -141,6 +141,7 @@ function change() {
 function reset() {
   for (const each of running) {
     each.simulation.reset();
+    stage.machines[running.indexOf(each)].u = 0;
     each.history = new History(SECONDS);
   }
   owed = 0;
@@ -156,11 +157,16 @@ function simulate(seconds) {
     const push = pulls[i];
     push[simulation.plant.channels[0].dof] += 0.5 * pressed * simulation.s.u_max;
     simulation.push.set(push);
+    let [total, samples] = [0, 0]; // of u
     const steps = Math.floor(owed / simulation.s.physics_step + 1e-9);
     for (let k = 0; k < steps && !simulation.failed; k++) {
       const sample = simulation.advance();
-      if (sample) history.add(sample);
+      if (!sample) continue;
+      history.add(sample);
+      total += sample.u;
+      samples += 1;
     }
+    if (samples) stage.machines[i].u = total / samples / simulation.s.u_max;
     done = Math.max(done, steps * simulation.s.physics_step);
   });
   owed -= done;
