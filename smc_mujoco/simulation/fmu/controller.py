@@ -120,7 +120,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
         computed.append(Variable("v_eq", "SMC_COMPUTED", "acceleration of the error that keeps s constant"))
     if controller.estimator:
         computed.append(Variable("v_estimated", "SMC_COMPUTED", "estimated velocity", SPEED))
-    parameters = [bounded("u_max", "u", controller.u_max[0])]
+    parameters = [bounded("u_max", controller.u_max[0])]
     for kind, part in controller.parts.items():
         parameters += [parameter(kind, part, name, value) for name, value in part.gains.items()]
     period = Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period)
@@ -149,10 +149,10 @@ def reads(code: Iterable[tuple[int, str]]) -> set[str]:
     return {name for _, text in code for name in re.findall(r"\by->(\w+)", text)}
 
 
-def bounded(name: str, what: str, bound: float) -> Variable:
+def bounded(name: str, bound: float) -> Variable:
     """Return the parameter that bounds the magnitude of a command."""
     start = bound if math.isfinite(bound) else UNBOUNDED
-    return Variable(name, "SMC_PARAMETER", f"bound on the magnitude of {what}", FORCE, start, 0.0, True)
+    return Variable(name, "SMC_PARAMETER", "bound on the magnitude of u", FORCE, start, 0.0, True)
 
 
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:

@@ -1,6 +1,7 @@
 """modelDescription.xml, buildDescription.xml and the page of documentation of an FMU."""
 
 import html
+import itertools
 import math
 import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Sequence
@@ -174,17 +175,19 @@ Gains can be changed while it runs. The sources need a C99 compiler and nothing 
 
 
 def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
-    """Return documentation/index.html."""
+    """Return documentation/index.html. The elements of a vector or a matrix share a row."""
     rows = []
-    for one in listed:
+    for name, elements in itertools.groupby(listed, lambda variable: variable.name.partition("[")[0]):
+        one, *others = elements
         if one.kind == "SMC_STATE":
             continue
         role = "output" if is_output(one) else ROLES[one.kind][0]
         unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
-        start = "unbounded" if one.start == UNBOUNDED else f"{one.start:g}"
+        starts = ["unbounded" if each.start == UNBOUNDED else f"{each.start:g}" for each in (one, *others)]
+        start = "identity" if name == "M" else ", ".join(starts[: 1 if len(set(starts)) == 1 else None])
         start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
-        cells = (one.name, role, unit, start, one.description)
+        cells = (f"{one.name} to {others[-1].name}" if others else one.name, role, unit, start, one.description)
         rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
     about = html.escape(summary(controller))
-    name = html.escape(controller.law.name)
-    return PAGE.format(name=name, summary=about, period=controller.period, rows="\n".join(rows), version=__version__)
+    title = html.escape(controller.law.name)
+    return PAGE.format(name=title, summary=about, period=controller.period, rows="\n".join(rows), version=__version__)

@@ -38,18 +38,17 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in VECTORS.items():
         if name in wanted:
-            listed += [Variable(f"{name}[{i}]", "SMC_INPUT", f"{words}, joint {i}", unit) for i in joints]
+            listed += [Variable(f"{name}[{i}]", "SMC_INPUT", words, unit) for i in joints]
     for name, (unit, words) in MATRICES.items():
         rows = range(1, 4) if name == "J" else joints
         for i in rows if name in wanted else ():
             starts = [float(name == "M" and i == j) for j in joints]  # M starts as the identity, which has an inverse
             listed += [Variable(f"{name}[{i},{j}]", "SMC_INPUT", words, unit, starts[j - 1]) for j in joints]
-    listed += [Variable(f"u[{i}]", "SMC_COMPUTED", f"command within u_max, joint {i}", FORCE) for i in joints]
-    listed += [Variable(f"s[{i}]", "SMC_COMPUTED", f"sliding variable, joint {i}") for i in joints]
+    listed += [Variable(f"u[{i}]", "SMC_COMPUTED", "command, within u_max", FORCE) for i in joints]
+    listed += [Variable(f"s[{i}]", "SMC_COMPUTED", "sliding variable") for i in joints]
     if controller.estimator:
-        words = "estimated velocity, joint"
-        listed += [Variable(f"v_estimated[{i}]", "SMC_COMPUTED", f"{words} {i}", SPEED) for i in joints]
-    listed += [bounded(f"u_max[{i}]", f"u of joint {i}", controller.u_max[i - 1]) for i in joints]
+        listed += [Variable(f"v_estimated[{i}]", "SMC_COMPUTED", "estimated velocity", SPEED) for i in joints]
+    listed += [bounded(f"u_max[{i}]", controller.u_max[i - 1]) for i in joints]
     for kind, part in controller.parts.items():
         for name, value in part.gains.items():
             one = kind != "law" or name in part.shared
