@@ -136,6 +136,23 @@ def test_the_response_of_the_loop_is_that_of_a_run_under_a_sine(fields):
     assert Loop(scenario).response(omega) == pytest.approx(fitted(scenario, omega), rel=1e-5)
 
 
+@smc.law_function(gains=dict.fromkeys(("x", "v", "f", "q", "dq", "fq"), 0.0))
+def weighted(y, gains, memory):
+    """Returns what it is told, each with a weight."""
+    driven = gains.x * y.x + gains.v * y.v + gains.f * y.f
+    return driven + gains.q * y.q + gains.dq * y.dq + gains.fq * y.fq, y.e
+
+
+@pytest.mark.parametrize("name", weighted.gains)
+def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_models(name):
+    omega, loop = 20.0, Loop(smc.Scenario(plant="cart_pole", law=weighted(**{name: 1.0})))
+    answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
+    (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
+    (*_, fx, fv), (*_, fqx, fqv) = loop.model.values()
+    expected = {"x": x, "v": v, "f": fx * x + fv * v, "q": q, "dq": dq, "fq": fqx * q + fqv * dq}
+    assert loop.gain(1e-3, omega) == pytest.approx(expected[name], rel=1e-3)
+
+
 @pytest.mark.parametrize(("gap", "omega"), [(1e-3, 60.0), (1e-2, 20.0), (1e-2, 60.0), (5e-2, 20.0)])
 def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omega):
     scenario = smc.Scenario(
@@ -210,6 +227,16 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
     scenario = smc.Scenario(plant=plant, law=law, x0=0.02, duration=6.0, **actuator)
     cycle = chattering(scenario)
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
+
+
+def test_an_estimator_of_the_velocity_is_in_the_prediction():
+    slow = smc.Scenario(
+        plant="duffing", law="super_twisting", x0=0.02, duration=6.0, actuator=smc.Lag(0.01),
+        velocity=smc.estimator("filtered_difference", tau=0.01),
+    )  # fmt: skip
+    cycle = chattering(slow)
+    assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(slow)), rel=0.15)
+    assert cycle.amplitude > 1.5 * chattering(dataclasses.replace(slow, velocity="measured")).amplitude
 
 
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
