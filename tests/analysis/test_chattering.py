@@ -145,7 +145,7 @@ def weighted(y, gains, memory):
 
 @pytest.mark.parametrize("name", weighted.gains)
 def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_models(name):
-    omega, loop = 20.0, Loop(smc.Scenario(plant="cart_pole", law=weighted(**{name: 1.0})))
+    omega, loop = 20.0, Loop(smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0})))
     answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
     (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
     (*_, fx, fv), (*_, fqx, fqv) = loop.model.values()
