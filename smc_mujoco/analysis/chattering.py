@@ -278,7 +278,10 @@ def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
     while slowest < omega * step < fastest:
         after = excess(omega * step)
         if before * after <= 0.0 and abs(before - after) < math.pi:
-            omega = float(brentq(excess, omega, omega * step, rtol=NEAR))  # type: ignore[arg-type]
+            try:
+                omega = float(brentq(excess, omega, omega * step, rtol=NEAR))  # type: ignore[arg-type]
+            except ValueError:  # the curve has branches, and from this side another one is found
+                omega *= step
             excess(omega)
             return loop.wave(math.exp(z), omega)
         omega, before = omega * step, after

@@ -229,6 +229,13 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
+def test_a_range_is_told_where_the_curve_of_cycles_has_branches():
+    parts = {"actuator": smc.Lag(0.01), "sensor": smc.Encoder(2000), "velocity": "levant"}
+    cycle = chattering("boundary_layer", plant="duffing", **parts)
+    assert cycle.frequency_range[0] <= cycle.frequency <= cycle.frequency_range[1]
+    assert cycle.amplitude_range[0] <= cycle.amplitude <= cycle.amplitude_range[1]
+
+
 def test_an_estimator_of_the_velocity_is_in_the_prediction():
     slow = smc.Scenario(
         plant="duffing", law="super_twisting", x0=0.02, duration=6.0, actuator=smc.Lag(0.01),
