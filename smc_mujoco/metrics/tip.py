@@ -154,9 +154,10 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
       force: with which it should press, N; None: the gain `force` of its law, if there is one.
 
     Returns:
-      max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact,
-      over the last 80 % of the run: mean_force, N; force_error, of this mean, % of the wanted one; force_ripple, the
-      standard deviation, N; touching, the share of the time in contact, %; and over the whole run depth, m.
+      max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact
+      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, of this mean, % of the
+      wanted one; force_ripple, the standard deviation, N; touching, the share of the time in contact, %; and over the
+      whole run depth, m.
 
     Raises:
       ScenarioError: the plant has no tip, or the run failed.
@@ -164,7 +165,7 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     conventions.refuse(trace)
     error = tip_error(trace)
     found = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
-    if trace.scenario.contact.kind != "none":
+    if knows_contacts(trace.scenario):
         wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
         pressed = contacts(trace)
         late = pressed.force[trace.t >= trace.t[0] + SETTLED * np.ptp(trace.t)]

@@ -92,6 +92,7 @@ def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
         with pytest.raises(smc.ScenarioError, match=f"the state of {type(part).__name__} is not in a trace"):
             tip.contacts(changed(pressed, actuator=part))
+        assert set(smc.tip_scores(changed(pressed, actuator=part))) == {"max_error", "rms_error", "last_error"}
 
 
 LIFTED = """
