@@ -1,23 +1,38 @@
-"""What a film shows of an arm: the path of its tip, and a bar for the torque of each joint against its limit."""
+"""What a film shows of an arm: paths of its tip, torques against their limits, the force of a contact, and blows.
+
+All are drawn over the rendered picture, so they cost little and no link hides them.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
-from smc_mujoco.metrics.tip import tip_path
+from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
-SEGMENTS = 90  # of a path: as many as look smooth
-WIDTH = 0.004  # m, of the path
-BAR, GAP, HEIGHT = 13, 5, 44  # px of a bar, between bars, and of the bar of both limits together
-LETTERS = 10  # px
-ROOM = HEIGHT + 3 * LETTERS  # px, of bars with their numbers and what they are
-WANTED = (0.12, 0.14, 0.16, 0.35)  # ink, translucent
+WIDTH, WANTED_WIDTH = 3.0, 1.6  # px, of the path and of the wanted one
+WANTED = 0.5  # opacity of the wanted path
+BAR, GAP, HEIGHT = 13, 5, 42  # px of a bar, between bars, and of the bar of both limits together
+LETTERS, NUMBER = 10, 13  # px
+SPACE = 5  # px, from a label to its bars
+ROOM = SPACE + HEIGHT + 1.6 * LETTERS  # px, of bars with their numbers
+LOST = 0.015  # m that a tip is off its path where a ghost shows the reference; chosen: nearer ones hide the ghost
+LONGEST = 0.3  # m, of the arrow of the largest force
+SHAFT, HEAD = 4.0, 9.0  # px: width of an arrow's shaft, and half of that of its head
+REACH = 0.09  # m, of a blow's arrow from the middle of its body
+SHOWN = 0.12  # s for which a blow is shown after its end
+FINER = 3  # pixels that an arrow is drawn with for each of the picture
+Project = Callable[[np.ndarray], np.ndarray]  # points (m, 3) -> (m, 2) px
+
+
+def is_arm(traces: Sequence[Trace]) -> bool:
+    """Return whether all machines have a tip, of which a film then tells."""
+    return all(bool(trace.scenario.plant.tip) for trace in traces)
 
 
 def has_bars(trace: Trace) -> bool:
@@ -25,82 +40,217 @@ def has_bars(trace: Trace) -> bool:
     return bool(trace.scenario.plant.tip) and all(limit < math.inf for limit in trace.scenario.limits)
 
 
-class Path:
-    """The path of a machine's tip, and the wanted one.
+def key(traces: Sequence[Trace]) -> list[str]:
+    """Return what the film of arms shows, in words."""
+    words = ["line: path of the tip, black where it is wanted"]
+    if all(map(has_bars, traces)):
+        words.append(f"bars: torque of joints 1 to {traces[0].scenario.plant.n}, of its limits")
+    if any(tip.knows_contacts(trace.scenario) for trace in traces):
+        words.append("violet arrow: force on what the tip touches")
+    if style.pushes(traces):
+        words.append("violet arrow: the blow")
+    if any(tip.tip_error(trace).max() > LOST for trace in traces):
+        words.append("translucent: where it is wanted")
+    return words
+
+
+class Trail:
+    """A path in the picture, uncovered as time runs.
 
     Args:
-      place: of the machine, (3,) m.
+      points: of the path, (m, 2) px.
+      times: at which the path gets there, (m,) s.
+      seen: which of them are drawn, (m,).
+      size: of the picture, px.
     """
 
-    def __init__(self, trace: Trace, place: np.ndarray, colour: str):
-        self.times = np.linspace(trace.t[0], trace.t[-1], SEGMENTS + 1)
-        rows = np.searchsorted(trace.t, self.times).clip(0, len(trace.t) - 1)
-        plant = trace.scenario.plant
-        self.points, self.wanted = (place + tip_path(plant, values[rows]) for values in (trace.x, trace.r))
-        self.rgba = np.array([*(value / 255 for value in style.rgb(colour)), 1.0], np.float32)
+    def __init__(
+        self,
+        points: np.ndarray,
+        times: np.ndarray,
+        seen: np.ndarray,
+        colour: str,
+        width: float,
+        size: tuple[int, int],
+    ):
+        self.colour, half = np.array(style.rgb(colour), float), width / 2
+        steps = np.ceil(2.0 * np.hypot(*np.diff(points, axis=0).T)).astype(int)  # a point each half px
+        place = np.concatenate([[0.0], np.cumsum(np.maximum(steps, steps > 0))])
+        even = np.arange(int(place[-1]) + 1)
+        dense = np.stack([np.interp(even, place, each) for each in points.T], axis=1)
+        at, above = np.interp(even, place, times), np.interp(even, place, seen) > 0.5
+        reach = math.ceil(half + 1.0)
+        low = np.clip(np.floor(dense.min(axis=0)).astype(int) - reach, 0, size)
+        high = np.clip(np.ceil(dense.max(axis=0)).astype(int) + reach + 1, 0, size)
+        self.box = *low.tolist(), *high.tolist()
+        wide, tall = (high - low).tolist()
+        self.cover, self.since = np.zeros((tall, wide)), np.full((tall, wide), np.inf)
+        middle = np.floor(dense).astype(int)
+        for i in range(-reach, reach + 1):
+            for j in range(-reach, reach + 1):
+                pixel = np.add(middle, (i, j))
+                ink = above * np.clip(half + 0.5 - np.hypot(*(pixel + 0.5 - dense).T), 0.0, 1.0)
+                x, y = (pixel - low).T
+                inside = (x >= 0) & (x < wide) & (y >= 0) & (y < tall) & (ink > 0.0)
+                np.maximum.at(self.cover, (y[inside], x[inside]), ink[inside])
+                np.minimum.at(self.since, (y[inside], x[inside]), at[inside])
 
-    def draw(self, shown: mujoco.MjvScene, time: float, now: np.ndarray) -> None:
-        """Add the wanted path, and the part of the path until a time, s, at which the tip is at `now`, (3,) m."""
-        for start, end in zip(self.wanted[:-1], self.wanted[1:], strict=True):
-            segment(shown, start, end, 0.5 * WIDTH, np.array(WANTED, np.float32))
-        past = self.points[self.times <= time]
-        for start, end in zip(past, [*past[1:], now], strict=True):
-            segment(shown, start, end, WIDTH, self.rgba)
+    def draw(self, picture: np.ndarray, time: float, opacity: float = 1.0) -> None:
+        """Draw the path until a time, s."""
+        left, top, right, bottom = self.box
+        y, x = np.nonzero(self.since <= time)
+        part, cover = picture[top:bottom, left:right], opacity * self.cover[y, x, None]
+        part[y, x] = (part[y, x] * (1.0 - cover) + self.colour * cover).astype(np.uint8)
 
 
-def segment(shown: mujoco.MjvScene, start: np.ndarray, end: np.ndarray, width: float, rgba: np.ndarray) -> None:
-    """Add a rod between two points, m."""
-    if shown.ngeom >= shown.maxgeom or np.linalg.norm(end - start) < 1e-4:
-        return
-    rod = shown.geoms[shown.ngeom]
-    mujoco.mjv_initGeom(rod, mujoco.mjtGeom.mjGEOM_CAPSULE, np.zeros(3), np.zeros(3), np.zeros(9), rgba)
-    mujoco.mjv_connector(rod, mujoco.mjtGeom.mjGEOM_CAPSULE, width, start, end)
-    rod.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN
-    shown.ngeom += 1
+class Blow(NamedTuple):
+    """A blow on a body of a machine."""
+
+    machine: int
+    body: str
+    force: np.ndarray  # (3,) N, its peak
+    time: float  # s
+    width: float  # s
 
 
-class Bars:
-    """A bar for each joint of each machine: its applied torque, as a share of its limit, upwards if positive.
+class Overlay:
+    """What is drawn over the pictures of arms.
 
     Args:
+      places: of the machines, (machines, 3) m.
+      project: from the scene to the picture, whose `size` is in px.
       edges: of the frames' times, (frames + 1,) s.
-      boxes: places of the machines, (machines, 4) px.
-      top: px, of the bars.
+      room: places of what is shown below each label, (machines, 4) px.
     """
 
-    def __init__(self, traces: Sequence[Trace], edges: np.ndarray, colours: Sequence[str], top: float, scale: float):
-        self.shares = [
-            np.clip(windows(trace.t, trace.applied, edges).mean / np.array(trace.scenario.limits), -1.0, 1.0)
+    def __init__(
+        self,
+        traces: Sequence[Trace],
+        colours: Sequence[str],
+        places: np.ndarray,
+        project: Project,
+        size: tuple[int, int],
+        edges: np.ndarray,
+        room: np.ndarray,
+        scale: float,
+    ):
+        self.traces, self.project, self.room, self.scale, self.colours = traces, project, room, scale, colours
+        self.trails, self.wanted = [], []
+        for trace, colour, place in zip(traces, colours, places, strict=True):
+            path, wanted = (points + place for points in tip.tip_paths(trace))
+            above = path[:, 2] >= 0.0, wanted[:, 2] >= 0.0  # the floor hides what is below it
+            self.trails.append(Trail(project(path), trace.t, above[0], colour, WIDTH * scale, size))
+            self.wanted.append(Trail(project(wanted), trace.t, above[1], style.INK, WANTED_WIDTH * scale, size))
+        self.edges = edges
+        self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
+        self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
+        self.forces = [
+            windows(trace.t, tip.contacts(trace).push, edges).mean if tip.knows_contacts(trace.scenario) else None
             for trace in traces
         ]
-        self.colours, self.top, self.scale = colours, top, scale
-        self.lefts: list[float] = []
+        sizes = [np.linalg.norm(one, axis=1).max() for one in self.forces if one is not None]
+        self.newton = LONGEST / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
+        self.blows = [
+            Blow(k, push.body, np.array([push.x, push.y, push.z]), push.time, push.width)
+            for k, trace in enumerate(traces)
+            for push in style.pushes([trace])
+        ]
 
-    @property
-    def width(self) -> float:
-        """Of the bars of one machine, px."""
-        return self.scale * (max(share.shape[1] for share in self.shares) * (BAR + GAP) + GAP)
+    def share(self, trace: Trace) -> np.ndarray:
+        """Return the torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame."""
+        torque = windows(trace.t, trace.applied, self.edges).mean
+        return np.clip(torque / np.array(trace.scenario.limits), -1.0, 1.0)
 
-    def place(self, boxes: np.ndarray, wide: int) -> None:
-        """Place the bars above their machines, whose places are (machines, 4) px, in a picture so wide."""
-        middles = (boxes[:, 0] + boxes[:, 2]) / 2
-        middles = middles.clip(self.width / 2 + 8, wide - self.width / 2 - 8)
-        self.lefts = (middles - self.width / 2).tolist()
-
-    def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
-        """Return the picture with the bars of a frame."""
-        image, s = Image.fromarray(picture), self.scale
-        draw, font = ImageDraw.Draw(image), style.font(LETTERS * s)
-        zero, half = self.top + (1.4 * LETTERS + HEIGHT / 2) * s, HEIGHT * s / 2
-        for share, left, colour in zip(self.shares, self.lefts, self.colours, strict=True):
-            for i, value in enumerate(share[frame]):
-                x = left + (GAP + i * (BAR + GAP)) * s
-                draw.rectangle((x, zero - half, x + BAR * s, zero + half), style.PAPER, style.RULE)
-                low, high = sorted((zero, zero - value * half))
-                full = abs(value) > 0.999
-                draw.rectangle((x + 1, low, x + BAR * s - 1, high), style.FAILED if full else colour)
-                draw.text((x + BAR * s / 2, zero + half + 2 * s), str(i + 1), style.MUTED, font, anchor="ma")
-            middle = left + self.width / 2
-            draw.text((middle, self.top), "torque, of its limit", style.MUTED, font, anchor="ma")
-            draw.line((left, zero, left + self.width, zero), style.INK, max(1, round(s)))
+    def over(self, picture: np.ndarray, frame: int, bodies: Callable[[int, str], np.ndarray]) -> np.ndarray:
+        """Return the picture of a frame with all this; `bodies` returns where a machine's body or tip is, (3,) m."""
+        time = float(self.edges[frame + 1])
+        picture = picture.copy()
+        for trail, wanted in zip(self.trails, self.wanted, strict=True):
+            wanted.draw(picture, np.inf, WANTED)
+            trail.draw(picture, time)
+        image = Image.fromarray(picture)
+        draw = ImageDraw.Draw(image)
+        for k, force in enumerate(self.forces):
+            if force is not None and (size := float(np.linalg.norm(force[frame]))) > 0.5:
+                at = bodies(k, self.traces[k].scenario.plant.tip)
+                ends = self.project(np.array([at, at - self.newton * force[frame]]))
+                self.arrow(image, ends[0], ends[1], style.REACTION, f"{size:.0f} N", after=True)
+        for blow in self.blows:
+            if self.edges[frame] <= blow.time + blow.width + SHOWN and time >= blow.time:
+                way = blow.force / np.linalg.norm(blow.force)
+                end = bodies(blow.machine, blow.body) - REACH * way
+                ends = self.project(np.array([end - LONGEST * 1.3 * way, end]))
+                self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(blow.force):.0f} N", after=False)
+        for k in range(len(self.traces)):
+            self.gauges(draw, k, frame)
         return np.asarray(image)
+
+    def arrow(
+        self, image: Image.Image, start: np.ndarray, end: np.ndarray, colour: str, words: str, after: bool
+    ) -> None:
+        """Draw an arrow with smooth edges between two points, px, and words beyond its end, or before its start."""
+        s, length = self.scale, float(np.linalg.norm(end - start))
+        if length > 1.0:
+            along = (end - start) / length
+            across = np.array([-along[1], along[0]])
+            head = min(2.2 * HEAD * s, 0.7 * length)
+            half, neck = 0.5 * SHAFT * s, end - head * along
+            wide = HEAD * s * head / (2.2 * HEAD * s)
+            rim = [start + half * across, neck + half * across, neck + wide * across, end]
+            rim += [neck - wide * across, neck - half * across, start - half * across]
+            corner, far = np.floor(np.min(rim, axis=0)).astype(int), np.ceil(np.max(rim, axis=0)).astype(int) + 1
+            size = tuple((far - corner).tolist())
+            mask = Image.new("L", tuple(FINER * side for side in size))
+            shape = [tuple(FINER * (point - corner)) for point in rim]
+            ImageDraw.Draw(mask).polygon(shape, 255)
+            image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
+        draw, font = ImageDraw.Draw(image), style.font(NUMBER * s, bold=True)
+        place = end if after else start
+        gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)
+        anchor = "lm" if gap > 0 else "rm"
+        at = (float(place[0] + gap), float(place[1]))
+        draw.text(at, words, colour, font, anchor=anchor, stroke_width=round(2 * s), stroke_fill=style.PAPER)
+
+    def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
+        """Draw the bars of a machine, and how far its tip is off its path."""
+        s, (left, top, right, bottom), font = self.scale, self.room[k].tolist(), style.font(LETTERS * self.scale)
+        words, letters = error_words(1e3 * self.errors[k][frame]), style.font(NUMBER * s, bold=True)
+        if self.shares is None:
+            draw.text(((left + right) / 2, (top + bottom) / 2), words, style.INK, letters, anchor="mm")
+            return
+        zero, half = top + (SPACE + HEIGHT / 2) * s, HEIGHT * s / 2
+        share = self.shares[k][frame]
+        for i, value in enumerate(share):
+            x = left + (GAP + i * (BAR + GAP)) * s
+            draw.rectangle((x, zero - half, x + BAR * s, zero + half), style.PAPER, style.RULE)
+            low, high = sorted((zero, zero - value * half))
+            full = abs(value) > 0.999
+            draw.rectangle((x + 1, low, x + BAR * s - 1, high), style.FAILED if full else self.colours[k])
+            draw.text((x + BAR * s / 2, zero + half + 2 * s), str(i + 1), style.MUTED, font, anchor="ma")
+        wide = bars_width(len(share)) * s
+        draw.line((left, zero, left + wide, zero), style.INK, max(1, round(s)))
+        if right - left > wide + 1:
+            draw.text((left + wide + 6 * s, zero), "tip", style.MUTED, style.font(NUMBER * s), anchor="lb")
+            draw.text((left + wide + 6 * s, zero + 2 * s), words.removeprefix("tip "), style.INK, letters, anchor="lt")
+
+
+def error_words(millimetres: float) -> str:
+    """Return how far a tip is off its path in words."""
+    return f"tip {millimetres:.{1 if millimetres < 9.95 else 0}f} mm"
+
+
+def bars_width(joints: int) -> float:
+    """Return the width of the bars of a machine, px of a full-size film."""
+    return joints * (BAR + GAP) + GAP
+
+
+def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
+    """Return width and height of what is shown below each label, px of a full-size film; `slot` is a machine's width.
+
+    The tip's distance stands beside the bars where the slot has room for it.
+    """
+    number = style.width("000 mm", NUMBER, bold=True) + 8
+    if not all(map(has_bars, traces)):
+        return number + style.width("tip ", NUMBER, bold=True), 1.6 * NUMBER
+    bars = bars_width(traces[0].scenario.plant.n)
+    return bars + number * (bars + number < slot), ROOM

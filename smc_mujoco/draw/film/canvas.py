@@ -20,6 +20,7 @@ MARGIN = 3  # px around what has changed, for smoothed edges
 FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, as each shape in it; fitted to two films
 SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
 FINE, LEAST = 0.35, 6  # px between an arc and its chords, and the least number of chords; chosen
+RING = 24  # chords of a ring around an arm's link: with fewer, a link would show through it
 GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
 CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -29,19 +30,23 @@ Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bott
 
 
 class Canvas:
-    """A picture of `size` px of a model, from its camera `film`, which stands still."""
+    """A picture of `size` px of a model, from its camera `film`, which stands still.
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
+    Args:
+      arms: whether it is of arms: rings around their links cast no shadows, and show all around.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False):
         self.model, self.data, self.size = model, data, size
         self.turn, self.place = data.cam("film").xmat.reshape(3, 3).copy(), data.cam("film").xpos.copy()
         self.sun = sun(model, data)
         self.steady = not any(model.light_castshadow & model.light_active)  # where lamps' shadows fall is not foretold
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
-        self.casts = shadows.casting(model, middle * camera.pixel(size))
+        self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.FLAT if arms else 0.0)
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
         quality.numstacks = FEW if ball < SMALL else facets(ball, np.pi, quality.numstacks)  # of cylinders, too
-        quality.numslices = facets(widest, 2 * np.pi, quality.numslices)
+        quality.numslices = max(facets(widest, 2 * np.pi, quality.numslices), RING * arms)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
         bounded = [model.geom_type != scene.PLANE, np.ones(model.nskin, bool), self.casts & (self.sun is not None)]

@@ -32,6 +32,8 @@ class Caption:
 
     Args:
       row: whether the machines stand in a row across the picture, and not behind each other.
+      below: width and height of what others draw below each label, in its badge's place, px of a full-size film.
+      parts: of the key; default: what arrows and ghosts mean.
     """
 
     def __init__(
@@ -45,6 +47,8 @@ class Caption:
         scales: Mapping[Group, Scale],
         states: Sequence[Sequence[State | None]] = (),
         row: bool = True,
+        below: tuple[float, float] | None = None,
+        parts: Sequence[str] | None = None,
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
         self.jumps = style.jumps(traces, names)
@@ -56,32 +60,34 @@ class Caption:
         )
         notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
         self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
-        self.key = wrapped(key(traces, scales), inside - self.note_room, KEY * scale)
+        self.key = wrapped(key(traces, scales) if parts is None else parts, inside - self.note_room, KEY * scale)
         self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
         badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]
         self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
         badges = [max(wide, STRIP * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
-        side, below = 40 * scale, 52 * scale
+        top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
+        if below is not None:
+            self.badge[:] = np.array(below) * scale
+            top -= 26 * scale
+        side, below_row = 40 * scale, 52 * scale
         self.max_label = (size[0] - side) / len(traces) - 0.8 * LABEL * scale  # width of a label
         if self.beside:
             self.max_label = MAX_LABEL * size[0]
             widths = [self.width(text) for text in self.texts()] + self.badge[:, 0]
-            side, below = max(widths) + 30 * scale, 20 * scale
+            side, below_row = max(widths) + 30 * scale, 20 * scale
         else:
-            below += self.badge[:, 1].max()
+            below_row += self.badge[:, 1].max()
             if max(self.width(name) for name in names) > self.max_label:
                 self.names = style.distinct(names)
-        top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
-        self.room = Room(side, top, size[0] - 40 * scale, size[1] - below)
+        self.room = Room(side, top, size[0] - 40 * scale, size[1] - below_row)
         self.sheet = functools.lru_cache(maxsize=16)(self._sheet)
 
-    def make_room(self, height: float) -> float:
-        """Leave room of a height, px of a full-size film, above the machines. Return where it begins, px."""
-        top = self.room.top - 36 * self.scale
-        self.room = self.room._replace(top=top + height * self.scale)
-        return top
+    @property
+    def apart(self) -> float:
+        """The width, px, that a machine in a row needs for its label and what is below it."""
+        return max(*(self.width(text) for text in self.texts()), *self.badge[:, 0]) + 0.8 * LABEL * self.scale
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """Return the labels, with the time of failure of machines that have failed; default: of all that will fail."""

@@ -160,8 +160,8 @@ def frames(
     if why := gl.missing():
         raise ScenarioError(why)
     scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
-    below = 2 * round(CHARTS * size[1] / 2)
-    above = size[0], size[1] - below
+    low = 2 * round(CHARTS * size[1] / 2)
+    above = size[0], size[1] - low
     times = shown.times
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
     hold = max(states.HOLD, float(np.diff(edges).max()))
@@ -169,18 +169,21 @@ def frames(
     scales = arrows.scales(traces)
     by_channel = [arrows.by_channel(trace, scales) for trace in traces]
     loads = [arrows.loads(trace, edges) for trace in traces]
-    timelines = [states.timeline(trace, times, hold) for trace in traces]
+    arms = arm.is_arm(traces)
+    timelines = [[None] * len(times) if arms else states.timeline(trace, times, hold) for trace in traces]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
-    caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row)
-    bars = None
-    if all(map(arm.has_bars, traces)):
-        bars = arm.Bars(traces, edges, colours, caption.make_room(arm.ROOM), scale)
-    charts = Charts(traces, names, colours, (size[0], below), scale)
+    below = arm.room(traces, size[0] / len(traces) / scale) if arms else None
+    words = arm.key(traces) if arms else None
+    caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row, below, words)
+    charts = Charts(traces, names, colours, (size[0], low), scale)
     motions = [motion(trace, times) for trace in traces]
-    with Stage(traces, colours, above, caption.room, chosen, motions) as stage:
+    with Stage(traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0) as stage:
         caption.place(stage.boxes)
-        if bars:
-            bars.place(stage.boxes, size[0])
+        over = (
+            arm.Overlay(traces, colours, stage.where, stage.project, above, edges, caption.badges, scale)
+            if arms
+            else None
+        )
         places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
@@ -190,15 +193,17 @@ def frames(
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame], time)
-                stage.aim(k, None if failed[k] else wanted[k][frame])
+                lost = over is None or over.errors[k][frame] > arm.LOST
+                stage.aim(k, wanted[k][frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
-                for i, longest in enumerate([] if failed[k] else by_channel[k][: stage.shown[k]]):
+                for i, longest in enumerate([] if failed[k] or arms else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
-            picture = stage.render(drawn, time)
-            words = tuple(each[frame] for each in timelines)
-            over = caption.over(picture, time, failed, words, float(shown.speeds[frame]))
-            over = bars.over(over, frame) if bars else over
-            yield np.concatenate([over, charts.at(time)])
+            picture = stage.render(drawn)
+            if over:
+                picture = over.over(picture, frame, stage.find)
+            moods = tuple(each[frame] for each in timelines)
+            picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]))
+            yield np.concatenate([picture, charts.at(time)])
 
 
 def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Playback speed of a film, from its traces: slow motion where things move fast, and faster where they rest.
 
 The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
-should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around blows; and FAST
+should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around blows, and always
+around a push on an arm; and FAST
 where nothing has moved for a while. The same traces give the same film.
 """
 
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number
-from smc_mujoco.draw import states
+from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.simulation.trace import Trace
 
@@ -79,11 +80,15 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     powers = spread(powers, round(AROUND * fps))
     for start in blows(runs):
         powers[np.abs(grid + 0.5 / fps - start) <= BLOW] = SLOWEST
-    moving = spread((travel > STILL).astype(float), round(REST * fps)) > 0.0
+    hits = np.zeros(len(grid), bool)  # by a push on an arm
+    for push in style.pushes(runs):
+        hits |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= BLOW
+    moving = spread(((travel > STILL) | hits).astype(float), round(REST * fps)) > 0.0
     longest, most = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), SLOWEST
 
     def bounded() -> np.ndarray:
-        return np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
+        speed = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
+        return np.where(hits, 0.5**SLOWEST, speed)
 
     while most and (1.0 / bounded()).sum() / fps > longest:
         most -= 1

@@ -22,6 +22,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
 GAP = 0.15  # between machines in a row, of their width or height; chosen
+ARMS_GAP = 0.04  # the same between arms, which have no arrows beside them
 AISLE = 0.05  # m between machines, chosen
 HIDDEN = 5  # a group of geoms that MuJoCo does not draw by default
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
@@ -212,7 +213,8 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
         sides = [points @ right for points in reaches]
         wide = max((one.max() - other.min() for one, other in itertools.pairwise(sides)), default=0.0)
         tall = max(float(np.ptp(points[:, 2])) for points in reaches)
-        return (wide + GAP * max(wide, tall)) * right
+        gap = ARMS_GAP if scenarios[0].plant.tip else GAP
+        return (wide + gap * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
     things = [fixed_boxes(assembly.model([scenario])) for scenario in scenarios]

@@ -13,6 +13,7 @@ HEIGHT = 4e-4  # of the model's extent: height of shadows over the floor
 EMISSION = 20.0  # so large that a shadow is as dark whichever light falls on it
 TINT = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
 THIN, MARK = 1.0, 3.0  # px: half of the thickness of shapes, and of boxes such as marks of a scale, without a shadow
+FLAT = 3.0  # px, the same of rings around an arm's links, which are in the shadow of these
 PLANE, BOX = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
 GEOM, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_TENDON
 
@@ -24,10 +25,15 @@ def flattening(way: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def casting(model: mujoco.MjModel, pixel: float) -> np.ndarray:
-    """Return which geoms cast shadows, (geoms,): opaque ones that are not too thin; `pixel` is the size of one, m."""
+def casting(model: mujoco.MjModel, pixel: float, flat: float = 0.0) -> np.ndarray:
+    """Return which geoms cast shadows, (geoms,): opaque ones that are not too thin; `pixel` is the size of one, m.
+
+    Args:
+      flat: px, half of the thickness of flat shapes without a shadow.
+    """
     least = np.where(model.geom_type == BOX, MARK, THIN) * pixel
-    return (np.sort(model.geom_aabb[:, 3:], axis=1)[:, 1] > least) & (model.geom_type != PLANE)
+    half = np.sort(model.geom_aabb[:, 3:], axis=1)
+    return (half[:, 1] > least) & (half[:, 0] > flat * pixel) & (model.geom_type != PLANE)
 
 
 def draw(scene: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> list[int]:

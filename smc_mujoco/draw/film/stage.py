@@ -32,6 +32,7 @@ class Stage:
       shown: number of channels of each machine that are drawn.
       boxes: place of each machine in the picture, (machines, 4) px: left, top, right, bottom.
       canvas: draws the pictures.
+      where: places of the machines, (machines, 3) m.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class Stage:
         room: camera.Room,
         chosen: camera.Camera | None = None,
         motions: Sequence[Motion | None] = (),
+        apart: float = 0.0,
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
@@ -50,7 +52,18 @@ class Stage:
         self.motions = motions or [None] * len(traces)
         runs = zip(self.puppets, traces, self.motions, strict=True)
         reaches = [puppet.reach(trace, motion) for puppet, trace, motion in runs]
+        distance = None if chosen is None or isinstance(chosen, str) or len(chosen) < 3 else chosen[2]
         where = places(self.puppets, reaches, turn)
+        if arm.is_arm(traces):  # the floor hides what is below it
+            floors = [(-np.inf, -np.inf, -there[2]) for there in where]
+            reaches = [np.maximum(points, floor) for points, floor in zip(reaches, floors, strict=True)]
+        seen = [points + there for points, there in zip(reaches, where, strict=True)]
+        place = camera.fit(np.concatenate(seen), turn, size, room, distance)
+        step = np.diff(camera.project(where, turn, place, size)[:, 0]).mean() if len(where) > 1 else apart
+        if step < apart:  # then labels would not be below their machines
+            where *= (apart / step, apart / step, 1.0)
+            seen = [points + there for points, there in zip(reaches, where, strict=True)]
+            place = camera.fit(np.concatenate(seen), turn, size, room, distance)
         self.model = scene.compose(scenarios, where, size)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
@@ -70,9 +83,6 @@ class Stage:
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
             self.pose(k, traces[k].x[0, : self.shown[k]])
-        seen = [points + place for points, place in zip(reaches, where, strict=True)]
-        distance = None if chosen is None or isinstance(chosen, str) or len(chosen) < 3 else chosen[2]
-        place = camera.fit(np.concatenate(seen), turn, size, room, distance)
         machines = zip(scenarios, self.joints, self.puppets, strict=True)
         self.mounts = [arrows.mounts(one, ids, each.slides, each.rail, turn[:, 2]) for one, ids, each in machines]
         film = self.model.camera("film")
@@ -83,12 +93,8 @@ class Stage:
         scene.forward(self.model, self.data)
         scene.hide_cut(self.model, self.data, turn, place, size, room)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
-        self.paths = [
-            arm.Path(trace, there, colour)
-            for trace, there, colour in zip(traces, where, colours, strict=True)
-            if trace.scenario.plant.tip
-        ]
-        self.canvas = Canvas(self.model, self.data, size)
+        self.turn, self.place, self.size, self.where = turn, place, size, where
+        self.canvas = Canvas(self.model, self.data, size, arms=arm.is_arm(traces))
 
     def __enter__(self) -> "Stage":
         return self
@@ -142,24 +148,29 @@ class Stage:
         self.rest[k] = None if motion is None else motion.at(time)
         self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, self.rest[k])
 
-    def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = (), time: float = 0.0) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only.
-
-        The paths of tips are shown until a time, s.
-        """
+    def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
+        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only."""
         scene.forward(self.model, self.data)
         scene.forward(self.model, self.goal)
 
         def add(shown: mujoco.MjvScene) -> None:
             for k in np.flatnonzero(self.aimed):
                 self.ghost(shown, self.links[k])
-            for k, path in enumerate(self.paths):
-                path.draw(shown, time, self.data.site(f"m{k}/{self.puppets[k].scenario.plant.tip}").xpos)
             for k, i, arrow in drawn:
                 arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
 
         whole, self.changed = self.changed, False
         return self.canvas.draw(add, whole)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Return where points (m, 3) m are in the picture, (m, 2) px."""
+        return camera.project(points, self.turn, self.place, self.size)
+
+    def find(self, k: int, name: str) -> np.ndarray:
+        """Return where a site of machine k is, or the centre of mass of a body, (3,) m."""
+        if mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, f"m{k}/{name}") >= 0:
+            return self.data.site(f"m{k}/{name}").xpos
+        return self.data.body(f"m{k}/{name}").xipos
 
     def ghost(self, shown: mujoco.MjvScene, links: np.ndarray) -> None:
         """Add translucent copies of geoms, posed as the reference wants them."""

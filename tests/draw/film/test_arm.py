@@ -1,16 +1,24 @@
-"""What films show of an arm: the path of its tip until now, and bars of torque against their limits."""
+"""What films show of an arm: its tip's path until now, torques against their limits, forces of contact, and blows."""
 
-import mujoco
+import dataclasses
+
 import numpy as np
 import pytest
 from helpers import arms
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arm
-from smc_mujoco.metrics.tip import tip_path
+from smc_mujoco.draw.film import arm, film, pace
+from smc_mujoco.metrics import tip
 
 COLOUR = "#0072B2"
+SIZE = (400, 220)
+EDGES = np.array([0.0, 0.02, 0.04])
+
+
+def project(points):
+    """A camera that sees x to the right and z up, 100 px a metre."""
+    return np.array([50.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
 
 @pytest.fixture(scope="module")
@@ -21,39 +29,107 @@ def trace():
     return smc.run(scenario)
 
 
-def test_the_path_is_drawn_until_now(trace):
-    place = np.array([1.0, 2.0, 0.0])
-    path, shown = arm.Path(trace, place, COLOUR), mujoco.MjvScene(trace.scenario.plant.load(), maxgeom=500)
-    points = place + tip_path(trace.scenario.plant, trace.x)
-    counts = []
-    for time in (0.1, 0.4):
-        shown.ngeom = 0
-        path.draw(shown, time, points[round(1e3 * time)])
-        rods = [
-            rod for rod in shown.geoms[: shown.ngeom] if np.allclose(rod.rgba[:3], np.array(style.rgb(COLOUR)) / 255)
-        ]
-        counts.append(len(rods))
-        ends = np.array([rod.pos for rod in rods])
-        late = points[round(1e3 * time) :]
-        assert np.linalg.norm(ends[-1] - late[0]) < 0.02
-        assert np.linalg.norm(ends[0] - points[0]) < 0.02
-    assert counts[1] > 2 * counts[0] > 10
+def struck(trace, **fields):
+    return dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, **fields))
+
+
+def overlay(trace, edges=EDGES):
+    return arm.Overlay(
+        [trace], [COLOUR], np.zeros((1, 3)), project, SIZE, edges, np.array([[100.0, 150.0, 300.0, 210.0]]), 1.0
+    )
+
+
+def paper():
+    return np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
+
+
+def test_a_trail_is_drawn_until_now_and_not_below_the_floor():
+    points, times = np.array([[20.0, 30.0], [60.0, 30.0], [60.0, 90.0]]), np.array([0.0, 1.0, 2.0])
+    trail = arm.Trail(points, times, np.ones(3, bool), COLOUR, 3.0, SIZE)
+    early, late, hidden = paper(), paper(), paper()
+    trail.draw(early, 0.5)
+    trail.draw(late, 2.0)
+    for picture, x, y, inked in (
+        (early, 25, 29, True),
+        (early, 45, 29, False),
+        (late, 45, 29, True),
+        (late, 60, 80, True),
+        (late, 45, 34, False),
+    ):
+        assert (picture[y, x].tolist() == list(style.rgb(COLOUR))) is inked
+    arm.Trail(points, times, np.array([True, True, False]), COLOUR, 3.0, SIZE).draw(hidden, 2.0)
+    assert hidden[29, 45].tolist() == list(style.rgb(COLOUR))
+    assert hidden[80, 60].tolist() == [255, 255, 255]
+    out = arm.Trail(points - 1000.0, times, np.ones(3, bool), COLOUR, 3.0, SIZE)
+    out.draw(late, 2.0)  # outside the picture
+
+
+def test_the_trail_of_an_arm_is_its_tips_path(trace):
+    shown = overlay(trace)
+    path = project(tip.tip_paths(trace)[0])
+    early, late = paper(), paper()
+    shown.trails[0].draw(early, 0.1)
+    shown.trails[0].draw(late, 0.5)
+    for k, when in ((50, True), (400, False)):
+        x, y = np.floor(path[k]).astype(int)
+        assert (late[y, x] != 255).any()
+        assert bool((early[y, x] != 255).any()) is when or np.hypot(*(path[k] - path[:100]).T).min() < 3.0
 
 
 def test_bars_are_shares_of_each_joints_limit(trace):
     assert arm.has_bars(trace)
-    edges = np.array([0.0, 0.02, 0.04])
-    bars = arm.Bars([trace], edges, [COLOUR], top=10.0, scale=1.0)
+    bars = overlay(trace)
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
+    assert bars.shares is not None
     np.testing.assert_allclose(bars.shares[0][0], expected, atol=0.05)
-    bars.place(np.array([[100.0, 50.0, 300.0, 200.0]]), 400)
     bars.shares[0][0] = (0.5, -1.0, 0.0)
-    image = bars.over(np.full((220, 400, 3), 128, np.uint8), 0)
-    left, zero = bars.lefts[0], 10.0 + 1.4 * arm.LETTERS + arm.HEIGHT / 2
-    middles = [round(left + arm.GAP + i * (arm.BAR + arm.GAP) + arm.BAR / 2) for i in range(3)]
+    image = bars.over(paper() // 2, 0, lambda k, name: np.array([9.0, 0.0, 9.0]))
+    zero = 150.0 + arm.SPACE + arm.HEIGHT / 2
+    middles = [round(100.0 + arm.GAP + i * (arm.BAR + arm.GAP) + arm.BAR / 2) for i in range(3)]
     quarter = round(arm.HEIGHT / 8)
     up, down = round(zero) - quarter, round(zero) + quarter
     assert image[up, middles[0]].tolist() == list(style.rgb(COLOUR))
     assert image[down, middles[0]].tolist() == list(style.rgb(style.PAPER))
     assert image[down, middles[1]].tolist() == list(style.rgb(style.FAILED))  # all that the motor has
     assert image[up, middles[2]].tolist() == image[down, middles[2]].tolist() == list(style.rgb(style.PAPER))
+
+
+def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
+    hit = struck(trace, disturbance=smc.Push("hand", x=50.0, time=0.021, width=0.01))
+    shown, body = overlay(hit), np.array([2.0, 0.0, 1.0])  # 250, 100 px
+    before, during = (shown.over(paper(), frame, lambda k, name: body) for frame in (0, 1))
+    hue = np.array(style.rgb(style.REACTION))
+    y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
+    assert 250 - 100 * arm.REACH - 3 <= x.max() <= 250 - 100 * arm.REACH + 1
+    assert abs(np.median(y) - 100) <= 1
+
+
+def test_the_key_names_only_what_is_in_the_picture(trace):
+    words = " ".join(arm.key([trace]))
+    assert "torque of joints 1 to 3" in words
+    assert "translucent" in words  # it starts 0.2 rad off
+    assert "arrow" not in words
+    near = dataclasses.replace(trace, x=trace.r)
+    assert "translucent" not in " ".join(arm.key([near]))
+    hit = struck(trace, disturbance=smc.Push("hand", y=50.0, time=0.1, width=0.02))
+    assert "the blow" in " ".join(arm.key([hit]))
+
+
+def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace):
+    still = dataclasses.replace(trace, x=np.zeros_like(trace.x))
+    hit = struck(still, disturbance=smc.Push("hand", y=50.0, time=0.3, width=0.02))
+    found = pace.clock([hit], 30.0)
+    slow = np.abs(found.times - 0.31) < 0.02
+    assert slow.sum() > 5
+    assert found.speeds[slow].tolist() == [0.5**pace.SLOWEST] * slow.sum()
+    assert pace.clock([still], 30.0).speeds.min() == pace.FAST
+
+
+def test_a_film_of_arms_tells_of_the_tip(trace):
+    now = film.Clock(np.array([0.1, 0.4]), np.ones(2))
+    labels = ["one with a long label", "another with a long label"]
+    early, late = film.frames([trace, trace], now, labels, None, (640, 360))
+    assert early.shape == (360, 640, 3)
+    (colour, _) = style.law_colours([trace.scenario.law] * 2)
+    inks = [np.abs(picture[:200].astype(int) - style.rgb(colour)).sum(axis=2) < 12 for picture in (early, late)]
+    assert inks[1].sum() > inks[0].sum() + 20
