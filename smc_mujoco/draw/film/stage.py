@@ -60,7 +60,7 @@ class Stage:
         seen = [points + there for points, there in zip(reaches, where, strict=True)]
         place = camera.fit(np.concatenate(seen), turn, size, room, distance)
         step = np.diff(camera.project(where, turn, place, size)[:, 0]).mean() if len(where) > 1 else apart
-        if step < apart:  # then labels would not be below their machines
+        if 0.0 < step < apart:  # then labels would not be below their machines
             where *= (apart / step, apart / step, 1.0)
             seen = [points + there for points, there in zip(reaches, where, strict=True)]
             place = camera.fit(np.concatenate(seen), turn, size, room, distance)
