@@ -42,7 +42,7 @@ scene = smc.Scene(
         }
     },
     figure="joints",
-    camera=(60.0, -26.0),  # from the side: the tip is in sight between arm and wall
+    camera=(60.0, -18.0),  # from the side: the tip is in sight between arm and wall
     answer=answer,
 )
 

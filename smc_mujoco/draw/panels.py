@@ -119,11 +119,19 @@ class Panel(NamedTuple):
 
 def _is_rate(law: Law) -> bool:
     """Return whether a law's s has the unit of a velocity; that of twisting is e, and that of PID a force."""
-    return law.relative_degree == 1 and (law.template is None or law.template.family != "baseline")
+    return law.relative_degree == 1 and not _is_baseline(law)
+
+
+def _is_baseline(law: Law) -> bool:
+    """Return whether a law is no sliding mode, such as PID or computed torque."""
+    return law.template is not None and law.template.family == "baseline"
 
 
 def overview(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the default panels of a figure, from top to bottom; with forces on the joints for realistic mechanisms."""
+    """Return the default panels of a figure, from top to bottom.
+
+    Realistic mechanisms have forces on their joints; s is left out if no law is a sliding mode.
+    """
     groups = style.split(traces)
     driven = {group: parts for group, parts in groups.items() if group.driven}
     panels = []
@@ -135,6 +143,8 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
         panels += [Panel(name, group, parts) for name in ("u", *force)]
     for group, parts in groups.items():
         panels += [Panel("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
+    if all(_is_baseline(trace.scenario.law) for trace in traces):
+        return panels
     return panels + [Panel("s", group, parts) for group, parts in driven.items()]
 
 
@@ -472,8 +482,10 @@ def far_off(sizes: Sequence[float]) -> int | None:
 
 def outside(panel: Panel, names: Sequence[str]) -> str:
     """Return which run leaves a panel of an arm and how far, such as "Time-delay sliding: up to 310"; else ""."""
-    sizes = [float(np.nanmax(np.abs(QUANTITIES[panel.quantity](trace)))) for trace in panel.traces]
-    away = far_off(sizes) if panel.quantity in OF_ARMS else None
+    if panel.quantity not in OF_ARMS:
+        return ""
+    sizes = [float(np.abs(QUANTITIES[panel.quantity](trace)).max()) for trace in panel.traces]
+    away = far_off(sizes)
     return "" if away is None else f"{names[away]}: up to {style.short(sizes[away])}"
 
 

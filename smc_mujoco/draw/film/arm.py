@@ -22,7 +22,8 @@ LETTERS, NUMBER = 10, 13  # px
 SPACE = 5  # px, from a label to its bars
 ROOM = SPACE + HEIGHT + 1.6 * LETTERS  # px, of bars with their numbers
 LOST = 0.015  # m that a tip is off its path where a ghost shows the reference; chosen: nearer ones hide the ghost
-LONGEST = 0.3  # m, of the arrow of the largest force
+LONGEST = 0.6  # m, of the arrow of the largest force
+STRUCK = 0.4  # m, of the arrow of a blow
 SHAFT, HEAD = 4.0, 9.0  # px: width of an arrow's shaft, and half of that of its head
 REACH = 0.09  # m, of a blow's arrow from the middle of its body
 SHOWN = 0.12  # s for which a blow is shown after its end
@@ -179,7 +180,7 @@ class Overlay:
             if self.edges[frame] <= blow.time + blow.width + SHOWN and time >= blow.time:
                 way = blow.force / np.linalg.norm(blow.force)
                 end = bodies(blow.machine, blow.body) - REACH * way
-                ends = self.project(np.array([end - LONGEST * 1.3 * way, end]))
+                ends = self.project(np.array([end - STRUCK * way, end]))
                 self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(blow.force):.0f} N", after=False)
         for k in range(len(self.traces)):
             self.gauges(draw, k, frame)

@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
-from smc_mujoco.mechanisms.plant import EFFORT
+from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
@@ -69,6 +69,8 @@ def mounts(
         (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
     )
     turning = NETWORK if plant.n > 1 and not own else 1.0
+    if plant.n == 1 and not own and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
+        turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])  # no smaller on a short rod
     before = front if own or plant.free else None
     return [Mount(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
 
