@@ -391,7 +391,8 @@ function partForm(side, part, title) {
   select.value = name;
   const row = element("div", { class: "part" }, element("label", { for: `${part}-${side}` }, title), select);
   if (!name) return [row];
-  return [row, ...gainSliders(kind[name], { ...kind[name].gains, ...gains }, ranges[name], (changed) => {
+  const note = part === "surface" ? [element("p", { class: "formula" }, "In place of the law's own s, whose gain has no effect now.")] : [];
+  return [row, ...note, ...gainSliders(kind[name], { ...kind[name].gains, ...gains }, ranges[name], (changed) => {
     chosen[side][part] ??= { name, gains: {} };
     Object.assign(chosen[side][part].gains, changed);
     of(side).simulation[part].setGains(changed);
