@@ -439,7 +439,7 @@ class ArrayFunction(Function):
         text, left, pointer = home.text, list[str](), home.home
         for token, place, dimension in zip((ROW, COLUMN), places, shape(home.kind), strict=False):
             if isinstance(place, ast.Slice):
-                if place.lower or place.upper or place.step:
+                if place.lower or place.upper or place.step or dimension == SLOTS:
                     raise refuse(node, "a part of an array")
                 text = text.replace(token, (ROW, COLUMN)[len(left)])
                 left.append(dimension)
@@ -470,13 +470,6 @@ class ArrayFunction(Function):
         if isinstance(node.op, ast.MatMult):
             raise refuse(node, "the operator @")
         return self.elementwise(super()._binop, node)
-
-    def _power(self, node: ast.BinOp) -> Value:
-        shapes, _ = self.frames[-1]
-        self.numeric(node.left)
-        if not shapes:
-            return super()._power(node)
-        return self.math("pow", [self.numeric(node.left), self.numeric(node.right)])  # as numba does with arrays
 
     def _compare(self, node: ast.Compare) -> Value:
         return self.elementwise(super()._compare, node)

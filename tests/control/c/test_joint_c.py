@@ -79,7 +79,7 @@ def turns(y, gains, memory):
     for one in twice:
         total += one
     if norm(y.e) > 0.1 and total < 1e3:
-        u = np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high)) - s**2
+        u = np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high)) - s**3 - 0.1 * np.abs(s) ** 0.5
     else:
         u = torque(y, -gains.k * s) - coriolis(y, np.array([s[0], 0.5, total / (1.0 + abs(total))]))
     kept = u.copy()
@@ -310,6 +310,7 @@ REFUSED = {
     "u = s * np.sum(s)": "sum, which is not a Python function,",
     "u = y.M * s": "arrays of different shapes in one expression",
     "u = s[1:]": "a part of an array",
+    "u = memory[0] * s": "a part of an array",
     "u = s * s[3]": "an index out of 0 to 2",
     "u = s * memory[0, int(y.t)]": "memory at an index that is not constant",
     "u = np.zeros(int(y.t))": "a length that is not known before the law runs",
