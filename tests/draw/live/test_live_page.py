@@ -208,6 +208,31 @@ def test_a_slider_moves_its_condition_and_the_link_holds_it(seen, page):
     assert (seen.chosen("input_delay"), seen.law_gain("k1"), seen.chosen("friction")) == (0.007, 4.25, friction)
 
 
+def test_surface_estimator_and_encoder_are_choices_that_the_link_holds(seen, page):
+    link = "plant=duffing&a=boundary_layer&a-surface=terminal&a-surface.b=3&b=classical&b-velocity=levant&counts=256"
+    chosen = """live.running().map(({ simulation: { s, surface, velocity } }) =>
+        [s.counts, surface?.name ?? null, surface?.gains.b ?? null, velocity.name])"""
+    linked = [[256, "terminal", 3.0, "filtered_difference"], [256, None, None, "levant"]]
+    seen.open(link)
+    assert page.evaluate(chosen) == linked
+    page.select_option("#surface-a", "linear")
+    page.select_option("#counts", "0")
+    page.select_option("#velocity-b", "measured")
+    assert page.evaluate(chosen) == [[0, "linear", None, "measured"], [0, None, None, "measured"]]
+    page.select_option("#surface-a", "terminal")
+    slope = page.locator("#law-a [data-exact=b]")
+    slope.fill("3")
+    slope.press("Enter")
+    page.select_option("#velocity-b", "levant")
+    page.select_option("#counts", "256")
+    setting = page.evaluate("location.hash").removeprefix("#")
+    seen.open("plant=duffing")
+    seen.open(setting)
+    assert page.evaluate(chosen) == linked
+    assert page.inner_text("#name-a") == "Boundary layer · terminal"
+    assert seen.said == []
+
+
 def test_a_link_with_nonsense_opens_the_page(seen):
     seen.open("plant=nothing&a=classical&a.k=much&delay=1e9&b=<script>")
     assert seen.page.input_value("#plant") == PLANTS[0]
