@@ -46,6 +46,10 @@ class Canvas:
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
         quality.numstacks = FEW if ball < SMALL else facets(ball, np.pi, quality.numstacks)  # of cylinders, too
+        if arms:  # joints hide the round ends of links
+            ball = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE, 0].max(initial=0.0)
+            ball /= middle * camera.pixel(size)
+            quality.numstacks = min(max(facets(ball, np.pi, quality.numstacks), LEAST), quality.numstacks)
         quality.numslices = max(facets(widest, 2 * np.pi, quality.numslices), RING * arms)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
