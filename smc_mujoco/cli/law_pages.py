@@ -12,7 +12,7 @@ from rich.table import Column
 from rich.text import Text
 
 from smc_mujoco.cli.tables import plain, titled, with_package
-from smc_mujoco.common.errors import find
+from smc_mujoco.common.errors import unknown
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -60,10 +60,14 @@ def print_pages(name: str | None, console: Console) -> None:
     """Print a page about one law, surface or estimator; without a name a line about each.
 
     Raises:
-      ScenarioError: nothing has that name.
+      ScenarioError: nothing has that name, or what has it cannot be loaded from its package.
     """
     if name is not None:
-        for template, package in find("law, surface or velocity estimator", name, catalogue()):
+        known = [templates() for templates in CATALOGUES.values()]
+        found = [(templates[name], templates.package(name)) for templates in known if name in templates]
+        if not found:
+            raise unknown("law, surface or velocity estimator", name, catalogue())
+        for template, package in found:
             print_page(template, console, package)
         return
     for heading, templates in CATALOGUES.items():

@@ -139,7 +139,7 @@ def scenes() -> Catalogue[Path]:
 def _of_package(point: EntryPoint) -> Path:
     """Return the scene file that an entry point of another package names. The file is read, and not run."""
     path = Path(str(source(point).origin))
-    ast.parse(path.read_text(encoding="utf-8"))
+    ast.parse(path.read_text(encoding="utf-8"), str(path))
     return path
 
 

@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import main
 from smc_mujoco.common import catalogue
 from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
@@ -112,6 +113,23 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
     assert "lazy_laws" not in sys.modules
     smc.law("lazy_law")
     assert "lazy_laws" in sys.modules
+
+
+def test_a_command_that_needs_no_package_imports_none(tmp_path):
+    """In a process of its own, where nothing is imported yet."""
+    about = tmp_path / "unasked-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: unasked\nVersion: 1.0\n")
+    points = "".join(f"[smc_mujoco.{kind}]\nunasked = unasked:x\n" for kind in ("laws", "plants", "scenes", "papers"))
+    (about / "entry_points.txt").write_text(points)
+    (tmp_path / "unasked.py").write_text("raise SystemExit('imported')")
+    code = "from smc_mujoco.cli.main import main; main(['run', 'inverted_pendulum', '--no-video', '--out', 'out'])"
+    paths = os.pathsep.join(map(str, (tmp_path, ROOT)))
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
@@ -275,6 +293,16 @@ def test_a_broken_entry_is_one_sentence_where_it_is_asked_for(broken, name):
     assert sentence.startswith(f"package 'bad': its law {name!r} ({BROKEN[name][0]})")
     assert BROKEN[name][1] in sentence
     assert "\n" not in sentence
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.PackageWarning")
+def test_the_page_of_a_broken_law_says_what_is_wrong_with_it(broken, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["laws", "raises"])
+    assert "its law 'raises' (bad_raises:raises) cannot be loaded (ZeroDivisionError" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        main(["laws", "riases"])
+    assert "unknown law, surface or velocity estimator 'riases'" in capsys.readouterr().err
 
 
 def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):

@@ -1,5 +1,6 @@
-"""An importer of FMUs as small as can be, and what an FMU of FMI 2.0 is made of."""
+"""An importer of FMUs as small as can be, and what FMUs of other tools are made of."""
 
+import re
 import subprocess
 import zipfile
 from pathlib import Path
@@ -53,12 +54,26 @@ class Importer:
 
 def fmi2(folder: Path, about: str = (HERE / "fmi2.xml").read_text()) -> Path:
     """An FMU of FMI 2.0, from fmi2.c; `about` is its description."""
-    system, headers = fmpy.platform, Path(fmpy.__file__).parent / "c-code"
-    library, path = folder / "controller.so", folder / "controller.fmu"
+    return archived(folder, [HERE / "fmi2.c"], "controller", fmpy.platform, about)
+
+
+def fmi3(folder: Path) -> Path:
+    """An FMU of FMI 3.0, from fmi3.c, which has inputs that are not real numbers, and steps every 5 ms."""
+    header = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text(encoding="utf-8")
+    own = (HERE / "fmi3.c").read_text(encoding="utf-8")
+    missing = {*re.findall(r"\bfmi3\w+(?=TYPE\b)", header)} - {*re.findall(r"fmi3\w+", own)}
+    (folder / "missing.c").write_text("".join(f"int {name}(void) {{ return 3; }}\n" for name in sorted(missing)))
+    about = (HERE / "fmi3.xml").read_text()
+    return archived(folder, [HERE / "fmi3.c", folder / "missing.c"], "servo", fmpy.platform_tuple, about)
+
+
+def archived(folder: Path, sources: list[Path], name: str, system: str, about: str) -> Path:
+    """C files as an FMU with a binary for this machine."""
+    headers, library = Path(fmpy.__file__).parent / "c-code", folder / f"{name}.so"
     if not library.exists():
-        command = [*build.compiler(), *build.FLAGS, f"-I{headers}", str(HERE / "fmi2.c"), "-o", str(library), "-lm"]
+        command = [*build.compiler(), *build.FLAGS, f"-I{headers}", *map(str, sources), "-o", str(library), "-lm"]
         subprocess.run(command, check=True)
-    with zipfile.ZipFile(path, "w") as archive:
+    with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", about)
-        archive.write(library, f"binaries/{system}/controller.so")
-    return path
+        archive.write(library, f"binaries/{system}/{name}.so")
+    return folder / f"{name}.fmu"

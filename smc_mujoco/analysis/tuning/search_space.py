@@ -81,7 +81,10 @@ def unit(law: Component, name: str) -> Unit | None:
     """
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
-        cure = f'write gains={{"{name}": Gain({written(gain.default)}, RATE)}} in its decorator, with its own unit'
+        cure = (
+            f'write gains={{"{name}": Gain({written(gain.default)}, RATE)}} in its decorator, with its own unit of '
+            "smc_mujoco.control.units, or Unit() for a number without one"
+        )
         raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {cure}")
     return gain.unit  # pyright: ignore[reportReturnType]
 

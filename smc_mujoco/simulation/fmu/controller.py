@@ -40,6 +40,7 @@ INPUTS: dict[str, tuple[Unit | None, str]] = {
     "fq": (None, "nominal fq of q'' = fq + gq u"),
     "gq": (None, "nominal gq of q'' = fq + gq u"),
 }
+STARTS = {"g": 1.0, "gq": 1.0}  # values of inputs before they are set: laws divide by these; 0 for all others
 ALWAYS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
@@ -111,7 +112,11 @@ class Controller:
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
     """Return the variables in the order of their value references. `code` is `controller.code()`."""
     wanted = {*ALWAYS, *_needed(controller, code, reads(code.values()))}
-    inputs = [Variable(name, "SMC_INPUT", words, unit) for name, (unit, words) in INPUTS.items() if name in wanted]
+    inputs = [
+        Variable(name, "SMC_INPUT", words, unit, STARTS.get(name, 0.0))
+        for name, (unit, words) in INPUTS.items()
+        if name in wanted
+    ]
     computed = [
         Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE),
         Variable("s", "SMC_COMPUTED", "sliding variable"),

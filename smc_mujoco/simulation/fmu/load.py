@@ -34,7 +34,7 @@ from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
 from smc_mujoco.simulation.fmu import slave
 from smc_mujoco.simulation.fmu.controller import OUTPUTS, UNBOUNDED
-from smc_mujoco.simulation.fmu.slave import REAL, Fault, Slave
+from smc_mujoco.simulation.fmu.slave import HELD, REAL, Fault, Slave
 
 # Our name -> names of an FMU's variables with that meaning; case is ignored.
 NAMES = {
@@ -359,9 +359,12 @@ def _meanings(
         listed = ", ".join(outs) or "none"
         raise ScenarioError(f"{file} has no output that is named as a command ({listed}): give variables={{'u': ...}}")
     outputs.setdefault("u", outs[0])
-    for theirs in (*inputs.values(), *constants, *outputs.values()):
+    for theirs in (*inputs.values(), *outputs.values()):
         if known[theirs].type not in REAL or known[theirs].dimensions:
             raise ScenarioError(f"{theirs!r} of {file} is not one real number: a law measures and returns real numbers")
+    for theirs in constants:
+        if known[theirs].type not in HELD or known[theirs].dimensions:
+            raise ScenarioError(f"{theirs!r} of {file} is not one number: export it without this input")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
+WHOLE = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
+HELD = (*REAL, *WHOLE, "Boolean")  # types of inputs that may keep one value
 STEPS, PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
 MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
@@ -89,9 +91,10 @@ class Slave:
     def _set(self, groups: Sequence[Group], values: Sequence[float]) -> None:
         """Set variables to the values at their places."""
         for kind, names, references, places in groups:
-            own = [values[place] for place in places]
+            own = [_of_type(kind, values[place]) for place in places]
+            setter = ("setInteger" if self.two else "setInt64") if kind == "Enumeration" else f"set{kind}"
             try:
-                getattr(self.fmu, f"set{kind}")(references, own)
+                getattr(self.fmu, setter)(references, own)
             except Exception as error:
                 what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, own, strict=True))
                 raise self._fault(f"setting {what}", error) from error
@@ -121,6 +124,11 @@ class Slave:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
         text = words[-1]
         self.said.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+
+
+def _of_type(kind: str, value: float) -> float:
+    """Return a value as a variable of a type has it: a whole number, a truth value, or as it is."""
+    return round(value) if kind in WHOLE else value != 0.0 if kind == "Boolean" else value
 
 
 def attempt(order: dict[str, Any], progress: Any) -> None:

@@ -174,6 +174,20 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
     np.testing.assert_allclose(trace.u[:, 0], u, rtol=1e-13, atol=1e-13)
 
 
+def test_inputs_that_are_not_real_may_be_held(folder):
+    """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
+    path = helper.fmi3(folder)
+    with pytest.raises(smc.ScenarioError, match=r"^input 'enable' of servo\.fmu means nothing .* constants="):
+        smc.law_from_fmu(path)
+    laws = [smc.law_from_fmu(path, constants={"enable": on, "mode": 2}) for on in (1, 0)]
+    trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
+    seen = slice(None, None, 5)
+    total = 0.005 * np.cumsum(trace.x[seen, 0])
+    u = -20.0 * trace.x[seen, 0] - 4.0 * trace.v[seen, 0] - total
+    np.testing.assert_allclose(trace.u[:, 0], np.repeat(u, 5)[: len(trace.u)], rtol=1e-13, atol=1e-13)
+    assert (off.u == 0.0).all()
+
+
 def test_periods_that_do_not_fit_are_said(foreign):
     law = smc.law_from_fmu(foreign, **RENAMED, isolate=False)()
     trace = smc.run(scenario(law, control_period=3e-3, physics_step=1e-3))
@@ -248,8 +262,8 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
         (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
          "changed.fmu has no output that is named as a command (none): give variables={'u': ...}"),
         (('name="mode" valueReference="3" causality="input"><Real start="0"/>',
-          'name="mode" valueReference="3" causality="input"><Boolean start="false"/>'),
-         "'mode' of changed.fmu is not one real number"),
+          'name="mode" valueReference="3" causality="input"><String start=""/>'),
+         "'mode' of changed.fmu is not one number: export it without this input"),
     ],
 )  # fmt: skip
 def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, said):
