@@ -359,12 +359,12 @@ def _meanings(
         listed = ", ".join(outs) or "none"
         raise ScenarioError(f"{file} has no output that is named as a command ({listed}): give variables={{'u': ...}}")
     outputs.setdefault("u", outs[0])
-    for theirs in (*inputs.values(), *outputs.values()):
-        if known[theirs].type not in REAL or known[theirs].dimensions:
-            raise ScenarioError(f"{theirs!r} of {file} is not one real number: a law measures and returns real numbers")
-    for theirs in constants:
-        if known[theirs].type not in HELD or known[theirs].dimensions:
-            raise ScenarioError(f"{theirs!r} of {file} is not one number: export it without this input")
+    real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL)
+    for theirs, types in {**dict.fromkeys(constants, HELD), **real}.items():
+        if known[theirs].type not in types or known[theirs].dimensions:
+            need = "real number: a law measures and returns real numbers"
+            need = need if types is REAL else "number: export it without this input"
+            raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
 
