@@ -18,7 +18,7 @@ def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path
     assert sum(how != "refused" for how, _ in ended) > cases / 20
 
 
-@pytest.mark.parametrize(("part", "cases"), [("calls", 150), ("files", 20)])
+@pytest.mark.parametrize(("part", "cases"), [("calls", 300), ("files", 40)])
 def test_wild_calls_and_files_end_well_or_in_a_sentence(part, cases):
     ended = list(attack.slice_of(part, 0, 0, cases))
     assert [why for _, _, why in ended if why] == []
