@@ -43,7 +43,7 @@ def has_bars(trace: Trace) -> bool:
 
 def key(traces: Sequence[Trace]) -> list[str]:
     """Return what the film of arms shows, in words."""
-    words = ["line: path of the tip, black where it is wanted"]
+    words = ["line: path of the tip, dark where it is wanted"]
     if all(map(has_bars, traces)):
         words.append(f"bars: torque of joints 1 to {traces[0].scenario.plant.n}, of its limits")
     if any(tip.knows_contacts(trace.scenario) for trace in traces):
