@@ -217,7 +217,10 @@ class ArrayFunction(Function):
     def store(self, target: ast.expr, value: Value) -> Iterator[str]:
         """Assign an array, or a number to all elements of an array."""
         if isinstance(target, ast.Name):
-            self.destination(target, value.kind)
+            before, kind = self.kinds.get(target.id, ""), value.kind
+            if shape(before) and self.fits(before, kind):  # 3 or SMC_JOINTS, where there are three joints
+                kind = base(kind) + before[len(base(before)) :]
+            self.destination(target, kind)
             place = self.value(target)
         else:
             place = self.changeable(target)
