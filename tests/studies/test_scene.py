@@ -105,7 +105,7 @@ def test_a_scene_runs_from_its_declaration_to_its_files(path, tmp_path, monkeypa
     saved, drawn = show.save(traces, tmp_path), show.figures(scene, traces, tmp_path)
     assert len(saved) == sum(map(len, traces.values()))
     assert [smc.load(file).scenario for file in saved] == [scenario for _, _, scenario in scene.runs()]
-    assert len(drawn) == 2 * (len(traces) if scene.figure == "overview" else 1)
+    assert len(drawn) == 2 * (len(traces) if scene.figure in ("overview", "joints") else 1)
     assert drawn == [path for paths in pages for path in paths]
     assert drawn[0].stat().st_size > 1000
     assert set(tmp_path.iterdir()) == {*saved, drawn[0]}
