@@ -98,7 +98,7 @@ def refused(make, *parts):
 
 
 def test_every_kind_of_the_library_is_tested_here():
-    kinds = {kind for kind in serialise._kinds(Signal).values() if kind.__module__.startswith("smc_mujoco.")}
+    kinds = {kind for kind in serialise._kinds(Signal).values() if kind.__module__.startswith("smc_mujoco.simulation.")}
     assert kinds - {Recorded, PerChannel} == {type(signal) for signal in [*EVERY, BLOW]}
 
 
