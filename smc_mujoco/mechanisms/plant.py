@@ -95,8 +95,13 @@ class Coupled(abc.ABC):
         """Return how the position of a site, the tip, depends on the channels, (3, n)."""
 
     @abc.abstractmethod
-    def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
-        """Return the C function of `dynamics` for one simulation. Its values serve the two functions below, too."""
+    def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
+        """Return the C function of `dynamics` for one simulation. Its values serve the two functions below, too.
+
+        Args:
+          tip: the site of `jacobian`; "" for a plant without.
+          at_rest: whether to compute g; False: it is NaN.
+        """
 
     @abc.abstractmethod
     def native_coriolis(self) -> int:

@@ -18,9 +18,10 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, at
+from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plant import Coupled
+from smc_mujoco.mechanisms.plant import Coupled, Native
 from smc_mujoco.simulation import model, native, state
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Recorded, Signal
@@ -167,9 +168,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
 
     coupled, joint = s.plant.nominal if isinstance(s.plant.nominal, Coupled) else None, s.law.joint
     modelled = s.model == "nominal"
-    own = None
-    if coupled is not None and (modelled or not joint):
-        own = coupled.native_dynamics(s.plant.parameters, s.plant.tip) if joint else coupled.native(s.plant.parameters)
+    own = None if coupled is None else _own(s, coupled)
     functions = {
         "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
     }
@@ -277,6 +276,15 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         "u": at + 16 + 24 * n,
     }
     return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, **tables, nominal=own)
+
+
+def _own(s: Resolved, nominal: Coupled) -> Native | None:
+    """Return MuJoCo's own nominal model for one simulation; None for a law of many joints that may not use it."""
+    if not s.law.joint:
+        return nominal.native(s.plant.parameters)
+    if s.model == "none":
+        return None
+    return nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest="g" in read_by(s.law.function))
 
 
 def pushed(disturbance: Signal, mechanism: mujoco.MjModel) -> dict[str, Any]:

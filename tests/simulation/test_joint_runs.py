@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from helpers import arms
 from helpers.runs import assert_same, plainly
+from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.control.joint_law import coriolis, jacobian, norm, product, saturate, torque
@@ -34,6 +35,17 @@ def curious(y, gains, memory):
     return u + 1e-3 * (norm(y.x) * y.g + y.v + y.r - y.dr + memory[:, 2] + memory[0, 1]), s
 
 
+@njit
+def weight(y):
+    return y.g
+
+
+@smc.law_function(joint=True, requires_model=True)
+def held(y, gains, memory):
+    """A law that reads g in a function that it calls; without such a law g is not computed."""
+    return weight(y) - 5.0 * y.e - y.de, y.de
+
+
 def cases(arm):
     """Scenarios that differ in all that the law's road touches, most in one Batch."""
     common = {"duration": 0.05, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2)}
@@ -50,6 +62,7 @@ def cases(arm):
     )
     yield smc.Scenario(plant=arm, law=curious, disturbance=pushes, **common)
     yield smc.Scenario(plant=arm, law=curious, model="none", **common)
+    yield smc.Scenario(plant=arm, law=held, **common)
     yield smc.Scenario(plant="pendulum_network", law=curious, control_period=2e-3, **common)
     swinging = smc.plant("inverted_pendulum_network", n=3)
     yield smc.Scenario(plant=swinging, law=curious, **common)

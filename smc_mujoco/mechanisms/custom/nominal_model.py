@@ -26,6 +26,7 @@ in another kinematic tree, is taken to be the model's initial one.
 import ctypes
 import dataclasses
 import functools
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
@@ -41,7 +42,7 @@ from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-VALUES = 15  # of `native_dynamics`: n, nv, addresses, whether h is of passive forces alone, the tip's site
+VALUES = 16  # of `native_dynamics`: n, nv, addresses, whether h is of passive forces alone, the tip's site, at_rest
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()
 
@@ -146,7 +147,7 @@ class NominalModel(Coupled):
             mujoco.mj_jacSite(model, data, found, None, model.site(tip).id)
         return found[:, places.qvel]
 
-    def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
+    def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
@@ -156,7 +157,8 @@ class NominalModel(Coupled):
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
         arrays = data.qpos, data.qvel, *forces, table, dense, state, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
-        values = (len(places.qpos), model.nv, *addresses, passive_alone(model), model.site(tip).id if tip else -1)
+        site = model.site(tip).id if tip else -1
+        values = (len(places.qpos), model.nv, *addresses, passive_alone(model), site, at_rest)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
     def native_coriolis(self) -> int:
@@ -187,6 +189,8 @@ def prepared(
     model = ready(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
+    if passive_alone(model) and not model.opt.density and not model.opt.viscosity:
+        model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_BODY  # nothing here reads where geoms are
     write(model, iter(list(nominal.fields(model, Values(**parameters)))))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
@@ -261,7 +265,7 @@ def _stages() -> tuple[Callable, Callable]:
 def native_dynamics() -> Function:
     """Return the C function of M, h and g.
 
-    Its inputs are x and v, (n,) each; its outputs M (n, n), h and g, (n,) each.
+    Its inputs are x and v, (n,) each; its outputs M (n, n), h and g, (n,) each. Without `at_rest` g is NaN.
     """
     positions, velocities = _stages()
     full = _called("mj_fullM", 1)
@@ -283,7 +287,10 @@ def native_dynamics() -> Function:
         for i in range(n):
             for j in range(n):
                 output[n * i + j] = dense[table[n + i], table[n + j]]
-        for part in range(2):  # g, then h, so that the velocities are those of the sample afterwards
+        for j in range(n):
+            output[n * n + n + j] = math.nan
+        first = 0 if own[15] != 0.0 else 1
+        for part in range(first, 2):  # g, then h, so that the velocities are those of the sample afterwards
             for j in range(n):
                 qvel[table[n + j]] = part * given[n + j]
             velocities(model, data, biases, alone)
