@@ -187,7 +187,7 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
         "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
         "state": f"{slots * BYTES[numbers]} bytes a {each}, memory[{slots * max(joints, 1)}]; no static data but "
         "constants, no malloc",
-        **({"reads": ", ".join(dict.fromkeys(re.findall(r"y->(?!plant)(\w+)", code)))} if joints else {}),
+        **({"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))} if joints else {}),
         **({"code": size} if size else {}),
         "licence": "use without restriction, without warranty",
         "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",

@@ -8,10 +8,12 @@ the function changes must not share its numbers with another name; such code is 
 """
 
 import ast
+import functools
 import inspect
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -54,6 +56,7 @@ HELPERS |= {  # numpy's, as numba compiles them: NaN stays NaN
     "lesser": "a <= b || a != a ? a : b",
     "greater": "a >= b || a != a ? a : b",
     "sign": "a > 0 ? 1 : a < 0 ? -1 : a",
+    "wrapped": "a < 0 ? a + b : a",  # an index from the end, as in Python
 }
 # Functions of numpy with elements -> the same in C.
 OF_MATH = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
@@ -62,6 +65,7 @@ ELEMENTWISE = {getattr(np, name): name for name in OF_MATH} | {getattr(np, n): c
 ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
 HELPED = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
 FILLED = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
+NEW = {*FILLED, np.full, np.array, np.where}  # functions that return a new array
 SHARED = "which shares its numbers with another name: write .copy() behind it"
 
 
@@ -94,12 +98,14 @@ class ArrayFunction(Function):
       before: lines that belong before the present one, such as loops that fill arrays.
       temporaries: name -> kind of arrays for results within expressions.
       fixed: whether nothing may move before the present line.
+      counters: variables of the present loops that are never negative.
     """
 
     program: JointProgram
 
     def __init__(self, *arguments: Any, **named: Any):
         self.frames: list[tuple[list[str], list[Value]]] = []
+        self.counters = set[str]()
         self.fixed = False
         super().__init__(*arguments, **named)
         self.check_sharing()
@@ -192,7 +198,9 @@ class ArrayFunction(Function):
             yield from self.block(node.body)
             yield "}"
         else:
+            self.counters |= {variable} if self.counts_naturals(node.iter) else set()
             yield from super().loop(node, variable)
+            self.counters.discard(variable)
 
     def returned(self, value: ast.expr) -> Iterator[str]:
         """Translate return."""
@@ -217,6 +225,8 @@ class ArrayFunction(Function):
     def store(self, target: ast.expr, value: Value) -> Iterator[str]:
         """Assign an array, or a number to all elements of an array."""
         if isinstance(target, ast.Name):
+            if target.id in self.parameters:
+                raise refuse(target, "an assignment to an argument that is an array")
             before, kind = self.kinds.get(target.id, ""), value.kind
             if shape(before) and self.fits(before, kind):  # 3 or SMC_JOINTS, where there are three joints
                 kind = base(kind) + before[len(base(before)) :]
@@ -224,6 +234,8 @@ class ArrayFunction(Function):
             place = self.value(target)
         else:
             place = self.changeable(target)
+            if base(wider(base(place.kind), base(value.kind))) != base(place.kind):
+                raise refuse(target, "real numbers for elements of an array of whole numbers")
         if shape(value.kind) and not self.fits(value.kind, place.kind):
             raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
         own = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
@@ -263,8 +275,8 @@ class ArrayFunction(Function):
         """Return a target in C, to which a value of a kind is assigned."""
         if isinstance(target, ast.Subscript):
             place = self.changeable(target)
-            if shape(place.kind) or place.kind != "real":
-                raise refuse(target, "an assignment to this")
+            if wider(place.kind, kind) != place.kind:
+                raise refuse(target, "a real number for an element of an array of whole numbers")
             return place.text
         return super().destination(target, kind)
 
@@ -422,7 +434,8 @@ class ArrayFunction(Function):
     def constants_of(self, node: ast.expr, values: np.ndarray) -> Value:
         """Return an array of constants."""
         made = self.program.array(ast.unparse(node).replace(".", "_"), values)
-        return array_at(made.text, f"{made.kind}[{len(values)}]")
+        found = array_at(made.text, f"{made.kind}[{len(values)}]")
+        return found if made.kind == "real" else found._replace(home="")  # of 16 bits, so that functions get a copy
 
     def _subscript(self, node: ast.Subscript) -> Value:
         array = self.resolve(node.value)
@@ -449,6 +462,8 @@ class ArrayFunction(Function):
                 continue
             index = self.outside(self.numeric, place)
             self.check_index(node, place, index, dimension)
+            if not self.natural(place):
+                index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
             text = text.replace(token, index.within(PRODUCT))
             row = pointer and token == ROW and len(places) == 2
             pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(home.kind)[1]}" if row else ""
@@ -465,6 +480,27 @@ class ArrayFunction(Function):
             self.program.slots = max(self.program.slots, int(constant) + 1)
         elif constant is not None and not 0 <= constant < self.program.size(dimension):
             raise refuse(node, f"an index out of 0 to {self.program.size(dimension) - 1}")
+
+    def counts_naturals(self, node: ast.expr) -> bool:
+        """Return whether no number of a range with a step of 1 or -1 is negative."""
+        match node:
+            case ast.Call(args=[_]):
+                return True
+            case ast.Call(args=[first, _]):
+                return self.natural(first)
+            case ast.Call(args=[first, last, step]):
+                end = self.constant(last)
+                return self.natural(first) if self.constant(step) == 1 else end is not None and end >= -1
+        return False
+
+    def natural(self, node: ast.expr) -> bool:
+        """Return whether an index is certainly not negative."""
+        match node:
+            case ast.Name(id=name) if name in self.counters:
+                return True
+            case ast.BinOp(left=left, op=ast.Add() | ast.Mult() | ast.Mod(), right=right):
+                return self.natural(left) and self.natural(right)
+        return (constant := self.constant(node)) is not None and constant >= 0
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         return self.elementwise(super()._unaryop, node)
@@ -545,7 +581,8 @@ class ArrayFunction(Function):
         items = [self.numeric(item) for item in node.args[0].elts]
         if any(shape(item.kind) for item in items):
             raise refuse(node, "an array of arrays")
-        found = self.temporary(f"real[{len(items)}]")
+        kind = functools.reduce(wider, (item.kind for item in items))
+        found = self.temporary(f"{kind}[{len(items)}]")
         for i, item in enumerate(items):
             self.move(f"{found.home}[{i}] = {item.text};", node)
         return found
@@ -556,10 +593,11 @@ class ArrayFunction(Function):
             raise refuse(node, "a call with another number of arguments")
         if function is len:
             return Value(self.dimensions(node)[0], "int")
-        kind = "real" + "".join(f"[{n}]" for n in self.dimensions(node.args[0]))
+        dimensions = "".join(f"[{n}]" for n in self.dimensions(node.args[0]))
         if function is np.full:
-            return self.numeric(node.args[1])._replace(kind=kind)
-        return literal(FILLED[function], self.program.single, node)._replace(kind=kind)
+            value = self.numeric(node.args[1])
+            return value._replace(kind=value.kind + dimensions)
+        return literal(FILLED[function], self.program.single, node)._replace(kind=f"real{dimensions}")
 
     def dimensions(self, node: ast.expr) -> list[str]:
         """Return the dimensions that an expression gives: a number, len(array), a variable of these, a tuple of them.
@@ -576,8 +614,8 @@ class ArrayFunction(Function):
                 if dimensions := shape(self.value(array).kind):
                     return [dimensions[0]]
             case ast.Name(id=name):
-                given = [one for one in ast.walk(self.tree) if isinstance(one, ast.Assign) and name in assigned(one)]
-                if len(given) == 1 and isinstance(given[0].targets[0], ast.Name):
+                given = [one for one in ast.walk(self.tree) if name in assigned(one)]
+                if len(given) == 1 and isinstance(given[0], ast.Assign) and isinstance(given[0].targets[0], ast.Name):
                     return self.dimensions(given[0].value)
                 if isinstance(size := self.globals.get(name), int) and not given and name not in self.kinds:
                     return [str(size)]
@@ -614,25 +652,50 @@ class ArrayFunction(Function):
                 found = {ast.unparse(node)}
             case ast.IfExp():
                 parts = [node.body, node.orelse]
-            case ast.Call() if not isinstance(node.func, ast.Attribute) and returns_argument(self.resolve(node.func)):
-                parts = node.args
+            case ast.Call():
+                parts = [node.args[i] for i in shared_arguments(self.resolve(node.func))]
+                found = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
         return found.union(*map(self.shared, parts))
 
 
-def returns_argument(function: Any) -> bool:
-    """Return whether a function may return one of its arguments, or a part of one."""
-    if not inspect.isfunction(getattr(function, "py_func", function)):
-        return False
-    _, tree = parsed(function)
-    names = {a.arg for a in tree.args.args}
-    values = [n.value for n in ast.walk(tree) if isinstance(n, ast.Return) and n.value is not None]
-    each = [one for v in values for one in (v.elts if isinstance(v, ast.Tuple) else [v])]
-    return any(isinstance(v, ast.Name | ast.Subscript) and root(v) in names for v in each)
+def shared_arguments(function: Any) -> set[int]:
+    """Return the places of the arguments that a function may return, in whole or in part."""
+    if not isinstance(getattr(function, "py_func", function), FunctionType) or function in NEW:
+        return set()
+    written, tree = parsed(function)
+    names = [a.arg for a in tree.args.args]
+    origins = {name: {i} for i, name in enumerate(names)}  # variable -> arguments of which it may be a part
+
+    def shared(value: ast.expr) -> set[int]:
+        parts = list[ast.expr]()
+        match value:
+            case ast.Name(id=name):
+                return origins.get(name, set())
+            case ast.Subscript() | ast.Attribute():
+                parts = [value.value]
+            case ast.IfExp():
+                parts = [value.body, value.orelse]
+            case ast.Tuple():
+                parts = value.elts
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                parts = [arguments[i] for i in shared_arguments(written.__globals__.get(name))]
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=home), attr=name), args=arguments):
+                parts = [arguments[i] for i in shared_arguments(getattr(written.__globals__.get(home), name, None))]
+        return set().union(*map(shared, parts))
+
+    inside, before = list(ast.walk(tree)), {}
+    while before != origins:
+        before = dict(origins)
+        for one in inside:
+            if isinstance(one, ast.Assign):
+                origins |= {name: origins.get(name, set()) | shared(one.value) for name in assigned(one)}
+    return set().union(*(shared(n.value) for n in inside if isinstance(n, ast.Return) and n.value is not None))
 
 
-def assigned(node: ast.Assign) -> set[str]:
-    """Return the names that an assignment sets."""
-    return names_in(node.targets)
+def assigned(node: ast.AST) -> set[str]:
+    """Return the names in the targets of an assignment or of a loop; none of other code."""
+    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    return names_in(t for t in targets if t is not None and not isinstance(t, ast.Subscript))
 
 
 def root(node: ast.expr) -> str:

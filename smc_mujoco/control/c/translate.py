@@ -117,7 +117,9 @@ def text_of(program: "Program") -> tuple[int, str]:
     for name, text in reversed(program.functions.items()):
         if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
-    arrays = [text for name, text in program.arrays.items() if any(f"{name}[" in other for other in functions)]
+    arrays = [
+        text for name, text in program.arrays.items() if any(re.search(rf"\b{name}\b", other) for other in functions)
+    ]
     return program.slots, "\n\n".join([*arrays, *functions])
 
 

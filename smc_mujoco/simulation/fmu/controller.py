@@ -151,7 +151,7 @@ def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: s
 
 def reads(code: Iterable[tuple[int, str]]) -> set[str]:
     """Return the fields of the measurement that some functions read."""
-    return {name for _, text in code for name in re.findall(r"\by->(\w+)", text)}
+    return {name for _, text in code for name in re.findall(r"->(\w+)", text)}  # a function may call it other than y
 
 
 def bounded(name: str, bound: float) -> Variable:

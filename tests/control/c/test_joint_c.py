@@ -31,6 +31,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-pro
 LAWS = catalogue()
 TYPE = "int smc_law(const smc_joint_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 EACH = np.array([1.0, 0.25, 3.0])
+ORDER = np.array([2, 0, 1])
 
 
 @njit
@@ -50,6 +51,14 @@ def inside(a, b):
     return a * b
 
 
+@njit
+def neighbours(a, order):
+    w, signs = np.zeros(len(a)), np.array([1, -1, 2])
+    for i in range(len(a)):  # the first reads the last element, as a[-1]
+        w[i] = a[order[i]] - signs[order[i] - 1] * a[i - 1]
+    return w
+
+
 @smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0, "all": Gain(0.5, shared=True)}, memory=3)
 def turns(y, gains, memory):
     """Every turn of Python with arrays that there is."""
@@ -57,6 +66,7 @@ def turns(y, gains, memory):
     s, twice = y.de + gains.c * y.e, np.zeros(n)
     s = s + 0.1 * product(y.M, s)
     s = s - s[0] * y.e  # reads an element that it changes
+    s = s + 0.01 * neighbours(s, ORDER)
     square = np.zeros((n, n))
     square[:, :] = y.M
     turned = y.e.copy()
@@ -320,6 +330,14 @@ REFUSED = {
     "u = s\n    if y.t > 1.0: u = 0.0": "a name for a number and an array",
     "s, u = y.x, s": "arrays that change places at once",
     "u = math.tanh(s)": "tanh of an array",
+    "u = part(s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = part(y.x)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = joint_law.torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = position(y)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = moved(s)": "an assignment to an argument that is an array",
+    "u = np.array([1, 0, 0])\n    u[0] = s[0]": "a real number for an element of an array of whole numbers",
+    "u = np.full(3, 0)\n    u[:] = s": "real numbers for elements of an array of whole numbers",
+    "n = len(s)\n    n += 1\n    u = s * norm(np.zeros(n))": "a length that is not known before the law runs",
 }
 
 
@@ -327,7 +345,11 @@ REFUSED = {
 def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
     (tmp_path / "strange_joint.py").write_text(
         "import math\nimport numpy as np\nimport smc_mujoco as smc\n"
+        "from smc_mujoco.control import joint_law\n"
         "from smc_mujoco.control.joint_law import norm, torque\n"
+        "def part(a):\n    b = a if a[0] > 0.0 else -a\n    return b\n"
+        "def position(y):\n    return y.x\n"
+        "def moved(a):\n    a = a + 1.0\n    return a\n"
         "@smc.law_function(joint=True)\n"
         f"def strange_joint(y, gains, memory):\n    s = y.de + y.e\n    {line}\n    return u, s\n"
     )

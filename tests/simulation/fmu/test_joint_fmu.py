@@ -13,11 +13,12 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers import arms  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
+from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control.c import build  # noqa: E402
-from smc_mujoco.control.joint_law import catalogue  # noqa: E402
+from smc_mujoco.control.joint_law import catalogue, product  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 
 pytestmark = pytest.mark.skipif(
@@ -116,6 +117,21 @@ def test_its_inputs_are_those_that_the_law_reads(made, name):
     inputs = {one.partition("[")[0] for one, v in known.items() if v.causality == "input"}
     assert inputs == set(read.split())
     assert [n for n, v in known.items() if v.causality == "output"] == [f"{n}[{i}]" for n in "us" for i in JOINTS]
+
+
+@njit
+def inertia(seen, v):
+    return product(seen.M, v)
+
+
+@smc.law_function(joint=True)
+def other_words(y, gains, memory):
+    return inertia(y, -y.e), y.e
+
+
+def test_what_a_function_reads_is_an_input_whatever_it_calls_the_measurement(folder):
+    path = smc.export_fmu(other_words, folder / "words.fmu", joints=2, model="nominal", binary=False)
+    assert "M[1,2]" in {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
 
 
 def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made, folder):
