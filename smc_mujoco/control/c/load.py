@@ -332,6 +332,8 @@ def _about(
             raise ScenarioError(f"gain {name} of {file} is {written(value)}: give it one number{each}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
+        if isinstance(value := default(gain), tuple):
+            raise ScenarioError(f"shared gain {name} of {file} is {written(value)}: give it one number")
         named[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)
     return About(
         named,

@@ -10,6 +10,8 @@
 
 #ifndef SMC_JOINTS
 #error "define SMC_JOINTS, the number of joints, before smc_joint_law.h"
+#elif SMC_JOINTS < 2
+#error "define SMC_JOINTS as a number from 2 on: a law of one channel has smc_law.h"
 #endif
 
 #ifndef SMC_REAL

@@ -263,6 +263,11 @@ MISTAKES = {
         own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2 3";'),
         "gain k of mine.c is (1, 2, 3): give it one number, or 2",
     ),
+    "one joint": (own("", joints="#define SMC_JOINTS 1"), "does not compile: define SMC_JOINTS as a number from 2"),
+    "shared": (
+        own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2", smc_law_shared[] = "k";'),
+        "shared gain k of mine.c is (1, 2): give it one number",
+    ),
 }  # fmt: skip
 
 
