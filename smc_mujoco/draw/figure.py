@@ -330,6 +330,7 @@ def signals(
             drawing.jumps(ax, style.jumps([trace], [law]), named=False)
             if room > points(250):
                 drawing.note(ax, _variation(trace, group))
+        drawing.scale_ticks(axes[0, 0].yaxis, control)  # which all share
         for law, ax in zip(laws, axes[:, 0], strict=True):
             ax.set_ylabel(control.label.replace("control ", ""))
             words = style.cropped(style.law_name(of_law[law]), 0.55 * room, points(11), bold=True)

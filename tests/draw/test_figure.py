@@ -473,3 +473,13 @@ def test_where_a_joint_is_is_drawn_as_it_is(pair):
         _, y = panels.curve(pair[0], x, name)
         assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
     assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9
+
+
+def test_small_commands_have_ticks_in_the_unit_of_their_label():
+    trace = smc.run(smc.Scenario(plant="duffing", law="observer_free", x0=(0.5,), duration=0.2, u_max=0.01))
+    page = draw_figure.signals([trace], None, None)
+    ax = page.axes[0]
+    page.canvas.draw()
+    assert ax.get_ylabel() == "u (mN)"
+    place, text = next((p, t.get_text()) for p, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if p > 0)
+    assert float(text) == pytest.approx(1e3 * place)
