@@ -7,8 +7,10 @@ import functools
 import hashlib
 import importlib
 import io
+import itertools
 import os
 import re
+import secrets
 import sys
 import warnings
 from collections import namedtuple
@@ -18,6 +20,7 @@ from typing import IO, Any
 
 from llvmlite import ir
 from numba import from_dtype, njit, types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc
 from numba.core.codegen import CPUCodeLibrary, RuntimeLinker
@@ -43,6 +46,20 @@ if hasattr(os, "register_at_fork"):  # a child would wait for ever for a lock th
         after_in_parent=global_compiler_lock.release,
         after_in_child=global_compiler_lock.release,
     )
+
+
+def number_functions_apart() -> None:
+    """Let numba number functions from a random number on, so that no other process gives the same ones.
+
+    The number is part of a function's symbol, also in code on disk. Numba counts from 1 in every process, so a process
+    that loads code of two others would run one function in place of another with the same name, types and number.
+    """
+    FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
+
+
+number_functions_apart()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=number_functions_apart)
 
 
 class NotCompilable(Exception):

@@ -1,19 +1,24 @@
 """Compiled components on disk: what was compiled once is loaded, what differs in anything that it reaches is not."""
 
 import ctypes
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import FunctionType
 
 import numba
 import numpy as np
 import pytest
+from helpers.runs import assert_same
 from numba import njit
+from numba.core.bytecode import FunctionIdentity
 from numba.extending import overload
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import native, reference
 
 
 @pytest.fixture(autouse=True)
@@ -108,6 +113,68 @@ def test_code_of_another_law_under_the_index_of_this_one_is_not_run(cache):
     index.write_bytes(first)
     assert hits(mine("gains.k")) == 0
     assert force(mine("gains.k")) == 3.0
+
+
+PAIR = """
+import sys
+
+import numba
+import smc_mujoco as smc
+
+gains = {"k": 3.0}
+
+
+@smc.law_function(joint=True, gains=gains)
+def weak(y, gains, memory):
+    return -gains.k * y.x, y.e
+
+
+@smc.law_function(joint=True, gains=gains)
+def strong(y, gains, memory):
+    return -2.0 * gains.k * y.x, y.e
+
+
+def scenario(law):
+    return smc.Scenario(plant="double_pendulum", law=law, duration=0.002)
+
+
+if __name__ == "__main__":
+    import pair
+
+    numba.config.CACHE_DIR = sys.argv[1]
+    smc.run(scenario(getattr(pair, sys.argv[2])))
+"""
+
+
+def test_code_of_two_processes_is_not_mixed_up(cache, tmp_path, monkeypatch):
+    """Numba numbers functions of one name, such as those around a law, and each of the processes counts from the start.
+
+    A process that loads both would run the code that it loads first in both laws.
+    """
+    (tmp_path / "pair.py").write_text(PAIR)
+    monkeypatch.syspath_prepend(tmp_path)
+    import pair  # pyright: ignore[reportMissingImports]
+
+    laws = pair.weak, pair.strong
+    for law in laws:
+        subprocess.run([sys.executable, "pair.py", cache, law.name], check=True, cwd=tmp_path)
+    loaded = [native.component(law()) for law in laws]
+    assert [code._cfunc.cache_hits for code in loaded] == [1, 1]
+    for trace in smc.run([pair.scenario(law) for law in laws]):
+        assert_same(trace, reference.run(trace.scenario))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_forked_processes_number_functions_apart():
+    ours, theirs = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.write(theirs, b"%d" % next(FunctionIdentity._unique_ids))
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert abs(int(os.read(ours, 100)) - next(FunctionIdentity._unique_ids)) > 1_000_000
+    os.close(ours)
+    os.close(theirs)
 
 
 @pytest.mark.parametrize(
