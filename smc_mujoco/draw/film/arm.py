@@ -37,8 +37,9 @@ def is_arm(traces: Sequence[Trace]) -> bool:
 
 
 def has_bars(trace: Trace) -> bool:
-    """Return whether torque has a limit in every joint of an arm."""
-    return bool(trace.scenario.plant.tip) and all(limit < math.inf for limit in trace.scenario.limits)
+    """Return whether u is a torque with a limit in every joint of an arm."""
+    scenario = trace.scenario
+    return bool(scenario.plant.tip) and scenario.amplifier is None and max(scenario.limits) < math.inf
 
 
 def key(traces: Sequence[Trace]) -> list[str]:

@@ -78,6 +78,7 @@ def test_the_trail_of_an_arm_is_its_tips_path(trace):
 
 def test_bars_are_shares_of_each_joints_limit(trace):
     assert arm.has_bars(trace)
+    assert not arm.has_bars(struck(trace, actuator=smc.DCMotor(command="voltage", gear=50.0), u_max=None))  # volts
     bars = overlay(trace)
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
     assert bars.shares is not None
