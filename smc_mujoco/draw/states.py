@@ -7,7 +7,6 @@ forces are in the reaction too, it is the sign of the actuator's force, which do
 """
 
 import itertools
-import weakref
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -19,13 +18,13 @@ from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.kept import kept
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 HOLD = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
 CALM, STUCK, STRUCK = range(3)  # moods
-_TOUCHES: "weakref.WeakKeyDictionary[Trace, np.ndarray]" = weakref.WeakKeyDictionary()
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
@@ -116,14 +115,9 @@ def backlash_gap(scenario: Scenario) -> float:
     return next((part.gap for part in scenario.actuator if isinstance(part, Backlash)), 0.0)
 
 
+@kept
 def in_contact(trace: Trace) -> np.ndarray:
-    """Return where each channel touches an obstacle or another channel, (K + 1, n); kept as long as the trace."""
-    if trace not in _TOUCHES:
-        _TOUCHES[trace] = _in_contact(trace)
-    return _TOUCHES[trace]
-
-
-def _in_contact(trace: Trace) -> np.ndarray:
+    """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
     contact = np.zeros(trace.x.shape, bool)
     if trace.scenario.contact.kind == "none":
         return contact

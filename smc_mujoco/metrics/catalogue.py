@@ -8,7 +8,6 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 from __future__ import annotations
 
 import math
-import weakref
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +25,7 @@ from smc_mujoco.metrics.conventions import (
     refuse,
     scale,
 )
+from smc_mujoco.metrics.kept import kept
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
-# Limit cycles of traces that are being scored: two metrics ask for each.
-_CYCLES: weakref.WeakKeyDictionary[Trace, tuple[float, float]] = weakref.WeakKeyDictionary()
 
 
 def metrics() -> tuple[Metric, ...]:
@@ -246,12 +244,11 @@ def chattering_frequency(trace: Trace) -> float:
     return _cycle(trace)[1]
 
 
+@kept
 def _cycle(trace: Trace) -> tuple[float, float]:
     """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
-    if trace not in _CYCLES:
-        found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
-        _CYCLES[trace] = max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
-    return _CYCLES[trace]
+    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
+    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
 
 
 @metric("s", realistic=True)

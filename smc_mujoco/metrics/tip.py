@@ -10,10 +10,7 @@ friction does not matter: a sliding contact's spring carries 99 % of a change of
 from __future__ import annotations
 
 import dataclasses
-import functools
-import weakref
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,14 +20,13 @@ from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids, joint_name
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import cut, groups
+from smc_mujoco.metrics.kept import kept
 from smc_mujoco.simulation import model as assembly
 
 if TYPE_CHECKING:
     from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
-
-V = TypeVar("V")
 
 # Share of a run after which forces of contact are scored: chosen, so that the tip has touched and the force has risen.
 SETTLED = 0.2
@@ -48,19 +44,6 @@ class Contacts(NamedTuple):
     force: np.ndarray
     depth: np.ndarray
     push: np.ndarray
-
-
-def kept(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
-    """Return a function that remembers its result for each trace: tables, figures and films ask for the same."""
-    found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
-
-    @functools.wraps(function)
-    def ask(trace: Trace) -> V:
-        if trace not in found:
-            found[trace] = function(trace)
-        return found[trace]
-
-    return ask
 
 
 def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:

@@ -1,0 +1,27 @@
+"""Results kept for each trace, because tables, figures and films ask for the same."""
+
+from __future__ import annotations
+
+import functools
+import weakref
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+V = TypeVar("V")
+
+
+class kept(Generic[V]):
+    """Decorator of a function of a trace, which then computes its result once as long as the trace exists."""
+
+    def __init__(self, function: Callable[[Trace], V]):
+        functools.update_wrapper(self, function)  # hashes of code follow __wrapped__ and do not see what is kept
+        self._function = function
+        self._found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
+
+    def __call__(self, trace: Trace) -> V:
+        if trace not in self._found:
+            self._found[trace] = self._function(trace)
+        return self._found[trace]
