@@ -186,7 +186,7 @@ def test_what_ended_well_is_kept_before_an_error_is_told(monkeypatch):
     ("change", "said"),
     [
         (
-            ("smc_mujoco.studies.run_key.key", lambda scenario: "other"),
+            ("smc_mujoco.studies.run_key.key", lambda scenario, plants=None: "other"),
             "a worker has other code for .*: install the same",
         ),
         (("pickle.loads", lambda data: smc.nowhere), "a worker says .*: put your laws in a module"),
