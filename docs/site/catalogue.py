@@ -232,7 +232,7 @@ def _properties(template: Template) -> str:
         "gains to choose": ", ".join(f"`{gain}`" for gain in searched(template)) or "none",
         "measures": measured or "nothing",
         "nominal model": "needed" if template.requires_model else 'optional, with `model="nominal"`',
-        "plants": ", ".join(f"`{plant}`" for plant in template.plants) or "all whose joints all have an actuator",
+        "plants": ", ".join(f"`{plant}`" for plant in template.plants) or "all with an actuator at each joint",
         "found by": ", ".join(f"`--needs {need}`" for need, one in PROPERTIES.items() if one.holds(template))
         or "its name",
     }

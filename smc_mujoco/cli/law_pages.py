@@ -138,7 +138,7 @@ def print_page(template: Template, console: Console, package: str = "") -> None:
         "family": template.family,
         "promises": _promises(template),
         "reads": ", ".join(f for f in Measurement._fields if f in reads(template)) * is_law,
-        "plants": (", ".join(template.plants) or "all whose joints all have actuators") * is_law,
+        "plants": (", ".join(template.plants) or "all with an actuator at each joint") * is_law,
         "discretisation": parts.discretisation,
         "known": parts.known,
         "source": parts.source,

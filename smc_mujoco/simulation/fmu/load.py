@@ -344,8 +344,8 @@ def _meanings(
     inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUTS if n not in chosen])
     if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
         raise ScenarioError(
-            f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C, or "
-            f"say what it is, as in variables={{'x': {joints[0]!r}}}"
+            f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
+            f"an input that one channel does not need is held by constants={{{joints[0]!r}: 0.0}}"
         )
     for theirs in ins:
         if theirs not in {*inputs.values(), *constants}:
