@@ -2,16 +2,15 @@
 
 import contextlib
 import ctypes
-import importlib
 import math
 import re
 import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.sources import strange
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
@@ -283,16 +282,15 @@ REFUSED = {
 
 @pytest.mark.parametrize(("line", "words"), REFUSED.items())
 def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
-    (tmp_path / "strange.py").write_text(
+    text = (
         "import numpy as np\nimport smc_mujoco as smc\n"
         "def halts(a):\n    while a:\n        return a\n"
         "def again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
         f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
     )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "strange", raising=False)
+    law = strange(text, tmp_path, monkeypatch)
     with pytest.raises(smc.ScenarioError, match=f"law 'strange' cannot be written in C: .*({words})") as error:
-        smc.law_to_c(importlib.import_module("strange").strange)
+        smc.law_to_c(law)
     assert "\n" not in str(error.value)
 
 

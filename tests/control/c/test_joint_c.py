@@ -1,10 +1,8 @@
 """Laws of many joints in C: written out, they give the compiled law's bits; every mistake is one sentence."""
 
-import importlib
 import math
 import re
 import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 import pytest
 from helpers import arms
 from helpers.runs import assert_same
+from helpers.sources import strange
 from numba import njit
 
 import smc_mujoco as smc
@@ -138,7 +137,7 @@ WAYS = {
 
 
 def ways_of(law):
-    """The scenarios of a law: those without the model only if it can do without, those without a tip likewise."""
+    """The scenarios that suit a law: not all laws can do without the model, and one needs a tip."""
     for way, fields in WAYS.items():
         if (law.requires_model and "without" in way) or (law.name == "hybrid_sliding" and way != "arm"):
             continue
@@ -348,7 +347,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("line", "words"), REFUSED.items())
 def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
-    (tmp_path / "strange_joint.py").write_text(
+    text = (
         "import math\nimport numpy as np\nimport smc_mujoco as smc\n"
         "from smc_mujoco.control import joint_law\n"
         "from smc_mujoco.control.joint_law import norm, torque\n"
@@ -356,12 +355,10 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
         "def position(y):\n    return y.x\n"
         "def moved(a):\n    a = a + 1.0\n    return a\n"
         "@smc.law_function(joint=True)\n"
-        f"def strange_joint(y, gains, memory):\n    s = y.de + y.e\n    {line}\n    return u, s\n"
+        f"def strange(y, gains, memory):\n    s = y.de + y.e\n    {line}\n    return u, s\n"
     )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "strange_joint", raising=False)
-    law = importlib.import_module("strange_joint").strange_joint
-    with pytest.raises(smc.ScenarioError, match="law 'strange_joint' cannot be written in C: ") as error:
+    law = strange(text, tmp_path, monkeypatch)
+    with pytest.raises(smc.ScenarioError, match="law 'strange' cannot be written in C: ") as error:
         smc.law_to_c(law, joints=3)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
