@@ -113,7 +113,7 @@ def figure(
             cells, others = (
                 [] if not each else _column(grid[there.index(i + 1)], each) for i, each in enumerate(heights)
             )
-        changes = style.jumps(traces, names)
+        changes = style.marks(traces, names)
         if cell is not None:
             _draw_small(page, cell, small, colours, changes)
         if overview:
@@ -186,7 +186,7 @@ def _draw_over_time(
             axes.append(ax)
             ax.set_xlim(0.0, end(overview[0].traces))
             drawing.over_time(ax, part, own)
-            drawing.jumps(ax, changes, named=ax is axes[0])
+            drawing.mark(ax, changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
         for ax in (frame, *(ax for ax, *_ in rows)):
             drawing.scale_ticks(ax.yaxis, panel)
@@ -241,7 +241,7 @@ def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
             ax.locator_params(axis="y", nbins=3)
             drawing.over_time(ax, panel, colours)
             drawing.scale_ticks(ax.yaxis, panel)
-            drawing.jumps(ax, changes, named=i == k == 0)
+            drawing.mark(ax, changes, named=i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
                 ax.set_xlabel("time (s)")
@@ -327,7 +327,7 @@ def signals(
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
             drawing.over_time(ax, Panel("u", group, [cut(trace, group)]), [colours[law]])
-            drawing.jumps(ax, style.jumps([trace], [law]), named=False)
+            drawing.mark(ax, style.jumps([trace], [law]), named=False)
             if room > points(250):
                 drawing.note(ax, _variation(trace, group))
         drawing.scale_ticks(axes[0, 0].yaxis, control)  # which all share
@@ -355,11 +355,7 @@ def _key(
     traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], shown: Sequence[Panel], rests: bool
 ) -> list[Handle]:
     """Return the entries of a legend: the traces, the reference with its band, the meaning of lines and bands."""
-    handles: list[Handle] = []
-    for trace, name, colour in zip(traces, names, colours, strict=True):
-        how = style.ending(trace)
-        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, pages.LETTERS) + (f" ({how})" if how else "")
-        handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
+    handles = pages.runs(traces, names, colours)
     if rests:
         diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))

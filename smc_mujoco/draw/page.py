@@ -19,6 +19,7 @@ from matplotlib.patches import Patch
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import style
+from smc_mujoco.simulation.trace import Trace
 
 DPI = 150
 FORMATS = ("svg", "png", "pdf")
@@ -136,6 +137,16 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
     for label, text in zip(legend.get_texts(), words, strict=True):
         label.set_text(text)
         label.set_parse_math(False)
+
+
+def runs(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
+    """Return the entries of a legend for runs: a line each, and how it failed if it did."""
+    handles: list[Handle] = []
+    for trace, name, colour in zip(traces, names, colours, strict=True):
+        how = style.ending(trace)
+        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, LETTERS) + (f" ({how})" if how else "")
+        handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
+    return handles
 
 
 def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:

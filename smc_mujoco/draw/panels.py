@@ -21,6 +21,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
+from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.metrics.conventions import BAND, last_exit, scale
@@ -36,6 +37,7 @@ MAX_RESTS = 12  # marked in a phase portrait
 SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have two small panels
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
+LEAVING = 0.6  # points, width of a curve that leaves its panel
 COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
 DASH = 5.0  # widths of a line
 WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
@@ -48,7 +50,9 @@ OF_ARMS = {  # quantities of arms, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
     "worst": "largest error of a joint",
+    "joint": "error",
 }
+THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
 UNBANDED = ("x", "e", "spread", *OF_ARMS)  # drawn sample by sample, without a mean over time
 ALONE = 8.0  # times the errors of all other runs: a run so far off leaves the panel instead of flattening them; chosen
 
@@ -69,6 +73,7 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "tip": lambda trace: 1e3 * tip.tip_error(trace)[:, None],
     "contact": lambda trace: tip.contacts(trace).force[:, None],
     "worst": lambda trace: 1e3 * np.abs(trace.x - trace.r).max(axis=1, keepdims=True),
+    "joint": lambda trace: 1e3 * (trace.x - trace.r),
 }
 
 
@@ -98,7 +103,8 @@ class Panel(NamedTuple):
         """The label of the vertical axis, with its unit."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
         if name in OF_ARMS:
-            return OF_ARMS[name] + (f" (m{group.unit})" if name == "worst" else "")
+            joint = f"{joint_names(plant)[self.channel]}, " if self.channel is not None else ""
+            return joint + OF_ARMS[name] + (f" (m{group.unit})" if name in THOUSANDTHS else "")
         mean = "mean " * (len(group.channels) > 1)
         alike = {"spread": "x", "e": "x", "reaction": "force", "d": "force", "applied": "u"}
         unit = f" ({'m' * self.thousandths}{style.units(group)[alike.get(name, name)]})"
@@ -235,8 +241,10 @@ def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True
     if name in ("x", "e"):
         target(ax, panel)
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
-    drawn = list(zip(panel.traces, colours, means, lines, dashes(lines, ax.get_ylim()), strict=True))
-    for trace, colour, mean, path, dash in reversed(drawn):
+    away = far_off(panel.traces, name)
+    widths = [style.points(LEAVING if k == away else LINE) for k in range(len(lines))]
+    drawn = list(zip(panel.traces, colours, means, lines, dashes(lines, ax.get_ylim()), widths, strict=True))
+    for trace, colour, mean, path, dash, width in reversed(drawn):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         e = columns(trace.t, mean[:, None] if name in ("x", "e") else y, COLUMNS)
         artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
@@ -244,7 +252,7 @@ def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True
             look = {"color": colour, "alpha": 0.3, "lw": style.points(LIGHT_LINE), "drawstyle": steps}
             for i in light(y.shape[1]):
                 artists += ax.plot(*curve(trace, y[:, i], name), **look)
-        artists += ax.plot(*path, color=colour, lw=style.points(LINE), drawstyle=steps, ls=dash)
+        artists += ax.plot(*path, color=colour, lw=width, drawstyle=steps, ls=dash)
         if trace.diverged_at is not None:
             last = np.clip(mean[-1], *ax.get_ylim())
             artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
@@ -254,6 +262,11 @@ def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True
 def cross() -> dict[str, Any]:
     """Return the look of the mark at the end of a failed run."""
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
+
+
+def dotted() -> dict[str, Any]:
+    """Return the look of the line at which a plant changes or an arm is hit."""
+    return {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
 
 
 def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
@@ -345,13 +358,13 @@ def scale_ticks(axis: Axis, panel: Panel) -> None:
         axis.set_major_formatter(Thousandths())
 
 
-def jumps(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
-    """Mark when plants change, time in s -> words; with the words above the axes if `named`."""
+def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
+    """Mark when plants change or arms are hit, time in s -> words; with the words above the axes if `named`."""
     last, size = ax.get_xlim()[1], style.points(9)
     room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
-        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=(0, (2, 2)), zorder=1.5)
+        ax.axvline(time, **dotted(), zorder=1.5)
         if not named:
             continue
         words = style.cropped(change, room, size)
@@ -472,33 +485,38 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[keep], v[keep]
 
 
-def far_off(sizes: Sequence[float]) -> int | None:
-    """Return the index of the run, by their largest |y|, that is so far off that a panel shows the others; or None."""
+def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
+    """Return the values of successful runs by their index; if there are none, of failed ones without their ends."""
+    values = {k: QUANTITIES[name](trace) for k, trace in enumerate(traces)}
+    found = {k: y for k, y in values.items() if traces[k].diverged_at is None}
+    if not found:
+        found = {k: y[: max(1, int(0.8 * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()}
+    return {k: y for k, y in found.items() if np.isfinite(y).all()}
+
+
+def far_off(traces: Sequence[Trace], name: str) -> int | None:
+    """Return the index of the run that is so far off that a panel of an arm shows the others; or None."""
+    sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()} if name in OF_ARMS else {}
     if len(sizes) < 2:
         return None
-    *_, second, largest = np.argsort(sizes).tolist()
+    *_, second, largest = sorted(sizes, key=lambda k: sizes[k])
     return largest if sizes[largest] > ALONE * sizes[second] > 0.0 else None
 
 
-def outside(panel: Panel, names: Sequence[str]) -> str:
-    """Return which run leaves a panel of an arm and how far, such as "Time-delay sliding: up to 310"; else ""."""
-    if panel.quantity not in OF_ARMS:
-        return ""
-    sizes = [float(np.abs(QUANTITIES[panel.quantity](trace)).max()) for trace in panel.traces]
-    away = far_off(sizes)
-    return "" if away is None else f"{names[away]}: up to {style.short(sizes[away])}"
+def outside(panel: Panel, names: Sequence[str]) -> tuple[str, str]:
+    """Return which run leaves a panel of an arm and how far: "Time-delay sliding", ": up to 310"; else two ""."""
+    away = far_off(panel.traces, panel.quantity)
+    if away is None:
+        return "", ""
+    largest = float(np.abs(QUANTITIES[panel.quantity](panel.traces[away])).max())
+    return names[away], f": up to {style.short(largest)}"
 
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the least and largest value of successful runs; if there are none, of failed ones without their ends."""
-    seen = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
-    for trace in traces if not seen else ():
-        y = QUANTITIES[name](trace)
-        seen.append(y[: max(1, int(0.8 * len(y)))] if trace.plant_diverged else y)
-    seen = [y for y in seen if np.isfinite(y).all()] or [np.zeros(1)]
-    if name in OF_ARMS and (away := far_off([float(np.abs(y).max()) for y in seen])) is not None:
-        del seen[away]
-    return float(min(y.min() for y in seen)), float(max(y.max() for y in seen))
+    """Return the least and largest value of the runs that last, without one that is far off."""
+    seen, away = lasting(traces, name), far_off(traces, name)
+    values = [y for k, y in seen.items() if k != away] or [np.zeros(1)]
+    return float(min(y.min() for y in values)), float(max(y.max() for y in values))
 
 
 def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:

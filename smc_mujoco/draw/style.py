@@ -275,19 +275,12 @@ def ending(trace: Trace) -> str:
 
 def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
     """Return the changes of plants, time in s -> "mass × 2", preceded by the labels of the runs if only some change."""
-    found: dict[tuple[float, str], list[str]] = {}
-    for trace, name in zip(traces, names, strict=True):
-        if jump := trace.scenario.jump:
-            added = trace.scenario.plant.added
-            words = ", ".join(
-                f"{what} + {factor:.3g} {added[what]}" if what in added else f"{what} × {factor:.3g}"
-                for what, factor in jump.factors.items()
-            )
-            found.setdefault((jump.time, words), []).append(name)
-    changes: dict[float, list[str]] = {}
-    for (time, words), who in sorted(found.items()):
-        changes.setdefault(time, []).append(words if len(who) == len(traces) else f"{', '.join(who)}: {words}")
-    return {time: "; ".join(parts) for time, parts in changes.items()}
+    return _by_time([_jump(trace) for trace in traces], names)
+
+
+def marks(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
+    """Return the changes of plants and the blows on arms, time in s -> words such as "blow of 400 N for 20 ms"."""
+    return _by_time([[*_jump(trace), *map(_blow, pushes([trace]))] for trace in traces], names)
 
 
 def pushes(traces: Sequence[Trace]) -> list[Push]:
@@ -296,12 +289,33 @@ def pushes(traces: Sequence[Trace]) -> list[Push]:
     return [push for scenario in arms for push in scenario.disturbance if isinstance(push, Push)]
 
 
-def blows(traces: Sequence[Trace]) -> dict[float, str]:
-    """Return the blows on the bodies of arms, time in s -> "blow of 400 N for 20 ms"."""
-    found = {}
-    for push in pushes(traces):
-        found[push.time] = f"blow of {short(math.hypot(push.x, push.y, push.z))} N for {1e3 * push.width:.3g} ms"
-    return found
+def _jump(trace: Trace) -> list[tuple[float, str]]:
+    """Return when a plant changes and how, if it does."""
+    jump, added = trace.scenario.jump, trace.scenario.plant.added
+    if jump is None:
+        return []
+    words = (
+        f"{what} + {factor:.3g} {added[what]}" if what in added else f"{what} × {factor:.3g}"
+        for what, factor in jump.factors.items()
+    )
+    return [(jump.time, ", ".join(words))]
+
+
+def _blow(push: Push) -> tuple[float, str]:
+    """Return when a blow starts, and its size in words."""
+    return push.time, f"blow of {short(math.hypot(push.x, push.y, push.z))} N for {1e3 * push.width:.3g} ms"
+
+
+def _by_time(events: Sequence[Sequence[tuple[float, str]]], names: Sequence[str]) -> dict[float, str]:
+    """Return what happens at each time, from the events of each run; with the runs' labels if only some have it."""
+    found: dict[tuple[float, str], list[str]] = {}
+    for name, happened in zip(names, events, strict=True):
+        for event in dict.fromkeys(happened):
+            found.setdefault(event, []).append(name)
+    words: dict[float, list[str]] = {}
+    for (time, what), who in sorted(found.items()):
+        words.setdefault(time, []).append(what if len(who) == len(events) else f"{', '.join(who)}: {what}")
+    return {time: "; ".join(parts) for time, parts in words.items()}
 
 
 @functools.cache

@@ -39,6 +39,13 @@ def test_a_run_far_off_leaves_its_panel_by_name(trace):
     low, high = ax.get_ylim()
     assert max(-low, high) < 3.0 * error
     assert not shown(joints([trace, trace], labels=["near", "same"]))[0].texts
+    lost = dataclasses.replace(far, diverged_at=0.2, failure="the law raised ValueError: no")
+    page = joints([trace, lost], labels=["near", "lost"])
+    assert page.legends[0].get_texts()[1].get_text() == "lost (failed at 0.2 s)"
+    ax = shown(page)[0]
+    assert "X" in [line.get_marker() for line in ax.lines]
+    assert not ax.texts  # a failed run does not set the range, in films neither
+    assert panels.outside(panels.Panel("tip", next(iter(style.split([trace]))), [trace, lost]), ["a", "b"]) == ("", "")
 
 
 def test_curves_that_coincide_are_dashed_in_turn(trace):
@@ -52,8 +59,12 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     page = joints([hit])
     assert [text.get_text() for text in page.legends[0].get_texts()][-1] == "blow of 50 N for 20 ms at 0.1 s"
     assert all([0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines] for ax in shown(page))
-    picked = smc.Scenario(plant="panda", law="none", jump=smc.Jump(0.001, {"payload": 2.0}), duration=0.002)
+    push = smc.Push("link5", y=30.0, z=40.0, time=0.001, width=0.02)
+    picked = smc.Scenario(
+        plant="panda", law="none", jump=smc.Jump(0.001, {"payload": 2.0}), disturbance=push, duration=0.002
+    )
     (run,) = smc.run([picked])
+    assert style.marks([run], ["none"]) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
     assert style.jumps([run], ["none"]) == {0.001: "payload + 2 kg"}
 
 

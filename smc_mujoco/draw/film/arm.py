@@ -25,6 +25,7 @@ LOST = 0.015  # m that a tip is off its path where a ghost shows the reference; 
 LONGEST = 0.6  # m, of the arrow of the largest force
 STRUCK = 0.4  # m, of the arrow of a blow
 SHAFT, HEAD = 4.0, 9.0  # px: width of an arrow's shaft, and half of that of its head
+SLENDER = 2.2  # length of an arrow's head, in halves of its width
 REACH = 0.09  # m, of a blow's arrow from the middle of its body
 SHOWN = 0.12  # s for which a blow is shown after its end
 FINER = 3  # pixels that an arrow is drawn with for each of the picture
@@ -64,6 +65,7 @@ class Trail:
       times: at which the path gets there, (m,) s.
       seen: which of them are drawn, (m,).
       size: of the picture, px.
+      opacity: 0 to 1.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Trail:
         colour: str,
         width: float,
         size: tuple[int, int],
+        opacity: float = 1.0,
     ):
         self.colour, half = np.array(style.rgb(colour), float), width / 2
         steps = np.ceil(2.0 * np.hypot(*np.diff(points, axis=0).T)).astype(int)  # a point each half px
@@ -84,9 +87,8 @@ class Trail:
         reach = math.ceil(half + 1.0)
         low = np.clip(np.floor(dense.min(axis=0)).astype(int) - reach, 0, size)
         high = np.clip(np.ceil(dense.max(axis=0)).astype(int) + reach + 1, 0, size)
-        self.box = *low.tolist(), *high.tolist()
         wide, tall = (high - low).tolist()
-        self.cover, self.since = np.zeros((tall, wide)), np.full((tall, wide), np.inf)
+        cover, since = np.zeros((tall, wide)), np.full((tall, wide), np.inf)
         middle = np.floor(dense).astype(int)
         for i in range(-reach, reach + 1):
             for j in range(-reach, reach + 1):
@@ -94,15 +96,17 @@ class Trail:
                 ink = above * np.clip(half + 0.5 - np.hypot(*(pixel + 0.5 - dense).T), 0.0, 1.0)
                 x, y = (pixel - low).T
                 inside = (x >= 0) & (x < wide) & (y >= 0) & (y < tall) & (ink > 0.0)
-                np.maximum.at(self.cover, (y[inside], x[inside]), ink[inside])
-                np.minimum.at(self.since, (y[inside], x[inside]), at[inside])
+                np.maximum.at(cover, (y[inside], x[inside]), ink[inside])
+                np.minimum.at(since, (y[inside], x[inside]), at[inside])
+        y, x = np.unravel_index(np.argsort(since, axis=None)[: np.isfinite(since).sum()], since.shape)
+        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of each pixel of the path, as it gets there
+        self.pixels = y + low[1], x + low[0]
 
-    def draw(self, picture: np.ndarray, time: float, opacity: float = 1.0) -> None:
+    def draw(self, picture: np.ndarray, time: float) -> None:
         """Draw the path until a time, s."""
-        left, top, right, bottom = self.box
-        y, x = np.nonzero(self.since <= time)
-        part, cover = picture[top:bottom, left:right], opacity * self.cover[y, x, None]
-        part[y, x] = (part[y, x] * (1.0 - cover) + self.colour * cover).astype(np.uint8)
+        count = int(np.searchsorted(self.since, time, side="right"))
+        y, x, cover = self.pixels[0][:count], self.pixels[1][:count], self.cover[:count]
+        picture[y, x] = (picture[y, x] * (1.0 - cover) + self.colour * cover).astype(np.uint8)
 
 
 class Blow(NamedTuple):
@@ -142,7 +146,7 @@ class Overlay:
             path, wanted = (points + place for points in tip.tip_paths(trace))
             above = path[:, 2] >= 0.0, wanted[:, 2] >= 0.0  # the floor hides what is below it
             self.trails.append(Trail(project(path), trace.t, above[0], colour, WIDTH * scale, size))
-            self.wanted.append(Trail(project(wanted), trace.t, above[1], style.INK, WANTED_WIDTH * scale, size))
+            self.wanted.append(Trail(project(wanted), trace.t, above[1], style.INK, WANTED_WIDTH * scale, size, WANTED))
         self.edges = edges
         self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
         self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
@@ -168,7 +172,7 @@ class Overlay:
         time = float(self.edges[frame + 1])
         picture = picture.copy()
         for trail, wanted in zip(self.trails, self.wanted, strict=True):
-            wanted.draw(picture, np.inf, WANTED)
+            wanted.draw(picture, np.inf)
             trail.draw(picture, time)
         image = Image.fromarray(picture)
         draw = ImageDraw.Draw(image)
@@ -195,9 +199,8 @@ class Overlay:
         if length > 1.0:
             along = (end - start) / length
             across = np.array([-along[1], along[0]])
-            head = min(2.2 * HEAD * s, 0.7 * length)
-            half, neck = 0.5 * SHAFT * s, end - head * along
-            wide = HEAD * s * head / (2.2 * HEAD * s)
+            head = min(SLENDER * HEAD * s, 0.7 * length)
+            half, neck, wide = 0.5 * SHAFT * s, end - head * along, head / SLENDER
             rim = [start + half * across, neck + half * across, neck + wide * across, end]
             rim += [neck - wide * across, neck - half * across, start - half * across]
             corner, far = np.floor(np.min(rim, axis=0)).astype(int), np.ceil(np.max(rim, axis=0)).astype(int) + 1

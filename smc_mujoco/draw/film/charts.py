@@ -54,7 +54,7 @@ class Charts:
                 ax.set_xlim(0.0, self.end)
                 ax.set_xlabel("time (s)", labelpad=2)
                 ax.tick_params(length=0)
-                panels.jumps(ax, style.jumps(traces, names) | style.blows(traces), named=False)
+                panels.mark(ax, style.marks(traces, names), named=False)
                 artists += panels.over_time(ax, panel, colours, label=False)
                 panels.scale_ticks(ax.yaxis, panel)
             self.full = picture(canvas)
@@ -96,7 +96,7 @@ class Charts:
 def set_titles(ax: Axes, panel: Panel, names: Sequence[str], point: float) -> None:
     """Set the panel's label at the left and, at the right, as much of what its lines mean as fits; `point` in px."""
     words = [f"{name}: {text}" for name, text in panels.meaning([panel]).items()]
-    if away := panels.outside(panel, names):
+    if away := "".join(panels.outside(panel, names)):
         words.insert(0, away)
     room = ax.get_window_extent().width - style.width(panel.label, 11 * point, bold=True) - 15 * point
     while words and style.width(", ".join(words), 9.5 * point) > room:

@@ -1,9 +1,9 @@
 """Playback speed of a film, from its traces: slow motion where things move fast, and faster where they rest.
 
 The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
-should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around blows, and always
-around a push on an arm; and FAST
-where nothing has moved for a while. The same traces give the same film.
+should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around impacts and pushes
+on an arm; and FAST where nothing has moved for a while. A film that would be too long is slowed less, and around pushes
+only if it would be too long with all else in real time. The same traces give the same film.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ SLOWEST = 3  # powers of two
 STILL = 5e-4  # of its range that a thing at rest moves a frame at most; chosen: less than a pixel in 3 frames
 FAST = 4.0  # times real time, where everything rests
 AROUND = 0.1  # s before and after fast motion that are shown as slowly
-BLOW = 0.04  # s around the start of a contact
+IMPACT = 0.04  # s around the start of a contact, and around the middle of a push
 REST = 0.3  # s after motion, and before it, that are not shown faster
 MAX_LENGTH = 1.85, 8.0  # duration of a film: in durations of the run, or in s if that is more; chosen
 SPEEDS = 0.01, 100.0
@@ -78,21 +78,20 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     travel = motion(runs, np.append(grid, whole))
     powers = np.ceil(np.log2(np.maximum(travel / TRAVEL, 1.0)) - 1e-9)
     powers = spread(powers, round(AROUND * fps))
-    for start in blows(runs):
-        powers[np.abs(grid + 0.5 / fps - start) <= BLOW] = SLOWEST
-    hits = np.zeros(len(grid), bool)  # by a push on an arm
+    for start in impacts(runs):
+        powers[np.abs(grid + 0.5 / fps - start) <= IMPACT] = SLOWEST
+    pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
-        hits |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= BLOW
-    moving = spread(((travel > STILL) | hits).astype(float), round(REST * fps)) > 0.0
-    longest, most = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), SLOWEST
-
-    def bounded() -> np.ndarray:
-        speed = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
-        return np.where(hits, 0.5**SLOWEST, speed)
-
-    while most and (1.0 / bounded()).sum() / fps > longest:
-        most -= 1
-    return grid, bounded()
+        pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
+    moving = spread(((travel > STILL) | pushed).astype(float), round(REST * fps)) > 0.0
+    longest, found = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
+    steps = [(most, SLOWEST) for most in range(SLOWEST, 0, -1)] + [(0, most) for most in range(SLOWEST, -1, -1)]
+    for most, around_pushes in steps:
+        found = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
+        found[pushed] = 0.5**around_pushes
+        if (1.0 / found).sum() / fps <= longest:
+            break
+    return grid, found
 
 
 def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
@@ -108,7 +107,7 @@ def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
     return travel
 
 
-def blows(runs: Sequence[Trace]) -> list[float]:
+def impacts(runs: Sequence[Trace]) -> list[float]:
     """Return when contacts begin that were none for a while before, s."""
     starts = []
     for trace in runs:

@@ -76,11 +76,11 @@ def test_frames_ascend_from_start_to_end_and_tell_their_speed(base):
     np.testing.assert_allclose(steps[:-1] * FPS, found.speeds[:-2], rtol=1e-6)
 
 
-def test_blows_are_slowest(monkeypatch):
+def test_impacts_are_slowest(monkeypatch):
     trace = smc.run(smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0))
     touch = trace.t[states.in_contact(trace)[:, 0]]
     first = float(touch[0])
-    assert pace.blows([trace])[0] == pytest.approx(first)
+    assert pace.impacts([trace])[0] == pytest.approx(first)
     assert at(trace, (first,)) == [0.125]
     monkeypatch.setattr(states, "in_contact", lambda trace: np.zeros(trace.x.shape, bool))
     assert at(trace, (first,)) == [0.25]
