@@ -368,8 +368,11 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
         return False
 
 
-def _gains(gains: object) -> dict[str, Gain]:
+def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str, Gain]:
     """Return the gains of a decorator, numbers or Gains, as Gains.
+
+    Args:
+      known: gains that come first, and whose defaults `gains` change.
 
     Raises:
       ScenarioError: not a mapping, a bad name or default, or a gain over an unknown one.
@@ -377,7 +380,7 @@ def _gains(gains: object) -> dict[str, Gain]:
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     checked: dict[str, Gain] = {}
-    for key, value in (gains or {}).items():
+    for key, value in {**known, **(gains or {})}.items():
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
@@ -422,7 +425,7 @@ def template(
       ScenarioError: an option out of range. From the decorator: a function with other arguments, or with a name
         longer than 100 characters.
     """
-    stated = _gains(gains)
+    stated = as_gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")

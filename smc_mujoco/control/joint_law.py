@@ -50,7 +50,8 @@ class JointMeasurement(NamedTuple):
     g: np.ndarray  # h(x, 0), the forces at rest: gravity and springs
 
 
-VECTORS = 9  # fields of a measurement from x to limit
+ARRAYS = JointMeasurement._fields[4:]  # the vectors, M, h and g, in the order in which they are stored
+VECTORS = ARRAYS.index("M")  # fields of a measurement from x to limit
 HEADER = 5  # numbers before the vectors of a stored measurement: t, dt, model, dynamics, n
 
 

@@ -15,11 +15,18 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown, users_frame
 from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import OLD_FIELDS, Measurement
 
 HERE = Path(__file__).parent
 HEADER, JOINT_HEADER = HERE / "smc_law.h", HERE / "smc_joint_law.h"
 INPUTS = len(Measurement._fields)  # numbers in a measurement
+# How a measurement is stored, for glue.c and replay.c.
+LAYOUT = (
+    f"-DSMC_INPUTS={INPUTS}",
+    f"-DSMC_HEADER={joint_law.HEADER}",
+    f"-DSMC_VECTORS={joint_law.VECTORS}",
+)
 PROTOTYPE = "int smc_law(const {} *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no fused multiply-add.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
@@ -84,7 +91,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
         raise ScenarioError(
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
         )
-    macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", f"-DSMC_INPUTS={INPUTS}", "-I", str(HERE)]
+    macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT, "-I", str(HERE)]
     macros += _old_names(source)
     files = [str(HERE / "glue.c"), "-o", str(target)]
     try:
@@ -118,7 +125,7 @@ def _old_names(source: Path) -> list[str]:
 def replayer(command: tuple[str, ...]) -> Path | None:
     """Return `replay.c`, compiled with a compiler's sanitizers; None if these do not work."""
     target = fresh(".exe")
-    line = [*command, *SANITIZERS, f"-DSMC_INPUTS={INPUTS}", str(HERE / "replay.c"), "-o", str(target), "-ldl"]
+    line = [*command, *SANITIZERS, *LAYOUT, str(HERE / "replay.c"), "-o", str(target), "-ldl"]
     try:
         if timed(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
             return None

@@ -1,7 +1,8 @@
 /* What glue.c needs for a law of many joints: its measurement, from the numbers of joint_law.py in double precision:
- * t, dt, model, the address of what `coriolis` and `jacobian` call, the number of joints, vectors, M, h, g.
+ * SMC_HEADER ones (t, dt, model, the address of what `coriolis` and `jacobian` call, the number of joints), SMC_VECTORS
+ * vectors, M, h, g.
  */
-enum { SMC_EACH = SMC_JOINTS, SMC_NUMBERS = 11 * SMC_JOINTS + SMC_JOINTS * SMC_JOINTS }; /* of vectors and M */
+enum { SMC_EACH = SMC_JOINTS, SMC_NUMBERS = (SMC_VECTORS + 2 + SMC_JOINTS) * SMC_JOINTS }; /* of vectors, M, h and g */
 typedef smc_joint_measurement smc_seen;
 /* a struct of other fields than smc_joint_law.h's is an error here */
 typedef char smc_joint_measurement_as_in_smc_joint_law_h[
@@ -48,6 +49,6 @@ static void smc_mujoco_see(const double *smc_in, smc_mujoco_plant *smc_plant, sm
     smc_plant->own = (const double *)(__INTPTR_TYPE__)smc_in[3];
     smc_plant->without_tip = 0;
     smc_y->t = (smc_real)smc_in[0], smc_y->dt = (smc_real)smc_in[1], smc_y->model = (smc_real)smc_in[2];
-    for (smc_i = 0; smc_i < SMC_NUMBERS; smc_i++) smc_to[smc_i] = (smc_real)smc_in[5 + smc_i];
+    for (smc_i = 0; smc_i < SMC_NUMBERS; smc_i++) smc_to[smc_i] = (smc_real)smc_in[SMC_HEADER + smc_i];
     smc_y->coriolis = smc_mujoco_coriolis, smc_y->jacobian = smc_mujoco_jacobian, smc_y->plant = smc_plant;
 }

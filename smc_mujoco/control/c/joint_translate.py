@@ -49,7 +49,7 @@ ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's 
 TOKEN = re.compile("\x02(\\d+)\x03")  # stands for a call in an expression, which may move before its loop
 NUMBERS = ("t", "dt", "model")
 # Fields of the measurement -> their dimensions.
-FIELDS = dict.fromkeys(joint_law.JointMeasurement._fields[4:], f"[{JOINTS}]") | dict.fromkeys(NUMBERS, "")
+FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(NUMBERS, "")
 FIELDS["M"] = f"[{JOINTS}][{JOINTS}]"
 ON_REQUEST = {joint_law.coriolis: ("coriolis", (JOINTS,)), joint_law.jacobian: ("jacobian", ("3", JOINTS))}
 HELPERS |= {  # numpy's, as numba compiles them: NaN stays NaN
@@ -185,7 +185,7 @@ class ArrayFunction(Function):
                 stores.append((target, found))
             else:
                 homes.append(f"&{self.destination(target, kind)}")
-        yield f"{beginning}{', ' * (not beginning.endswith('('))}{', '.join(homes)});"
+        yield call_to(beginning, ", ".join(homes))
         for target, found in stores:
             yield from self.store(target, found)
 
@@ -234,7 +234,7 @@ class ArrayFunction(Function):
             place = self.value(target)
         else:
             place = self.changeable(target)
-            if base(wider(base(place.kind), base(value.kind))) != base(place.kind):
+            if wider(base(place.kind), base(value.kind)) != base(place.kind):
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
         if shape(value.kind) and not self.fits(value.kind, place.kind):
             raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
@@ -549,7 +549,7 @@ class ArrayFunction(Function):
         if not shape(kinds[0]):
             return Value(f"{beginning})", kinds[0])
         found = self.temporary(kinds[0])
-        self.move(f"{beginning}{', ' * (not beginning.endswith('('))}{found.home});", node)
+        self.move(call_to(beginning, found.home), node)
         return found
 
     def of_elements(self, function: Any, node: ast.Call) -> Value:
@@ -718,6 +718,11 @@ def base(kind: str) -> str:
 def declared(kind: str, name: str) -> str:
     """Return the declaration of an array, whose numbers lie in one row."""
     return f"{TYPES[base(kind)]} {name}[{' * '.join(shape(kind))}];"
+
+
+def call_to(beginning: str, homes: str) -> str:
+    """Return the call of a function that writes its results to pointers."""
+    return f"{beginning}{', ' * (not beginning.endswith('('))}{homes});"
 
 
 def array_at(home: str, kind: str, offset: str = "") -> Value:

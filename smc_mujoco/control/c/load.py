@@ -27,15 +27,14 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.c import build, sandbox
-from smc_mujoco.control.component import Template, Value, at, template, written
-from smc_mujoco.control.joint_law import VECTORS, JointMeasurement
+from smc_mujoco.control.component import Template, Value, as_gains, template, written
+from smc_mujoco.control.joint_law import ARRAYS
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
 
 LIBRARIES = (".so", ".dylib")
 MAX_TIMEOUT = 86_400.0  # s
 DEFAULT_MEMORY = 8
-JOINT_FIELDS = JointMeasurement._fields[4 : 4 + VECTORS]  # the vectors from x to limit
 
 
 class CLaw(AtAddress):
@@ -75,8 +74,12 @@ class CLaw(AtAddress):
         if not self.joints:
             u, s = self._out(y, gains, memory, 2)
             return u, s
-        asked, each = Asked(y, self.joints), [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
-        out = self._out(asked.numbers, each, memory, 2 * len(y.x))
+        requests = sandbox.Requests(
+            self.joints, lambda w: y.dynamics.coriolis(np.array(w)).tolist(), lambda: y.dynamics.jacobian().ravel()
+        )
+        numbers = sandbox.stored(y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS])
+        each = [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
+        out = self._out(numbers, each, memory, 2 * len(y.x))
         return np.array(out[: self.joints]), np.array(out[self.joints :])
 
     def _out(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int) -> list[float]:
@@ -111,34 +114,6 @@ class CLaw(AtAddress):
     def __reduce__(self):
         """Pickle the machine code: another process runs this law even if its file has changed."""
         return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
-
-
-class Asked:
-    """The numbers of a JointMeasurement, with which C code can call `coriolis` and `jacobian` of Python.
-
-    They are valid as long as this object lives.
-    """
-
-    def __init__(self, y: JointMeasurement, joints: int):
-        def coriolis(w: Any, own: Any, memory: Any, out: Any) -> int:
-            return written_to(out, y.dynamics.coriolis(np.array(w[:joints])))
-
-        def jacobian(nothing: Any, own: Any, memory: Any, out: Any) -> int:
-            try:
-                return written_to(out, y.dynamics.jacobian())
-            except ValueError:
-                return 1
-
-        def written_to(out: Any, values: np.ndarray) -> int:
-            for i, value in enumerate(values.ravel().tolist()):
-                out[i] = value
-            return 0
-
-        self._functions = sandbox.ON_REQUEST(coriolis), sandbox.ON_REQUEST(jacobian)
-        places = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self._functions]
-        self._table = sandbox.doubles([*places, 0.0, 1.0])
-        head = [y.t, y.dt, y.model, float(ctypes.addressof(self._table)), float(joints)]
-        self.numbers = [*head, *(number for vector in y[4:] for number in np.ravel(vector).tolist())]
 
 
 @functools.cache
@@ -230,8 +205,9 @@ def law_from_c(
 
 def _try(library: sandbox.Library, about: "About") -> list[str]:
     """Call a law in a separate process, as `sandbox.call` does."""
-    fields = JOINT_FIELDS if about.joints else Measurement._fields
-    return sandbox.call(library, fields, about.values, about.memory, about.modelled, about.joints)
+    fields = ARRAYS if about.joints else Measurement._fields
+    gains = [gain.default for gain in about.gains.values()]
+    return sandbox.call(library, fields, gains, about.memory, about.modelled, about.joints)
 
 
 def check(
@@ -250,7 +226,7 @@ def check(
     about = _about(library, gains, memory, None, None)
     yield from library.warnings
     yield from _try(library, about)
-    gains_text = ", ".join(f"{name} = {written(default(gain))}" for name, gain in about.gains.items()) or "none"
+    gains_text = ", ".join(f"{name} = {written(gain.default)}" for name, gain in about.gains.items()) or "none"
     joints = f"{about.joints} joints; " * bool(about.joints)
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
 
@@ -286,21 +262,11 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
 class About(NamedTuple):
     """Properties of a law in C; `joints` is 0 for a law of one channel."""
 
-    gains: dict[str, Any]  # of float and Gain
+    gains: dict[str, Gain]
     memory: int
     degree: int
     modelled: bool
     joints: int
-
-    @property
-    def values(self) -> list[float]:
-        """Defaults of the gains, one number a gain for each joint."""
-        return [at(default(gain), i) for gain in self.gains.values() for i in range(max(1, self.joints))]
-
-
-def default(gain: float | Gain) -> Value:
-    """Return the default of a gain."""
-    return gain.default if isinstance(gain, Gain) else gain
 
 
 def _about(
@@ -311,30 +277,26 @@ def _about(
     modelled: bool | None,
 ) -> About:
     """Return the properties of a library's law: the arguments, or else what the file states."""
-    if not isinstance(gains, Mapping | None):
-        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
-    given = {} if gains is None else gains
-    named: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     facts, file = sandbox.load(library), library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:
         raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")
     if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
         raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
-    if (text := facts.get("smc_law_gains")) is not None:
-        own = parsed_gains(text, f"{file}'s smc_law_gains")
-        for name in named:
-            errors.find(f"gain of {file}", name, own)
-        named = own | named
-    for name, value in ((name, default(gain)) for name, gain in named.items()):
-        if isinstance(value, tuple) and len(value) != joints:
+    text = facts.get("smc_law_gains")
+    own = {} if text is None else parsed_gains(text, f"{file}'s smc_law_gains")
+    named = as_gains(gains, own)
+    for name in () if text is None else named:
+        errors.find(f"gain of {file}", name, own)
+    for name, gain in named.items():
+        if isinstance(gain.default, tuple) and len(gain.default) != joints:
             each = f", or {joints}" * bool(joints)
-            raise ScenarioError(f"gain {name} of {file} is {written(value)}: give it one number{each}")
+            raise ScenarioError(f"gain {name} of {file} is {written(gain.default)}: give it one number{each}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
-        if isinstance(value := default(gain), tuple):
-            raise ScenarioError(f"shared gain {name} of {file} is {written(value)}: give it one number")
-        named[name] = dataclasses.replace(gain if isinstance(gain, Gain) else Gain(gain), shared=True)
+        if isinstance(gain.default, tuple):
+            raise ScenarioError(f"shared gain {name} of {file} is {written(gain.default)}: give it one number")
+        named[name] = dataclasses.replace(gain, shared=True)
     return About(
         named,
         whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
@@ -356,8 +318,10 @@ def parsed_gains(text: str, what: str) -> dict[str, Any]:
         except ValueError:
             values = ()
         parsed[name] = values[0] if len(values) == 1 else values
-        if not (equals and name.isidentifier() and values) or any(map(math.isnan, values)):
+        if not (equals and name.isidentifier() and values):
             raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
+        if any(map(math.isnan, values)):
+            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
     return parsed
 
 

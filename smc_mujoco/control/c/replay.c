@@ -43,7 +43,7 @@ int main(int count, char **word)
     if (!library) return failed(dlerror());
     joints = (size_t)*(const int *)dlsym(library, "smc_mujoco_joints");
     each = joints ? joints : 1;
-    inputs = joints ? 5 + 11 * joints + joints * joints : SMC_INPUTS;
+    inputs = joints ? SMC_HEADER + (SMC_VECTORS + 2 + joints) * joints : SMC_INPUTS;
     y = numbers(inputs), out = numbers(2 * each);
     asked[0] = asked[1] = (double)(intptr_t)nothing;
     many = each * strtoul(word[3], NULL, 10), size = each * strtoul(word[4], NULL, 10);

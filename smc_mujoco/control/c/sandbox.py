@@ -7,6 +7,7 @@ start quickly, so the functions that start it, and only they, import smc_mujoco.
 
 import contextlib
 import ctypes
+import itertools
 import json
 import math
 import os
@@ -15,7 +16,7 @@ import re
 import signal
 import struct
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,7 +31,7 @@ ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thre
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
-    BEYOND + 1: ("writes beyond the numbers of out", "write u and s alone, out[0] and out[1] of one channel"),
+    BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] in one channel"),
     BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
     ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
@@ -78,13 +79,18 @@ def load(library: Library) -> dict[str, Any]:
 
 
 def call(
-    library: Library, fields: Sequence[str], gains: Sequence[float], memory: int, modelled: bool, joints: int = 0
+    library: Library,
+    fields: Sequence[str],
+    gains: Sequence[float | tuple[float, ...]],
+    memory: int,
+    modelled: bool,
+    joints: int = 0,
 ) -> list[str]:
     """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
 
     Args:
-      fields: names of the numbers in a measurement; of a law of many joints, of its vectors.
-      gains: values of the gains, of many joints for each joint.
+      fields: names of the numbers in a measurement; of a law of many joints, of its arrays.
+      gains: values of the gains, of many joints one number or one for each joint.
       memory: number of state variables.
       modelled: whether the law needs the nominal model.
       joints: of a law of many joints; 0 for one channel.
@@ -93,15 +99,16 @@ def call(
       ScenarioError: as in `load`.
     """
     from smc_mujoco.control.c import build
+    from smc_mujoco.control.component import at
 
-    calls, unseen, name = build.fresh(".calls"), [], library.path.name
+    calls, unseen, name, each = build.fresh(".calls"), [], library.path.name, max(1, joints)
     anchor, data = build.static_data(library.file, library.symbol)
     if not data:
         unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
-    order = {"fields": fields, "gains": gains, "memory": memory, "modelled": modelled, "joints": joints}
+    numbers = [at(gain, i) for gain in gains for i in range(each)]
+    order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints, "each": each}
     _run(library, order | {"calls": str(calls), "anchor": anchor, "data": data})
-    each = max(1, joints)
-    if why := _sanitize(library, calls, len(gains) // each, memory):
+    if why := _sanitize(library, calls, len(gains), memory):
         unseen.append(f"{name} is tried without address and undefined-behaviour sanitizers: {why}")
     calls.unlink()
     return unseen
@@ -219,6 +226,49 @@ def doubles(values) -> ctypes.Array:
     return (ctypes.c_double * len(values))(*values)
 
 
+class Requests:
+    """C functions for what a law of many joints may ask, valid as long as this object lives.
+
+    Args:
+      joints: their number.
+      coriolis: a list w -> the numbers of C(x, v) w.
+      jacobian: returns the numbers of the tip's Jacobian by rows, or raises ValueError if there is none.
+
+    Attributes:
+      address: of the addresses of both functions, of their parameters, and the force per unit of u.
+    """
+
+    def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):
+        def answer(out, function, *arguments) -> int:
+            try:
+                for i, number in enumerate(function(*arguments)):
+                    out[i] = number
+            except ValueError:
+                return 1
+            return 0
+
+        def product(w, own, memory, out) -> int:
+            return answer(out, coriolis, w[:joints])
+
+        def tip(nothing, own, memory, out) -> int:
+            return answer(out, jacobian)
+
+        self.joints, self.functions = joints, (ON_REQUEST(product), ON_REQUEST(tip))
+        addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
+        self.table = doubles([*addresses, 0.0, 1.0])
+        self.address = ctypes.addressof(self.table)
+
+
+def stored(head, requests: Requests, arrays) -> list[float]:
+    """Return the numbers of a joint measurement, as `joint_law.measurement_at` reads them.
+
+    Args:
+      head: t, dt and model.
+      arrays: the numbers of each of its arrays, in their order.
+    """
+    return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
+
+
 # the script
 
 
@@ -256,45 +306,21 @@ class Fenced:
         return self.guards() != self.before
 
 
-class Requests:
-    """What a law of many joints may ask in a trial: C(x, v) w = w / 10, and a tip that three joints move.
-
-    Attributes:
-      address: of the addresses of both functions, of their parameters, and the force per unit of u.
-    """
-
-    def __init__(self, joints: int):
-        def coriolis(w, own, memory, out):
-            for i in range(joints):
-                out[i] = 0.1 * w[i]
-            return 0
-
-        def jacobian(nothing, own, memory, out):
-            for i in range(3 * joints):
-                out[i] = float(i // joints == i % joints)
-            return 0
-
-        self.functions = ON_REQUEST(coriolis), ON_REQUEST(jacobian)
-        addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
-        self.table = doubles([*addresses, 0.0, 1.0])
-        self.address = ctypes.addressof(self.table)
-
-
 class Trial:
     """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
     Args:
       law, library: as returned by `entry`.
-      order: fields, gains, memory, modelled and joints as in `call`; "data" and "anchor", the static data and the law's
-        address in the file.
+      order: fields, memory, modelled and joints as in `call`; "each", the number of channels; "gains", each gain's
+        number for each channel; "data" and "anchor", the static data and the law's address in the file.
       calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
     """
 
     def __init__(self, law, library, order, calls):
         self.law, self.library, self.calls = law, library, calls
         self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
-        self.joints, self.each = order["joints"], max(1, order["joints"])
-        self.on_request = Requests(self.joints)
+        self.joints, self.each = order["joints"], order["each"]
+        self.requests = Requests(self.joints, lambda w: [0.1 * one for one in w], self.jacobian)
         base = ctypes.cast(law, ctypes.c_void_p).value - order["anchor"]
         self.data = [(name, base + place, size) for name, place, size in order["data"]]
         self.data_before = self.static_data()
@@ -352,10 +378,14 @@ class Trial:
         """Return the numbers of a measurement in their order, from those of each channel. Those left out are 0."""
         if not self.joints:
             return [seen[0].get(name, 0.0) for name in self.fields]
-        head = [*(seen[0].get(name, 0.0) for name in ("t", "dt", "model")), float(self.on_request.address), self.joints]
-        vectors = [one.get(name, 0.0) for name in self.fields for one in seen]
         M = [1.0 if i == j else COUPLING for i in range(self.joints) for j in range(self.joints)]
-        return [*head, *vectors, *M, *[0.0] * (2 * self.joints)]
+        known = {"M": M, "h": [0.0] * self.joints, "g": [0.0] * self.joints}
+        arrays = [known.get(name) or [one.get(name, 0.0) for one in seen] for name in self.fields]
+        return stored([seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays)
+
+    def jacobian(self) -> list[float]:
+        """Return the Jacobian of a tip that the first three joints move."""
+        return [float(row == i) for row in range(3) for i in range(self.joints)]
 
     def state(self, saved: bytes = b"") -> Fenced:
         """Return a memory of zeros, or with saved content."""
@@ -426,7 +456,7 @@ def attempt(order, progress) -> None:
     done("smc_setup")
     if trial := order["trial"]:
         print(symbol, file=progress)
-        set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
+        set_sizes(library, len(trial["gains"]) // trial["each"], trial["memory"])
         with Path(trial["calls"]).open("wb") as calls:
             try:
                 Trial(law, library, trial, calls).all()
