@@ -35,6 +35,7 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
+WHITE = 0.35  # share of white in a law's colour on a dark page: chosen
 CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
 ALIKE = 0.10  # colours closer than this look alike, see `distance`; chosen
 OKLAB_CONES = np.array([
@@ -393,6 +394,11 @@ def plant_name(plant: Plant) -> str:
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return #RRGGBB as three numbers, 0 .. 255."""
     return tuple(bytes.fromhex(colour[1:]))  # pyright: ignore[reportReturnType]
+
+
+def lighter(colour: str) -> str:
+    """Return a law's colour for a dark page: mixed with white."""
+    return "#" + "".join(f"{round((1.0 - WHITE) * part + WHITE * 255):02X}" for part in rgb(colour))
 
 
 def letters_on(colour: str) -> str:

@@ -21,6 +21,8 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 HINGE, SLIDE = 0.425, 0.08  # length of the longest arrow: of the pendulum's, of the rail's
+OF_RADIUS, OF_LENGTH, LONG = 0.16, 0.024, 0.5  # thickness at a hinge: of the bob's radius, of the pendulum up to 0.5 m
+OFF_ARC, OFF_RAIL = 1.6, 2.2  # thicknesses between a body and its nearest arrow
 THICKNESS, SHORT = 0.035, 0.008  # m, at a slide, and at most that part of its rail
 OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent
 NETWORK = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
@@ -161,10 +163,10 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
             return
         reach, width, out = (
             mount.unit * HINGE * length,
-            0.16 * radius + 0.024 * mount.unit * min(length, 0.5),
+            OF_RADIUS * radius + OF_LENGTH * mount.unit * min(length, LONG),
             arm / length,
         )
-        along, start = np.cross(data.xaxis[mount.joint], out), radius + 1.6 * width
+        along, start = np.cross(data.xaxis[mount.joint], out), radius + OFF_ARC * width
     else:
         reach, width, along, out = mount.unit, mount.thick, data.xaxis[mount.joint], np.array([0.0, 0.0, 1.0])
         if mount.front is not None:
@@ -172,7 +174,7 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
             place = place + (half(model, data, body, mount.front) + width) * mount.front
-        start = half(model, data, body, out) + 2.2 * width
+        start = half(model, data, body, out) + OFF_RAIL * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
     width = min(arrow.size * width, 0.006 + SLENDER * abs(high - low))

@@ -25,6 +25,7 @@ from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.law import Measurement, fits, laws
 from smc_mujoco.control.properties import reads
 from smc_mujoco.draw import style
+from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Field, Plant, array, as_plant, catalogue, model_path
@@ -36,7 +37,6 @@ MODEL = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need
 FACTOR = 10.0  # a slider reaches from gain / FACTOR to gain * FACTOR where tuning has no range for the gain: chosen
 ACRONYM = 3  # letters of a name, at most, that is written in capitals, such as PID
 START = ("observer_free", "classical")  # laws with which the page opens: the paper's, and classical sliding mode
-WHITE = 0.35  # share of white in a law's colour on a dark page, as in the report
 
 
 def plants() -> list[str]:
@@ -88,6 +88,15 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[C
         "last_stage": controller.LAST_STAGE,
         "max_state": controller.MAX_STATE,
         "max_control": controller.MAX_CONTROL,
+        "arrow": {
+            "arc": arrows.HINGE,
+            "of_radius": arrows.OF_RADIUS,
+            "of_length": arrows.OF_LENGTH,
+            "long": arrows.LONG,
+            "off_arc": arrows.OFF_ARC,
+            "off_rail": arrows.OFF_RAIL,
+            "shortest": arrows.MIN_LENGTH,
+        },
         "own": [law.name for law in own],
         "plants": {plant.name: _plant(plant, kinds, own) for plant in chosen},
         "laws": {law.name: _component(law) | _law(law) for law in kinds["law"]},
@@ -116,7 +125,7 @@ def _law(law: Component) -> dict[str, Any]:
     return {
         "label": style.law_name(law),
         "colour": style.law_colour(law),
-        "colour_dark": _lighter(style.law_colour(law)),
+        "colour_dark": style.lighter(style.law_colour(law)),
         "family": law.template.family if law.template is not None else "",
         "requires_model": law.requires_model,
         "reads_model": bool(read & MODEL),
@@ -203,11 +212,6 @@ def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:
     ]
     names = ("name", "label", "unit", "least", "most", "value", "step")
     return [dict(zip(names, row, strict=True)) for row in rows]
-
-
-def _lighter(colour: str) -> str:
-    """Return a law's colour for a dark page: mixed with white."""
-    return "#" + "".join(f"{round((1.0 - WHITE) * part + WHITE * 255):02X}" for part in style.rgb(colour))
 
 
 def _equation(plant: Plant) -> str:

@@ -20,6 +20,7 @@ from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
 from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import laws
+from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.audit.verdict import Claim
@@ -62,7 +63,7 @@ def environment() -> "Environment":
         lstrip_blocks=True,
     )
     made.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
-    made.globals |= {"words": words, "checks": checks}
+    made.globals |= {"words": words, "checks": checks, "white": style.WHITE}
     return made
 
 

@@ -13,9 +13,8 @@ const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { rati
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
 const PATIENCE = 1.5; // s over which frames are counted: chosen
 const STIFFNESS = 12; // of the spring by which a pointer pulls, in u_max per extent of the plant squared: chosen
-// Of the arrow of u, as in films: length at the bound on u, of a pendulum's or of the plant's extent; and its thickness.
-const [ARC, PUSH, THIN] = [0.425, 0.2, 0.018];
-const SHORT = 0.05; // of the bound on u: a smaller u has no arrow
+// Of the arrow of u along a rail: length at the bound on u, and thickness, of the plant's extent. Chosen.
+const [PUSH, THIN] = [0.2, 0.018];
 const REACH = 0.25; // of the plant's extent: a spring longer than that pulls no harder: chosen
 
 function css(name) {
@@ -289,9 +288,9 @@ class Machine {
     for (const skin of this.skins) bend(skin, xpos, xmat);
   }
 
-  // Point the arrow of u: along a pendulum's arc beyond the bob, or along the rail above the cart.
+  // Point the arrow of u, as in films: along a pendulum's arc beyond the bob, or along the rail above the cart.
   pointForce() {
-    const { force, joint, handle, simulation: { model, data, plant: { extent, channels } } } = this;
+    const { force, joint, handle, simulation: { model, data, plant: { extent, channels }, facts: { arrow } } } = this;
     const vector = (array, i) => new THREE.Vector3(...array.subarray(3 * i, 3 * i + 3));
     const [axis, foot] = [vector(data.xaxis, joint), vector(data.geom_xpos, handle)];
     const share = Math.min(Math.max(this.u, -1), 1);
@@ -301,15 +300,16 @@ class Machine {
       const length = out.length();
       out.normalize();
       along = axis.clone().cross(out);
-      [reach, width] = [ARC * length, 0.16 * model.geom_rbound[handle] + 0.024 * Math.min(length, 0.5)];
-      foot.addScaledVector(out, model.geom_rbound[handle] + 1.6 * width);
+      const radius = model.geom_rbound[handle];
+      [reach, width] = [arrow.arc * length, arrow.of_radius * radius + arrow.of_length * Math.min(length, arrow.long)];
+      foot.addScaledVector(out, radius + arrow.off_arc * width);
     } else {
       const [, depth, height] = model.geom_aabb.subarray(6 * handle + 3, 6 * handle + 6);
-      foot.addScaledVector(out, height + 2.2 * width);
+      foot.addScaledVector(out, height + arrow.off_rail * width);
       if (channels.length > 1) foot.y -= depth + width; // before what the cart carries
     }
     const length = reach * Math.abs(share);
-    force.visible = Math.abs(share) > SHORT && along.lengthSq() > 0.5;
+    force.visible = Math.abs(share) > arrow.shortest && along.lengthSq() > 0.5;
     if (!force.visible) return;
     const head = Math.min(3 * width, length / 2);
     const radius = Math.min(width, head) / 2;
@@ -483,18 +483,24 @@ export class Stage {
   changed(machine, part) {
     const { simulation: { step }, arrow: { visible: pulled }, drawn } = machine;
     if (drawn?.step === step && !drawn.pulled && !pulled) return null;
+    const inBoxes = this.slow && !GRADES[this.grade].shadows; // a new grade sets `drawn` to null
+    const box = inBoxes ? this.boxOf(machine, part) : null;
+    machine.drawn = { step, pulled, box };
+    if (!box || !drawn || drawn.pulled || pulled) return part;
+    const x = Math.max(part.x, Math.floor(Math.min(box.left, drawn.box.left)));
+    const y = Math.max(part.y, Math.floor(Math.min(box.top, drawn.box.top)));
+    const width = Math.min(part.x + part.width, Math.ceil(Math.max(box.right, drawn.box.right))) - x;
+    const height = Math.min(part.y + part.height, Math.ceil(Math.max(box.bottom, drawn.box.bottom))) - y;
+    return width > 0 && height > 0 ? { x, y, width, height } : null;
+  }
+
+  // Return the box of what moves in a machine's part of the canvas, in px.
+  boxOf(machine, part) {
     const { left, right, bottom, top } = machine.movingBounds(this.camera);
-    const now = {
+    return {
       left: part.x + ((left + 1) / 2) * part.width - PAD, right: part.x + ((right + 1) / 2) * part.width + PAD,
       top: part.y + ((1 - top) / 2) * part.height - PAD, bottom: part.y + ((1 - bottom) / 2) * part.height + PAD,
     };
-    machine.drawn = { step, pulled, ...now };
-    if (!this.slow || GRADES[this.grade].shadows || !drawn || drawn.pulled || pulled) return part;
-    const x = Math.max(part.x, Math.floor(Math.min(now.left, drawn.left)));
-    const y = Math.max(part.y, Math.floor(Math.min(now.top, drawn.top)));
-    const width = Math.min(part.x + part.width, Math.ceil(Math.max(now.right, drawn.right))) - x;
-    const height = Math.min(part.y + part.height, Math.ceil(Math.max(now.bottom, drawn.bottom))) - y;
-    return width > 0 && height > 0 ? { x, y, width, height } : null;
   }
 
   // Set the ray of a pointer. Return the index of the machine under it, or of the grabbed one; null for none.

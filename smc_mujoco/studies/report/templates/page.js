@@ -12,7 +12,8 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   // Colours of the style on a dark page; all others, of laws, become lighter, as in style.css.
   const NIGHT = { "#1F2429": "#E6E9EC", "#646C75": "#A5ADB5", "#E3E6E9": "#2A3037", "#B9BFC5": "#4F5861", "#FFFFFF": "#15191E" };
-  const lighter = (c) => Math.round(0.65 * c + 0.35 * 255);
+  const white = parseFloat(document.documentElement.style.getPropertyValue("--white"));
+  const lighter = (c) => Math.round((1 - white) * c + white * 255);
   const shade = (text) => {
     if (NIGHT[text.toUpperCase()]) return NIGHT[text.toUpperCase()];
     if (/^#[0-9a-f]{6}$/i.test(text)) {
