@@ -53,7 +53,7 @@ def arithmetic() -> str:
 
 @functools.cache
 def package(*without: str) -> str:
-    """Return a hash of this package's code, models and gains.
+    """Return a hash of this package's code, models, gains and papers.
 
     It leaves out PRESENTATION and the folders named in `without`.
     """
@@ -63,7 +63,7 @@ def package(*without: str) -> str:
     files |= {Path("models") / path.name: path for path in shipped("models").rglob("*")}
     digest = hashlib.sha256()
     for name, path in sorted(files.items()):
-        if path.suffix in (".py", ".xml", ".json"):
+        if path.suffix in (".py", ".xml", ".json", ".toml"):
             digest.update(name.as_posix().encode() + path.read_bytes())
     return digest.hexdigest()
 

@@ -23,7 +23,7 @@ from smc_mujoco.mechanisms.plant import Plant, as_plant, ready
 from smc_mujoco.simulation import callback, coerce
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels
-from smc_mujoco.simulation.controller import MAX_CONTROL, MAX_STATE
+from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.reference import Failure, evaluate
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel
@@ -108,10 +108,10 @@ class Setting:
             a = np.asarray(action, float)
         except (TypeError, ValueError):
             a = np.array(np.nan)
-        if a.shape != shape or not math.isfinite(np.vdot(a, a)):
+        if a.shape != shape or not np.isfinite(a).all():
             wrong = shown(action)
             if a.shape == shape and copies:  # name the first copy that is not finite
-                i = int(np.argmin(np.abs(a).max(axis=-1) < MAX_CONTROL))
+                i = int(np.argmin(np.isfinite(a).all(axis=-1)))
                 wrong = f"{shown(a[i].tolist())} for copy {i}"
             raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
         return self.ctrl_limits * np.minimum(np.maximum(a, -1.0), 1.0)

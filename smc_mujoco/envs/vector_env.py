@@ -127,6 +127,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         self.samples += 1
         if anew.any():
             self.begin(anew)
+            terminated[anew] = False
         x, v = self.state()
         terminated |= self.setting.lost(x, v)
         truncated = self.samples >= self.last

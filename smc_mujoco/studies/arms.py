@@ -177,12 +177,14 @@ def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
 def back_within(trace: Trace, distance: float, after: float) -> float:
     """Return how long after a time the tip has come within a distance of its path for good, s; inf if it never does.
 
+    A run that fails never does.
+
     Args:
       distance: m.
       after: s.
     """
     t = trace.t[trace.t >= after]
-    out = np.flatnonzero(off_path(trace, after) > distance)
+    out = np.flatnonzero(~(off_path(trace, after) <= distance))  # NaN, after a failure, is out
     if not len(out):
         return 0.0
     return math.inf if out[-1] == len(t) - 1 else float(t[out[-1] + 1]) - after

@@ -109,13 +109,22 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
 
 
 def _plant_codes(plant: Plant) -> list[str]:
-    """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file."""
-    if plant.build.__module__.startswith(PACKAGE):
-        own = [] if plant.nominal.__module__.startswith(PACKAGE) else [plant.nominal]
-        return [fingerprint.of(thing) for thing in own]
+    """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file.
+
+    Of a plant of this package with some functions replaced, these count.
+    """
     builds = *plant.contacts.items(), *plant.mechanisms.items()
+    if plant.build.__module__.startswith(PACKAGE):
+        return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]
     functions = plant.build, plant.fields, plant.nominal, builds
     return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
+
+
+def _of_a_user(thing: Any) -> bool:
+    """Return whether a function, or one in nested tuples, is not of this package."""
+    if isinstance(thing, tuple):
+        return any(map(_of_a_user, thing))
+    return callable(thing) and not thing.__module__.startswith(PACKAGE)
 
 
 def _compared(data: dict[str, Any]) -> str:

@@ -28,13 +28,13 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     A metric of a limit cycle is NaN for a run without one. Its limit is then compared with `Metric.absent`.
 
     Args:
-      metric: its name.
+      metric: its name, or "GROUP METRIC".
       value: of the metric, in `unit`.
 
     Raises:
       ScenarioError: the limit is neither a number nor a pair.
     """
-    compared = CATALOGUE[metric].absent if math.isnan(value) else value
+    compared = CATALOGUE[metric.rpartition(" ")[2]].absent if math.isnan(value) else value
     if not isinstance(limit, tuple | list):
         most = number(f"limit of {metric}", limit, infinite=True)
         return Limit(metric, quantity(value, unit), f"<= {quantity(most)}", compared <= most)

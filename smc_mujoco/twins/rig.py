@@ -193,15 +193,19 @@ class Rig:
             `fit` leaves rounding out by default.
           closed: whether to close the loop if the controller is known; else the recorded command is replayed.
           state: positions and velocities at the start, as in the columns of `checked`, (2n,); None: those measured.
+
+        Raises:
+          ScenarioError: a start before the record, fewer than 50 samples to repeat, or what `fit` raises of a record.
         """
         if self.dynamics is not None:
             raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
         data = self.checked(record)
         period = self.step(data)
-        first = round((self.start if start is None else start) / period)
+        first = round((self.start if start is None else number("start", start, least=0.0)) / period)
         last = len(data[self.columns.time]) - 1
         if duration is not None:
-            last = min(last, first + round(duration / period))
+            shortest = round(records.MIN_SAMPLES * period, 9)
+            last = min(last, first + round(number("duration", duration, least=shortest) / period))
         if last - first < records.MIN_SAMPLES:
             raise ScenarioError(
                 f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "

@@ -37,6 +37,18 @@ def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     assert np.isfinite(arms.cost(trace))
 
 
+def test_a_run_that_fails_does_not_come_back_to_its_path():
+    n, t = 7, np.array([0.0, 1.0, 2.0, 3.0])
+    scenario = smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), duration=3.0)
+    rest, zero = np.tile(arms.arm().rest, (4, 1)), np.zeros((4, n))
+    moved = rest + np.array([[0.0], [0.0], [1.0], [0.0]])
+    failed = moved + np.array([[0.0], [0.0], [0.0], [np.nan]])
+    for x, back in ((rest, 0.0), (moved, 2.0), (failed, np.inf), (rest + np.nan, np.inf)):
+        names = ("v", "u", "applied", "s", "d", "force", "reaction")
+        trace = smc.Trace(t=t, x=x, r=rest, scenario=scenario, **dict.fromkeys(names, zero))
+        assert arms.back_within(trace, 1e-3, after=1.0) == back
+
+
 def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
     """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
     known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])

@@ -245,12 +245,21 @@ def test_an_entry_is_exported_to_c():
 # errors and the command
 
 
+def ruled(**fields):
+    """A run of acrobot by the rules of the boards, as far as its scenario says, with some fields changed."""
+    short = smc.run(boards.entry("acrobot", duration=0.01))
+    return dataclasses.replace(short, scenario=boards.entry("acrobot", **fields))
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
         (lambda: boards.entry("acrobat"), "acrobot"),
         (lambda: boards.board(smc.run(boards.entry("acrobot", duration=0.01))), "duration of the run is 0.01"),
-        (lambda: boards.board(smc.run(boards.entry("acrobot", x0=3.0, duration=10.0))), "x0 of the run"),
+        (lambda: boards.board(ruled(x0=3.0)), "x0 of the run"),
+        (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
+        (lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), "disturbance of the run is"),
+        (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', as of a published row: give another"),
         (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
         (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
         (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),

@@ -16,6 +16,7 @@ from helpers import runs
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
+from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
@@ -245,15 +246,33 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
     fingerprint.package.cache_clear()
+    before = fingerprint.package()  # on which a report's verdicts depend
+    (package / "studies" / "papers" / "gaber" / "paper.toml").write_text("# other thresholds")
+    fingerprint.package.cache_clear()
+    assert fingerprint.package() != before
+    fingerprint.package.cache_clear()
 
 
-def test_a_nominal_model_in_place_of_a_plants_own_tells_runs_apart():
+def test_functions_in_place_of_a_plants_own_tell_runs_apart():
     def nominal(x, v, i, q):
         return 0.0, 1.0
 
+    def nothing(*given):
+        yield from ()
+
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
-    other = dataclasses.replace(own, plant=dataclasses.replace(own.plant, nominal=nominal))
-    assert key(own) != key(other)
+    contacts, mechanisms = own.plant.contacts, own.plant.mechanisms
+    changes = (
+        {"nominal": nominal},
+        {"fields": nothing},
+        {"contacts": {**contacts, "other": nothing}},
+        {"mechanisms": {**mechanisms, "other": Variant(nothing, nothing)}},
+        {"contacts": {**contacts}, "mechanisms": {**mechanisms}},
+    )
+    plants = [dataclasses.replace(own.plant, **change) for change in changes]
+    *others, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
+    assert len({key(own), *others}) == 5
+    assert same == key(own)
 
 
 def test_metrics_are_the_same_after_a_score():

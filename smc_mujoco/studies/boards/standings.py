@@ -1,6 +1,9 @@
 """The boards as tables: published rows with one's own among them, best score first."""
 
+import dataclasses
+
 from smc_mujoco.common import errors
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.boards.entries import on_board
 from smc_mujoco.studies.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
@@ -8,6 +11,8 @@ from smc_mujoco.studies.boards.scoring import criteria, score, shoulder_first
 from smc_mujoco.studies.boards.simulator import Robustness
 
 NAME = "smc_mujoco"  # of this package's entry
+# Fields of a Scenario that are an entry's own. The rules fix all others.
+DESIGN = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "condition")
 WORDS = {
     "swing_up_time": "time",
     "energy": "energy",
@@ -30,29 +35,45 @@ def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
 
     Raises:
       ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', or a name that
-        cannot be printed.
+        cannot be printed or is that of a published row.
     """
-    found = criteria(trace)
-    ran, ruled = trace.scenario, on_board(trace.scenario.plant.name, "none")
-    for rule in ("duration", "control_period", "x0", "v0", "limits"):
-        if (value := getattr(ran, rule)) != (right := getattr(ruled, rule)):
+    found, robot = criteria(trace), trace.scenario.plant.name
+    ran = _ruled(trace.scenario)
+    for rule, right in _ruled(on_board(robot, "none")).items():
+        if (value := ran[rule]) != right:
             raise errors.ScenarioError(
-                f"{rule} of the run is {value} and on the boards {right}: use smc.boards.on_board"
+                f"{rule} of the run is {errors.shown(value)} and on the boards {errors.shown(right)}: "
+                "use smc.boards.on_board"
             )
     values = {field: getattr(found, field) for field in Row._fields[1:6]}
-    own = Row(name=errors.name("name of the row", name), score=score(found), **values)
-    return tuple(sorted((*SIMULATION[trace.scenario.plant.name]["v2"], own), key=lambda row: -row.score))
+    published = SIMULATION[robot]["v2"]
+    own = Row(name=_new_name(name, published), score=score(found), **values)
+    return tuple(sorted((*published, own), key=lambda row: -row.score))
 
 
 def robustness_board(robot: str, found: Robustness, name: str = NAME) -> tuple[RobustnessRow, ...]:
     """Return the rows of the robustness board of a robot, with a result of this name among them.
 
     Raises:
-      ScenarioError: another robot, or a name that cannot be printed.
+      ScenarioError: another robot, or a name that cannot be printed or is that of a published row.
     """
     shoulder_first(robot)
-    own = RobustnessRow(name=errors.name("name of the row", name), score=found.score, **found.percent)
+    own = RobustnessRow(name=_new_name(name, ROBUSTNESS[robot]), score=found.score, **found.percent)
     return tuple(sorted((*ROBUSTNESS[robot], own), key=lambda row: -row.score))
+
+
+def _ruled(scenario: Scenario) -> dict[str, object]:
+    """Return what the rules fix of a run, by name: the plant's parameters, and the fields that are not in DESIGN."""
+    resolved = scenario.resolved
+    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in DESIGN]
+    return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in fields}}
+
+
+def _new_name(name: str, published: tuple[Row, ...] | tuple[RobustnessRow, ...]) -> str:
+    """Return the name of a row if it can be printed and no published row has it."""
+    if errors.name("name of the row", name) in [row.name for row in published]:
+        raise errors.ScenarioError(f"name of the row is {name!r}, as of a published row: give another")
+    return name
 
 
 def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME) -> str:
