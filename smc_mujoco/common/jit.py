@@ -30,6 +30,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.utils import _dynamic_modname, _dynamic_module
 from numba.extending import intrinsic
 
+from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.rebuild import rebuild
 
@@ -302,11 +303,14 @@ WHEREABOUTS = re.compile(
 )
 
 
+COLOURS = re.compile(r"\x1b\[[\d;]*m")  # which numba writes where NUMBA_COLOR_SCHEME asks for them
+
+
 def reason(error: Exception) -> str:
-    """Return the line of a compiler's error that says what is wrong."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip(" ^~.")]
+    """Return the line of a compiler's error that says what is wrong. It may quote a user's texts."""
+    lines = [line.strip() for line in COLOURS.sub("", str(error)).splitlines() if line.strip(" ^~.")]
     telling = [line for line in lines if not WHEREABOUTS.match(line)]
-    return (telling or lines or [type(error).__name__])[0].removeprefix("TypingError: ")
+    return printable((telling or lines or [type(error).__name__])[0].removeprefix("TypingError: "))
 
 
 # Raises out of bounds and at division by zero. Without wrappers for Python, which would take half the time to compile.

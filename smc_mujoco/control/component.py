@@ -13,7 +13,7 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypedDict
 
@@ -189,6 +189,8 @@ def _value(name: str, value: object, **limits: Any) -> Value:
         if not isinstance(listed, Sequence) or not listed:
             raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
         return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))
+    if isinstance(value, Mapping | Set):
+        raise ScenarioError(f"{name} is {shown(value)}: give a number, or a list of one for each driven channel")
     return number(name, value, **limits)
 
 
@@ -250,6 +252,10 @@ class Template:
 
     degree = renamed("degree", RENAMED["degree"])
     modelled = renamed("modelled", RENAMED["modelled"])
+
+    def __repr__(self) -> str:
+        gains = "".join(f", {name}={written(gain.default)}" for name, gain in self.gains.items())
+        return f"<Template of {self.kind}({self.name!r}{gains})>"
 
     @property
     def defaults(self) -> dict[str, float]:

@@ -6,13 +6,18 @@ from typing import Any
 from numba import njit
 
 import smc_mujoco as smc
-from smc_mujoco.common.jit import jit
+from smc_mujoco.common.jit import jit, reason
 
 
 def names(function: Callable[..., Any] | None) -> dict[str, Any]:
     """Return what the names in a compiled function stand for."""
     compiled: Any = function
     return getattr(compiled, "py_func", compiled).__globals__
+
+
+def test_a_reason_that_quotes_a_user_s_text_has_no_codes_of_terminals():
+    error = ValueError("\x1b[1m\x1b[31mFailed in nopython mode\nit returns Literal[str](\x1b]0;owned\x07)\x1b[0m")
+    assert reason(error) == r"it returns Literal[str](\x1b]0;owned\x07)"
 
 
 def test_laws_share_the_package_s_helpers():

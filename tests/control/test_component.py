@@ -65,6 +65,17 @@ def test_word_that_cannot_be_drawn_is_refused(option):
         smc.law_function(**option)
 
 
+@pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])
+def test_gain_that_is_no_list_of_numbers_is_refused(value):
+    with pytest.raises(smc.ScenarioError, match=r"k is {.*: give a number, or a list of one for each driven channel$"):
+        smc.law("classical", k=value)
+
+
+def test_template_prints_as_name_and_gains():
+    template = smc.law_function(gains={"k": 2.0, "w": Gain((1.0, 0.5))})(lambda y, gains, memory: (0.0, 0.0))
+    assert repr(template) == "<Template of law('<lambda>', k=2, w=(1, 0.5))>"
+
+
 def test_builtin_without_a_signature_is_refused():
     with pytest.raises(smc.ScenarioError, match=r"law 'type' takes \(y, gains, memory\)"):
         smc.law_function()(type)

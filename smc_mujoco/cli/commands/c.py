@@ -56,7 +56,7 @@ def check_c(
 
 @errors_as_sentences()
 def export_c(
-    law: options.LawName,
+    law: options.LawOrFile,
     gains: Annotated[
         str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
     ] = "",
@@ -72,6 +72,8 @@ def export_c(
     double precision it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same
     bits.
 
+    A Python file has one law, made by @smc.law_function.
+
     A law of many joints is written for a number of joints. Its gains may have one value for each joint, as in
     --gains "k=8 20 15,c=5".
 
@@ -79,9 +81,7 @@ def export_c(
     """
     with held_back():
         from smc_mujoco.control.c.export import law_to_c
-        from smc_mujoco.control.c.load import parsed_gains
-        from smc_mujoco.control.law import law as find
 
     with options.joints_as_option():
-        text = law_to_c(find(law, **parsed_gains(gains, "--gains")), numbers, joints)
+        text = law_to_c(options.law_with(law, gains), numbers, joints)
     print(text, end="")

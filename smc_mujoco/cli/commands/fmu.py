@@ -14,7 +14,7 @@ from smc_mujoco.common.interrupts import held_back
 
 @errors_as_sentences()
 def export_fmu(
-    law: options.LawName,
+    law: options.LawOrFile,
     gains: Annotated[
         str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
     ] = "",
@@ -41,7 +41,7 @@ def export_fmu(
     The file contains C source code and a binary for this machine; it needs no Python. Its inputs are x, v (unless an
     estimator replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s. All gains are
     tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
-    it gives the bits of `smc-mujoco run`.
+    it gives the bits of `smc-mujoco run`. A Python file has one law, made by @smc.law_function.
 
     A law of many joints has a variable for each element: x[1], x[2], M[1,1]. Its inputs are also those of M, h, g, the
     matrix C of Coriolis forces and the tip's Jacobian J that it reads. Its gains may have one value for each joint, as
@@ -52,11 +52,9 @@ def export_fmu(
     with held_back():
         from smc_mujoco.control import estimator
         from smc_mujoco.control import surface as surfaces
-        from smc_mujoco.control.c.load import parsed_gains
-        from smc_mujoco.control.law import law as find
         from smc_mujoco.simulation.fmu.export import export_fmu as export
 
-    chosen = find(law, **parsed_gains(gains, "--gains"))
+    chosen = options.law_with(law, gains)
     parts = {
         "surface": surface and options.component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
         "velocity": velocity

@@ -57,6 +57,10 @@ Json = Annotated[
     ),
 ]
 LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law from the table of `smc-mujoco laws`.")]
+LawOrFile = Annotated[
+    str,
+    typer.Argument(metavar="LAW|FILE.py", help="A law from the table of `smc-mujoco laws`, or a file with your own."),
+]
 PlantName = Annotated[
     str,
     typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model."),
@@ -190,6 +194,26 @@ def laws_of(text: str) -> "list[Law]":
     if not own:
         raise ScenarioError(f"{text} has no law: write @smc.law_function above a function (y, gains, memory)")
     return list(own.values())
+
+
+def law_with(text: str, gains: str) -> "Law":
+    """Return a law by its name, or the one law of a Python file, with the gains of the option --gains.
+
+    Raises:
+      ScenarioError: an unknown law, a file without a law or with several, or bad gains.
+    """
+    from smc_mujoco.control.c.load import parsed_gains
+    from smc_mujoco.control.law import law as find
+
+    values = parsed_gains(gains, "--gains")
+    if not text.endswith(".py"):
+        return find(text, **values)
+    made, *others = laws_of(text)
+    if others:
+        names = ", ".join(one.name for one in (made, *others))
+        raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
+    assert made.template is not None
+    return made.template.bind(values, warn=True)
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:

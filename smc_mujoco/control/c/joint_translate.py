@@ -56,7 +56,6 @@ HELPERS |= {  # numpy's, as numba compiles them: NaN stays NaN
     "lesser": "a <= b || a != a ? a : b",
     "greater": "a >= b || a != a ? a : b",
     "sign": "a > 0 ? 1 : a < 0 ? -1 : a",
-    "wrapped": "a < 0 ? a + b : a",  # an index from the end, as in Python
 }
 # Functions of numpy with elements -> the same in C.
 OF_MATH = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
@@ -98,14 +97,12 @@ class ArrayFunction(Function):
       before: lines that belong before the present one, such as loops that fill arrays.
       temporaries: name -> kind of arrays for results within expressions.
       fixed: whether nothing may move before the present line.
-      counters: variables of the present loops that are never negative.
     """
 
     program: JointProgram
 
     def __init__(self, *arguments: Any, **named: Any):
         self.frames: list[tuple[list[str], list[Value]]] = []
-        self.counters = set[str]()
         self.fixed = False
         super().__init__(*arguments, **named)
         self.check_sharing()
@@ -198,9 +195,7 @@ class ArrayFunction(Function):
             yield from self.block(node.body)
             yield "}"
         else:
-            self.counters |= {variable} if self.counts_naturals(node.iter) else set()
             yield from super().loop(node, variable)
-            self.counters.discard(variable)
 
     def returned(self, value: ast.expr) -> Iterator[str]:
         """Translate return."""
@@ -462,8 +457,7 @@ class ArrayFunction(Function):
                 continue
             index = self.outside(self.numeric, place)
             self.check_index(node, place, index, dimension)
-            if not self.natural(place):
-                index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
+            index = self.from_start(place, index, dimension)
             text = text.replace(token, index.within(PRODUCT))
             row = pointer and token == ROW and len(places) == 2
             pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(home.kind)[1]}" if row else ""
@@ -477,30 +471,9 @@ class ArrayFunction(Function):
         if dimension == SLOTS:
             if constant is None or constant < 0:
                 raise refuse(node, f"memory at {'a negative' if constant else 'an'} index that is not constant")
-            self.program.slots = max(self.program.slots, int(constant) + 1)
+            self.program.claim(node, int(constant))
         elif constant is not None and not 0 <= constant < self.program.size(dimension):
             raise refuse(node, f"an index out of 0 to {self.program.size(dimension) - 1}")
-
-    def counts_naturals(self, node: ast.expr) -> bool:
-        """Return whether no number of a range with a step of 1 or -1 is negative."""
-        match node:
-            case ast.Call(args=[_]):
-                return True
-            case ast.Call(args=[first, _]):
-                return self.natural(first)
-            case ast.Call(args=[first, last, step]):
-                end = self.constant(last)
-                return self.natural(first) if self.constant(step) == 1 else end is not None and end >= -1
-        return False
-
-    def natural(self, node: ast.expr) -> bool:
-        """Return whether an index is certainly not negative."""
-        match node:
-            case ast.Name(id=name) if name in self.counters:
-                return True
-            case ast.BinOp(left=left, op=ast.Add() | ast.Mult() | ast.Mod(), right=right):
-                return self.natural(left) and self.natural(right)
-        return (constant := self.constant(node)) is not None and constant >= 0
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         return self.elementwise(super()._unaryop, node)

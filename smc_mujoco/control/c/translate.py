@@ -49,12 +49,13 @@ SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
 ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # integers in Python, floating-point in C
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
-# Python's min, max, abs and % of integers: functions that the C file defines if it uses them.
+# Python's min, max, abs, and % and indices of integers: functions that the C file defines if it uses them.
 HELPERS = {
     "minimum": "b < a ? b : a",
     "maximum": "b > a ? b : a",
     "absolute": "a < 0 ? -a : a",
     "modulo": "(a % b + b) % b",
+    "wrapped": "a < 0 ? a + b : a",  # an index from the end
 }
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
@@ -142,6 +143,14 @@ class Program:
         self.used_names.add(unique)
         return unique
 
+    def claim(self, node: ast.AST, slot: int) -> None:
+        """Take a slot of the memory. Refuse one that the component does not have."""
+        size = self.component.memory
+        if slot >= size:
+            code = shown(ast.unparse(node))[1:-1]
+            raise Untranslatable(f"it uses {code}, and its memory has {size} numbers: give memory={slot + 1}")
+        self.slots = max(self.slots, slot + 1)
+
     def helper(self, name: str, kind: str) -> str:
         """Return the C name of a helper or a power such as power_3, for numbers of a kind."""
         function = name if name in POWERS and kind == "real" else f"{name}_{kind}"
@@ -211,12 +220,15 @@ class Function:
       kinds: of its arguments.
       constants: arguments replaced by literal numbers.
       entry: whether it is the component's own function.
+
+    Attributes:
+      counters: variables of the present loops that are never negative.
     """
 
     def __init__(
         self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], entry: bool = False
     ):
-        self.program, self.constants, self.entry = program, constants, entry
+        self.program, self.constants, self.entry, self.counters = program, constants, entry, set[str]()
         written, self.tree = parsed(function)
         cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
         self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
@@ -407,11 +419,13 @@ class Function:
             raise refuse(node.target, "a loop over a variable that exists already")
         name = self.c_name(variable)
         self.names[variable] = Value(name, "int")
+        self.counters |= {variable} if self.counts_naturals(call) else set()
         first, last = bounds if len(bounds) == 2 else (Value("0", "int"), bounds[0])
         sign, change = ("<", "++") if step == 1 else (">", "--")
         yield f"for (int32_t {name} = {first.text}; {name} {sign} {last.within(SUM)}; {name}{change}) {{"
         yield from self.block(node.body)
         yield "}"
+        self.counters.discard(variable)
         del self.names[variable]
 
     def returned(self, value: ast.expr) -> Iterator[str]:
@@ -504,7 +518,9 @@ class Function:
             raise refuse(node, "an index that is not an integer")
         if isinstance(array, tuple | list | np.ndarray):
             constants = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
-            return Value(f"{constants.text}[{index.text}]", constants.kind)
+            if (place := self.constant(node.slice)) is not None and not -len(array) <= place < len(array):
+                raise refuse(node, f"an index out of {-len(array)} to {len(array) - 1}")
+            return Value(f"{constants.text}[{self.from_start(node.slice, index, len(array)).text}]", constants.kind)
         home = self.value(node.value)
         if home.kind != "memory":
             raise refuse(node, "an element")
@@ -514,8 +530,35 @@ class Function:
         if place is None or place < 0:
             why = "at an index that is not constant" if place is None else "at a negative index"
             raise refuse(node, f"memory {why}")
-        self.program.slots = max(self.program.slots, int(place) + 1)
+        self.program.claim(node, int(place))
         return Value(f"{home.text}[{index.text}]", "real")
+
+    def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
+        """Return an index that counts from the end if it is negative, as in Python, as one from the start."""
+        if self.natural(place):
+            return index
+        return Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {length})", "int")
+
+    def counts_naturals(self, node: ast.expr) -> bool:
+        """Return whether no number of a range with a step of 1 or -1 is negative."""
+        match node:
+            case ast.Call(args=[_]):
+                return True
+            case ast.Call(args=[first, _]):
+                return self.natural(first)
+            case ast.Call(args=[first, last, step]):
+                end = self.constant(last)
+                return self.natural(first) if self.constant(step) == 1 else end is not None and end >= -1
+        return False
+
+    def natural(self, node: ast.expr) -> bool:
+        """Return whether an index is certainly not negative."""
+        match node:
+            case ast.Name(id=name) if name in self.counters:
+                return True
+            case ast.BinOp(left=left, op=ast.Add() | ast.Mult() | ast.Mod(), right=right):
+                return self.natural(left) and self.natural(right)
+        return (constant := self.constant(node)) is not None and constant >= 0
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):

@@ -289,6 +289,9 @@ def _description(file: Path, digest: str) -> Any:
     if not zipfile.is_zipfile(file):
         raise ScenarioError(f"{file.name} is not an FMU, as it is no zip archive: {CURE}")
     try:
+        with zipfile.ZipFile(file) as archive:
+            if (wanted := "modelDescription.xml") not in archive.namelist():
+                raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
         folder = _extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:

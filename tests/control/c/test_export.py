@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.compiler import needs_compiler
 from helpers.sources import strange
 
 import smc_mujoco as smc
@@ -23,10 +24,7 @@ from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.reference import gains_of
 
-pytestmark = pytest.mark.skipif(
-    subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
-    reason="there is no C compiler here",
-)
+pytestmark = needs_compiler
 
 LAWS = catalogue()
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
@@ -196,7 +194,7 @@ def turns(z, K, state):
         count += 1
         if count == 2:
             continue
-        double += QUARTERS[count - 1] / 4
+        double += QUARTERS[count - 3] / 4  # from the end, the first time
     if abs(a) > WIDTH and not b < 0.0:
         late = a
     elif -1.0 < b <= 0.0 or a == 0:
@@ -263,6 +261,8 @@ REFUSED = {
     "u = y.e if y.de else np.sign(y.e)": "sign",
     "memory[int(y.t)] = 1.0; u = 0.0": "memory at an index that is not constant",
     "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
+    "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
+    "u = TABLE[2]": "an index out of -2 to 1",
     "for u in (y.e, y.de): pass": "a loop over anything but a range",
     "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
     "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
@@ -283,7 +283,7 @@ REFUSED = {
 @pytest.mark.parametrize(("line", "words"), REFUSED.items())
 def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
     text = (
-        "import numpy as np\nimport smc_mujoco as smc\n"
+        "import numpy as np\nimport smc_mujoco as smc\nTABLE = 1.0, 2.0\n"
         "def halts(a):\n    while a:\n        return a\n"
         "def again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
         f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
@@ -332,6 +332,7 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
         (["twisting", "--gains", "r3=1"], "unknown gain of twisting 'r3'"),
         (["twisting", "--gains", "r1=-1"], "twisting's r1 is -1: give a number greater than 0"),
         (["twisting", "--gains", "r1"], "--gains is 'r1': give names and numbers"),
+        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
@@ -341,6 +342,19 @@ def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
     assert (end.value.code, printed.out) == (2, "")
     assert printed.err.startswith(f"smc-mujoco: {said}")
     assert len(printed.err.splitlines()) == 1
+
+
+def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
+    one = "@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
+    (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-c", str(file), "--gains", "k=4"])
+    assert not end.value.code
+    assert 'smc_law_gains[] = "k=4.0";' in capsys.readouterr().out
+    file.write_text(f"{file.read_text()}{one.replace('mine', 'other')}")
+    with pytest.raises(SystemExit):
+        cli.main(["export-c", str(file)])
+    assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
 
 
 def test_what_is_no_law_or_is_in_c_already_is_refused(folder):

@@ -15,6 +15,7 @@ from smc_mujoco.control.c.javascript import to_js
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement, catalogue
 
+TENTHS = 0.1, 0.2, 0.3
 CALLS = 40  # of each component, with random measurements and one memory
 SCRIPT = """
 import fs from "node:fs";
@@ -97,7 +98,7 @@ def test_whole_numbers_and_loops_are_as_in_python(tmp_path):
         for i in range(1, 4):
             total += y.e / (i + 1)
         place = int(y.x * 10.0)
-        return total + (place & 3), math.floor(y.v) * gains.k
+        return total + (place & 3) + TENTHS[(place & 1) - 1], math.floor(y.v) * gains.k
 
     assert compared([counted()], tmp_path)["counted"] < 1e-14
 

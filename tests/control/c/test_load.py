@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
@@ -22,10 +23,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import reference
 from smc_mujoco.studies import run_key
 
-pytestmark = pytest.mark.skipif(
-    subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
-    reason="there is no C compiler here",
-)
+pytestmark = needs_compiler
 
 DOCS = Path(smc.__file__).parents[1] / "docs" / "c.md"
 MINE, HEADER = re.findall(r"^```c\n(.*?)^```$", DOCS.read_text(), re.MULTILINE | re.DOTALL)
@@ -308,6 +306,7 @@ def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
         (law("out[0] = other(y->e);", "double other(double);\n/* -Wl,-z,defs */"), "undefined reference to `other'"),
         (law("out[0] = other(y->e);"), "implicit declaration of function 'other'"),
         (MINE.replace("k1=2.5", "k1"), "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers"),
+        (MINE.replace("k1=2.5", "k1=nan"), "smc_law_gains is 'lam=6,k1=nan', and k1 is nan: give it a number"),
         (MINE.replace("k1=2.5", "lam=2"), "my_law.c's smc_law_gains is 'lam=6,lam=2': give lam once"),
         (MINE + "const int smc_law_degree = 5;", "degree is 5: give a whole number from 1 to 3"),
         (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
@@ -598,6 +597,8 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
         (3, {}, "cannot take a law from 3"),
         (None, {"gains": {"k2": 1.0}}, "unknown gain of my_law.c 'k2': choose from k1, lam"),
         (None, {"gains": 3}, "gains is 3: give names"),
+        (None, {"gains": {"k1": np.nan}, "isolate": True}, "default of gain k1 is nan: give a finite number"),
+        (None, {"gains": {"k1": np.ones(2)}}, "gain k1 of my_law.c is (1, 1): give it one number"),
         (None, {"memory": 0}, "memory is 0"),
         (".", {}, "cannot take a law from '.': give a .c file"),
         (None, {"timeout": 0}, "timeout is 0"),

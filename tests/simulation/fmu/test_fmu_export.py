@@ -14,6 +14,7 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from fmpy.validation import validate_fmu  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
 from helpers.pages import ROOT, titled  # noqa: E402
 
@@ -26,10 +27,7 @@ from smc_mujoco.control.law import catalogue  # noqa: E402
 from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
 from smc_mujoco.simulation.fmu import description  # noqa: E402
 
-pytestmark = pytest.mark.skipif(
-    subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
-    reason="there is no C compiler here",
-)
+pytestmark = needs_compiler
 
 REFERENCE = smc.Sine(0.2, 3.0)
 SURFACES = surface.catalogue()
@@ -476,15 +474,16 @@ def test_the_command_writes_what_it_is_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--surface", "linear(d=3)"], "unknown gain of linear 'd'"),
-        (["--velocity", "levan"], "unknown velocity estimator 'levan': did you mean 'levant'?"),
-        (["--velocity", "levant(3)"], "velocity estimator 'levant(3)' cannot be read: write it as levant(L=4800)"),
-        (["--gains", "k1"], "--gains is 'k1': give names and numbers"),
+        (["super_twisting", "--surface", "linear(d=3)"], "unknown gain of linear 'd'"),
+        (["super_twisting", "--velocity", "levan"], "unknown velocity estimator 'levan': did you mean 'levant'?"),
+        (["super_twisting", "--velocity", "levant(3)"], "velocity estimator 'levant(3)' cannot be read: write it as "),
+        (["super_twisting", "--gains", "k1"], "--gains is 'k1': give names and numbers"),
+        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(words, said, capsys):
     with pytest.raises(SystemExit) as end:
-        cli.main(["export-fmu", "super_twisting", *words])
+        cli.main(["export-fmu", *words])
     printed = capsys.readouterr()
     assert (end.value.code, printed.out) == (2, "")
     assert printed.err.startswith(f"smc-mujoco: {said}")

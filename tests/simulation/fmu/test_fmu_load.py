@@ -12,10 +12,10 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from helpers import fmu as helper  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
-from smc_mujoco.control.c import build  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.simulation.fmu import load  # noqa: E402
@@ -23,7 +23,7 @@ from smc_mujoco.simulation.fmu.slave import Slave  # noqa: E402
 from smc_mujoco.simulation.reference import gains_of  # noqa: E402
 
 pytestmark = [
-    pytest.mark.skipif(build.timed(["sh", "-c", "command -v ${CC:-cc}"], 10.0).returncode != 0, reason="no C compiler"),
+    needs_compiler,
     pytest.mark.filterwarnings("ignore::smc_mujoco.PlainLoopWarning"),
 ]
 FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
@@ -279,7 +279,7 @@ def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
         archive.writestr("other.xml", "")
     for path, said in (
         (tmp_path / "text.fmu", "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation"),
-        (tmp_path / "empty.fmu", "empty.fmu is not an FMU ("),
+        (tmp_path / "empty.fmu", "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for"),
         (tmp_path / "none.fmu", f"there is no file '{tmp_path / 'none.fmu'}': give the path of an .fmu file"),
         (3, "cannot take a law from 3: give the path of an .fmu file"),
     ):

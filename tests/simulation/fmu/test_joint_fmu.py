@@ -12,6 +12,7 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers import arms  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
 from numba import njit  # noqa: E402
 
@@ -21,10 +22,7 @@ from smc_mujoco.control.c import build  # noqa: E402
 from smc_mujoco.control.joint_law import catalogue, product  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 
-pytestmark = pytest.mark.skipif(
-    subprocess.run(["sh", "-c", "command -v ${CC:-cc}"], capture_output=True, check=False).returncode != 0,
-    reason="there is no C compiler here",
-)
+pytestmark = needs_compiler
 
 REFERENCE = smc.Sine(0.2, 5.0)
 JOINTS = (1, 2, 3)
