@@ -33,6 +33,11 @@ class Machine:
         """Name of each law -> its label, in the order of the rig."""
         return {law.name: words.style.law_name(law) for law in self.rig.laws}
 
+    @property
+    def colours(self) -> dict[str, str]:
+        """Name of each law -> its colour, all different."""
+        return dict(zip(self.laws, words.style.law_colours(self.rig.laws), strict=True))
+
     def unit(self, metric: str) -> str:
         """Return the unit of a metric on this machine."""
         scenario = self.rig.scenario("none")

@@ -90,11 +90,12 @@ def either(units: Iterable[str]) -> str:
 
 def typeset(unit: str) -> str:
     """Return a unit with its dots and powers: "rad s^2" as "rad·s²"."""
-    return re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²")).replace(" ", "·")
+    return re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²")).replace(" ", "·").replace("·of·", " of ")
 
 
 def pretty(text: str) -> str:
-    """Return a sentence of the audit, written in ASCII, with mathematical signs and proper names."""
+    """Return a sentence of the audit, written in ASCII, with mathematical signs and proper names; no backquotes."""
+    text = text.replace("`", "")
     signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
     text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
     names = {name: plant(name) for name in plants()} | {name: law(name).lower() for name in laws()}

@@ -316,6 +316,9 @@ def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     again = picture(seen.page)
     seen.page.locator("#play").click()
     assert np.abs(drawn - again).max() == 0.0
+    x, y = map(round, seen.page.evaluate("(({ x, y }) => [x, y])(live.stage.parts()[1])"))
+    seam = again[20:-20, x - 1] if x else again[y - 1, 20:-20]  # the corners are round
+    assert np.ptp(seam, axis=0).max() == 0.0  # nothing of the plant before
 
 
 def test_two_laws_have_the_colours_of_the_figures(seen, page):

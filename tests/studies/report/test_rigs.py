@@ -71,6 +71,7 @@ def test_every_law_of_the_machine_runs_on_every_set(work):
     qube = smc.rig("qube_servo")
     assert list(machine.laws) == [law.name for law in qube.laws]
     assert machine.laws["state_feedback"] == "Rig's state feedback"
+    assert len(set(machine.colours.values())) == len(qube.laws)
     for board in machine.boards:
         assert [block.condition for block in board.blocks] == list(qube.members())
         assert len(machine.medians(board.metric, "relay")) == len(qube.members())

@@ -366,6 +366,7 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.slow, preserveDrawingBuffer: this.slow });
     canvas.addEventListener("webglcontextrestored", () => this.drawAll());
     this.setGrade(this.slow ? 2 : 0);
+    this.renderer.setClearAlpha(0); // of what is between two machines
     this.renderer.setScissorTest(true);
     this.camera = new THREE.PerspectiveCamera();
     this.machines = [];
@@ -408,6 +409,9 @@ export class Stage {
   // Show simulations, with their colours.
   show(simulations, colours) {
     for (const machine of this.machines) machine.dispose();
+    this.renderer.setScissorTest(false);
+    this.renderer.clear(); // else the machines of before stay in the seam
+    this.renderer.setScissorTest(true);
     this.machines = simulations.map((simulation, i) => new Machine(simulation, colours[i]));
     this.furnish();
     this.beside = simulations[0].plant.beside;

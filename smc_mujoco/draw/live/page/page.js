@@ -244,6 +244,7 @@ const GREEK = { lam: "λ", alpha: "α", beta: "β", gamma: "γ", delta: "δ", mu
 // Return a formula with Greek letters, exponents, primes and subscripts instead of plain text.
 function pretty(text) {
   return text
+    .replace(/\bde\b/g, "e'")
     .replace(/\b([A-Za-z]+)(?![\w(])/g, (word) => (Object.hasOwn(GREEK, word) ? GREEK[word] : word))
     .replace(/\^2\b/g, "²").replace(/\^3\b/g, "³").replace(/\^\(1\/2\)/g, "^½").replace(/<=/g, "≤").replace(/''/g, "″").replace(/'/g, "′").replace(/ - |(?<=[= (])-(?=\S)/g, (minus) => minus.replace("-", "−"))
     .replace(/\b([a-zA-Z])([0-9])\b/g, (_, letter, digit) => letter + "₀₁₂₃₄₅₆₇₈₉"[digit]);
@@ -266,7 +267,7 @@ function writeNames() {
   const [{ unit }, free] = channels;
   $("plant").value = chosen.plant;
   $("equation").textContent = pretty(equation);
-  $("cap-x").textContent = `x, position (${unit})${free ? `; pale: ${free.name} (${free.unit})` : ""}`;
+  $("cap-x").textContent = `x, ${unit === "rad" ? "angle" : "position"} (${unit})${free ? `; pale: ${free.name} (${free.unit})` : ""}`;
   $("cap-u").textContent = `u, command (${effort.replace(" ", " ")}), and its bound`;
   $("cap-s").textContent = "s, sliding variable";
   $("cap-phase").textContent = `Phase plane: v (${unit}/s) over x; dashed: s = 0`;
