@@ -91,6 +91,8 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     """Return the largest gains for the law of a scenario. Arguments and errors are those of `gains_for`."""
     if amplitude is None and frequency is None:
         raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
+    if not base.law.uniform:
+        raise ScenarioError(f"gains_for searches one number for each gain of all channels, not {base.law}: give one")
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None:
             number(name, value, above=0.0)
@@ -164,10 +166,10 @@ def _scaled(law: Component, size: float, speed: float) -> Component:
 
 def _strength(base: Scenario) -> float:
     """Return how many times larger the forces among the gains can be: until the first is the actuator's limit."""
-    law, u_max = base.law, min(base.limits)
-    rest = np.zeros(base.plant.n)
-    _, g = base.plant.nominal(rest, rest, 0, base.plant.values({}))
-    force = u_max * abs(g) if base.resolved.model == "nominal" else u_max
+    law, plant, u_max = base.law, base.plant, min(base.limits)
+    rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model == "nominal"
+    accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
+    force = min(accelerations) if with_model else u_max
     most = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
     most |= search_space.largest(law, {}, u_max)
     sizes = [most[name] / abs(gain) for name, gain in law.gains.items() if name in most and 0.0 < abs(gain) < math.inf]

@@ -82,6 +82,12 @@ class Loop:
     def __init__(self, scenario: Scenario, channel: int = 0, late: float = 0.0):
         self.scenario, self.channel, self.late, s = scenario, channel, late, scenario.resolved
         plant = s.plant
+        for joint, low, high in plant.ranges:
+            if not low <= 0.0 <= high:
+                raise ScenarioError(
+                    f"chattering is predicted about x = 0, and joint {joint!r} of {plant.name} is from {low:g} to "
+                    f"{high:g}: measure it in a run, with smc.score, or choose another plant"
+                )
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise()

@@ -7,8 +7,9 @@
 
 All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
-The rule. X and V are the largest |x| and |v| of the grid. A run is home while |x| <= 2 % of X and |v| <= 2 % of V on
-every channel, and near while its distance (x/X)^2 + (v/V)^2 is below (0.2 %)^2, a tenth of that. Every state is run for
+The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the distance from the reference. A run is
+home while |e| <= 2 % of X and |v| <= 2 % of V on every channel, and near while its distance (e/X)^2 + (v/V)^2 is below
+(0.2 %)^2, a tenth of that. Every state is run for
 15 % of the duration. Undecided states are run again, from the beginning, for 40 %, and the rest for the whole duration.
 (Runs are deterministic. All this costs at most 1.55 times a whole run.)
 - It converges, early: home throughout the last third of the run, with a distance that is smaller by a tenth in the
@@ -41,7 +42,7 @@ from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.conventions import BAND, last
+from smc_mujoco.metrics.conventions import BAND, error, last
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, case
 from smc_mujoco.simulation.run import stream
@@ -52,7 +53,7 @@ HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 LATE = 3  # an early verdict considers the last third of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 STILL = 1e-6  # of X, V and u_max
-LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the distance (x/X)^2 + (v/V)^2: two factors, a size
+LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the distance (e/X)^2 + (v/V)^2: two factors, a size
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
@@ -194,10 +195,11 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
     far = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
-    distance = np.maximum(np.abs(trace.x / far[0]), np.abs(trace.v / far[1])).max(axis=1)
+    e = error(trace)
+    distance = np.maximum(np.abs(e / far[0]), np.abs(trace.v / far[1])).max(axis=1)
     late = last(trace) if final else slice(-(distance.size // LATE), None)
     home = distance[late] <= BAND
-    square = ((trace.x / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
+    square = ((e / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
     start, square = square[0], square[late]
     middle = square.size // 2
     sooner, later = square[:middle].max(), square[middle:].max()

@@ -3,7 +3,7 @@
 Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3 rad or m a step.
 It converges quadratically where J has full rank, and stays bounded where the arm is stretched. MuJoCo's Jacobians are
 exact and at hand; a package such as mink would add a solver of quadratic programs, which this problem does not need.
-Joints keep to their ranges.
+Joints keep to their ranges. Those that are not searched are where runs start.
 """
 
 import dataclasses
@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number
+from smc_mujoco.mechanisms.hardware.part import initial_pose
 from smc_mujoco.mechanisms.plant import Plant
 
 CLOSE = 1e-9  # m and rad, of the tip
@@ -33,6 +34,7 @@ class Tip:
     def __post_init__(self):
         self.model = self.plant.load()
         self.data = mujoco.MjData(self.model)
+        self.data.qpos[:] = initial_pose(self.model)
         kind, name = ("site", self.site) if self.site is not None else ("body", self.body)
         count = self.model.nsite if kind == "site" else self.model.nbody
         names = [getattr(self.model, kind)(i).name for i in range(count)]

@@ -1,27 +1,32 @@
 """Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
 
 The tip is the site that `plant.tip` names. Its path follows from the joints' positions. Forces of contact are MuJoCo's
-at the logged state under the logged command: those of the sample, not means over a control period. They are unknown if
-an actuator has a state that a trace lacks, such as a motor's current or the rotor behind a backlash. The state of a
-friction does not matter: a sliding contact's spring carries 99 % of a change of load, see
-`mechanisms.hardware.contact`. Joints without a channel are taken to be where they start.
+at the logged state under the logged command and disturbances: those of the sample, not means over a control period.
+They are unknown if an actuator has a state that a trace lacks, such as a motor's current or the rotor behind a
+backlash. Frictions that bristles or the callback compute are left out. That does not matter on an arm: a sliding
+contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`. Joints without a channel are taken
+to be where they start.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number
-from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids, joint_names
+from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import cut, groups
 from smc_mujoco.metrics.kept import kept
 from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation.reference import evaluate
+from smc_mujoco.simulation.signals import Push
 
 if TYPE_CHECKING:
     from smc_mujoco.mechanisms.plant import Plant
@@ -46,17 +51,20 @@ class Contacts(NamedTuple):
     push: np.ndarray
 
 
-def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
+def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = None) -> np.ndarray:
     """Return the tip's positions in space, m, (K, 3), at the channels' positions x, (K, n).
+
+    Args:
+      factors: of the true plant's parameters, see `Scenario.factors`. None: the nominal plant.
 
     Raises:
       ScenarioError: the plant has no tip.
     """
     if not plant.tip:
         raise ScenarioError(f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')")
-    model = plant.load()
+    model = plant.load(factors)
     data, site = mujoco.MjData(model), model.site(plant.tip).id
-    data.qpos[:] = assembly.initial_pose(model)
+    data.qpos[:] = initial_pose(model)
     places, found = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
     for k, each in enumerate(x):
         data.qpos[places] = each
@@ -67,8 +75,14 @@ def tip_path(plant: Plant, x: np.ndarray) -> np.ndarray:
 
 @kept
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`."""
-    paths = tip_path(trace.scenario.plant, trace.x), tip_path(trace.scenario.plant, trace.r)
+    """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`.
+
+    The actual one is that of the true plant, the wanted one that of the nominal plant.
+    """
+    scenario, jump = trace.scenario, _jump_sample(trace)
+    parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
+    actual = np.concatenate([tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)])
+    paths = actual, tip_path(scenario.plant, trace.r)
     for path in paths:
         path.flags.writeable = False
     return paths
@@ -107,17 +121,21 @@ def contacts(trace: Trace) -> Contacts:
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
+    scale = math.prod(part.scale for part in scenario.actuator)
+    pushes = [(model.body(d.body).id, d) for d in scenario.disturbance if isinstance(d, Push) and scenario.plant.direct]
     found, wrench = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3))), np.zeros(6)
     moves = model.body_weldid[model.geom_bodyid] != 0
-    data.qpos[:] = assembly.initial_pose(model)
-    jump = None if scenario.jump is None else -(-scenario.jump_step // scenario.steps)  # its first sample
+    data.qpos[:] = initial_pose(model)
+    jump = _jump_sample(trace)
     for k in range(len(trace.t)):
         if k == jump:
             assembly.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
-        data.qpos[positions], data.qvel[rates], data.ctrl[drives] = trace.x[k], trace.v[k], trace.applied[k, :n]
-        if scenario.plant.direct:
-            data.qfrc_applied[rates] = trace.d[k]
+        data.qpos[positions], data.qvel[rates], data.qfrc_applied[rates] = trace.x[k], trace.v[k], trace.d[k]
+        data.ctrl[drives] = scale * trace.applied[k, :n]
+        data.xfrc_applied[:] = 0.0
+        for body, push in pushes:
+            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * np.array([push.x, push.y, push.z])
         mujoco.mj_forward(model, data)
         for i in range(data.ncon):
             mujoco.mj_contactForce(model, data, i, wrench)
@@ -128,6 +146,12 @@ def contacts(trace: Trace) -> Contacts:
     for values in found:
         values.flags.writeable = False
     return found
+
+
+def _jump_sample(trace: Trace) -> int:
+    """Return the first sample of a trace at or after the jump of its scenario; the number of samples without one."""
+    scenario = trace.scenario
+    return len(trace.t) if scenario.jump is None else -(-scenario.jump_step // scenario.steps)
 
 
 def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:

@@ -55,6 +55,9 @@ class Chunk:
         for i, scenario in enumerate(scenarios):
             qpos[i], qvel[i] = assembly.start(self.model, scenario)
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
+        # those that the first scenario sets in the shared model, as they are where a scenario leaves them alone
+        set_fields = assembly.field_values(self.compiled, first, 0)
+        self.untouched = {name: array(self.compiled, name) for name in set_fields}
         self.errors: dict[int, str] = {}
         self.calls = 0  # of the callback that each simulation has had
         self.spare = mujoco.MjData(self.model)
@@ -77,7 +80,8 @@ class Chunk:
         """Set the true parameters that hold from a step on."""
         derived = []
         for i in indices:
-            for name, value in assembly.field_values(self.compiled, self.scenarios[i], step).items():
+            values = self.untouched | assembly.field_values(self.compiled, self.scenarios[i], step)
+            for name, value in values.items():
                 held = self.fields[name][i] if name in self.fields else array(self.model, name)
                 if np.any(held != value):
                     self.fields[name] = self.batch.expand(name)

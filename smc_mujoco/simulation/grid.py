@@ -125,7 +125,7 @@ def check_moving(seeds: Sequence[Scenario]) -> None:
 def _rests(scenario: Scenario) -> bool:
     """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
     moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
-    if moved or scenario.noise != Noise() or scenario.resolved.reference != REST:
+    if moved or scenario.feedforward or scenario.noise != Noise() or scenario.resolved.reference != REST:
         return False
     made = with_values(model([scenario]), scenario)
     data = mujoco.MjData(made)

@@ -15,7 +15,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.hardware.part import ROTOR, START, Part, joint_ids
+from smc_mujoco.mechanisms.hardware.part import ROTOR, Part, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import array, ready
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -90,12 +90,6 @@ def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dic
         values = found.setdefault(name, array(compiled, name).copy())
         values[at] = values[at] + value if adds else value
     return found
-
-
-def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
-    """Return the pose from which joints without a channel start, (nq,): the model's start keyframe, or else qpos0."""
-    key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
-    return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
 
 
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:

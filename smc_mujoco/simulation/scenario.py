@@ -603,7 +603,7 @@ def warn_of_units(s: Resolved) -> None:
 def _other_units(s: Resolved) -> Iterator[tuple[str, str]]:
     """Yield a sentence about each suspicious number, and what to give instead."""
     for name, factor in s.mismatch.items():
-        if MIN_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
+        if name not in s.plant.added and MIN_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
             yield (
                 f"mismatch makes {name} {factor:g} times the nominal one",
                 f"if it is {factor:g} % more, give {1 + factor / 100:g}",

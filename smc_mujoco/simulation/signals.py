@@ -222,7 +222,8 @@ class Push(Signal):
     """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on the arm.
 
     (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0: of impulse 2 width / pi times the peak.
-    A trace's d, the disturbances of the joints, does not show it.
+    A trace's d does not show it where disturbances act on joints, as on the panda and on users' models. Elsewhere d has
+    its force along the slide, or the torque of its horizontal part about the hinge, of the body that it pushes.
 
     Attributes:
       body: its name in the model.

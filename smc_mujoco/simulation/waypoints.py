@@ -103,7 +103,10 @@ def cartesian_path(
         raise ScenarioError(f"{plant.name} has joints without an actuator: a path in space needs all of them driven")
     if (site is None) == (body is None):
         raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give the name of one of them")
-    array = np.asarray(points, float) if np.ndim(points) == 2 else np.empty((0, 0))
+    try:
+        array = np.asarray(points, float)
+    except ValueError:  # rows of unequal lengths
+        array = np.empty(0)
     if array.shape != (len(times), 3):
         raise ScenarioError(
             f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} times"

@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.gains_for import _strength
 from smc_mujoco.metrics.limit_cycle import of_trace
 
 LAG = {"actuator": smc.Lag(0.01)}
@@ -26,6 +28,14 @@ def test_forces_among_the_gains_stay_at_the_actuators_limit():
     design = smc.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
     assert design.law.gains["k"] == pytest.approx(2.0)
     assert design.chattering.amplitude < 1.0
+
+
+def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
+    """With the model a gain is an acceleration, of which each joint has its own limit."""
+    law, limits, rest = smc.law("classical", k=2.0), (6.0, 0.5), np.zeros(2)
+    base = smc.Scenario(plant="double_pendulum", law=law, model="nominal", u_max=limits)
+    least = min(u * base.plant.nominal(rest, rest, i, base.plant.values({}))[1] for i, u in enumerate(limits))
+    assert _strength(base) == pytest.approx(least / 2.0)
 
 
 def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
@@ -64,8 +74,13 @@ def without_units(y, gains, memory):
         ("super_twisting", {"frequency": 10.0}, "oscillates at 14.* Hz at least"),  # ten times as fast it has no cycle
         ("classical", {"frequency": 100.0, "u_max": 0.005}, "are 800 times what u_max allows, .* at most 100 times"),
         (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
+        (
+            smc.law("classical", k=(1.0, 2.0)),
+            {"amplitude": 1.0, "plant": "double_pendulum"},
+            "one number for each gain",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence(law, wanted, said):
     with pytest.raises(smc.ScenarioError, match=said):
-        smc.gains_for(law, "duffing", **wanted, **LAG)
+        smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG)

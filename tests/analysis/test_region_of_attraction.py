@@ -94,6 +94,11 @@ def test_a_run_that_fails_does_not_converge():
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2
 
 
+def test_home_is_the_reference():
+    held = dataclasses.replace(base("duffing", smc.law("lqr"), 3.0), model="nominal", reference=smc.Constant(0.3))
+    assert maps.of(held, [0.0, 0.6], [0.0, 0.1]).outcome.tolist() == [[CONVERGES] * 2] * 2
+
+
 def test_a_turn_away_is_not_home():
     found = maps.of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]

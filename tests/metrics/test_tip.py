@@ -9,6 +9,7 @@ from helpers import arms
 
 import smc_mujoco as smc
 from smc_mujoco.draw.joints import mark_losses
+from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import tip
 from smc_mujoco.studies import arms as tasks
 
@@ -47,6 +48,24 @@ def test_tip_scores_are_of_the_distance_in_space(trace):
     assert away.max() > 0.05
 
 
+def test_the_actual_tip_is_that_of_the_true_plant(trace):
+    """An arm whose last link's length is a parameter: a mismatch moves the tip, and not the wanted one."""
+
+    def fields(model, p):
+        yield from trace.scenario.plant.fields(model, p)
+        yield Field("site_pos", model.site("tip").id, model.site_pos[model.site("tip").id] * p.share)
+
+    plant = dataclasses.replace(
+        trace.scenario.plant, fields=fields, parameters=dict(trace.scenario.plant.parameters) | {"share": 1.0}
+    )
+    longer = dataclasses.replace(trace.scenario, plant=plant, jump=smc.Jump(0.25, {"share": 1.1}))
+    actual, wanted = tip.tip_paths(dataclasses.replace(trace, scenario=longer))
+    before, same = tip.tip_paths(trace)
+    np.testing.assert_array_equal(wanted, same)
+    np.testing.assert_array_equal(actual[:250], before[:250])
+    assert np.linalg.norm(actual - before, axis=1)[250:].min() > 0.01
+
+
 def test_joint_scores_are_each_joints_own(trace):
     found = smc.joint_scores(trace)
     assert list(found) == ["reach", "turn", "lift"]
@@ -70,6 +89,25 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
         np.testing.assert_allclose(pressed.reaction[k], -A * felt, atol=0.05)
         assert found.force[k] == pytest.approx(felt, rel=5e-3)
         np.testing.assert_allclose(found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6)  # away from the wall
+
+
+def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
+    """A cart leans on a stop, whose reaction a trace has."""
+    pushed = {"feedforward": smc.Constant(4.0), "disturbance": smc.Constant(8.0)}
+    motor = smc.DCMotor(inductance=0.0)
+    cart = smc.Scenario(plant="duffing", law="none", contact="stops", x0=0.5, duration=2.0, actuator=motor, **pushed)
+    trace = smc.run(cart)
+    assert tip.contacts(trace).force[-1] == pytest.approx(-trace.reaction[-1, 0], rel=0.01)
+    assert trace.reaction[-1, 0] < -1.0
+
+
+def test_contact_forces_know_a_push(pressed):
+    """The wall's soft normal carries at most a hundredth of it at once, and the rest by depth."""
+    push = smc.Push("link7", x=30.0, time=0.5, width=0.1)
+    more = tip.contacts(changed(pressed, disturbance=push)).force - tip.contacts(pressed).force
+    assert np.abs(np.delete(more, np.s_[500:601])).max() < 1e-9
+    assert np.all(more[502:599] > 0.0)
+    assert more.max() <= 0.01 * 30.0
 
 
 def changed(trace, **fields):
@@ -108,9 +146,11 @@ LIFTED = """
 
 
 def test_joints_without_a_channel_are_where_they_start():
-    """A lift that holds the arm 0.7 m higher than the model's qpos0."""
+    """A lift that holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
     plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
     np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
+    (turn,) = smc.cartesian_path(plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5])
+    np.testing.assert_allclose(tip.tip_path(plant, np.array([[turn.values[-1]]])), [[0.4, 0.0, 1.3]], atol=1e-6)
 
 
 def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):

@@ -309,7 +309,8 @@ def test_grid_asks_where_a_model_at_rest_starts(arm):
     with pytest.raises(smc.ScenarioError, match=r"arm starts at rest at 0 .* 'nominal'.*smc.starts\(x0=0.5\) or --x0"):
         smc.grid(["duffing", arm], law, ["noise", "nominal"], 2)
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
-    assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 10
+    moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
+    assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
     assert len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2  # seed 0 alone starts at 0
     held = ARM.replace('fromto="0 0 0 0 0 -0.4"', 'fromto="0 0 0 0.4 0 0"')
     assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it

@@ -54,6 +54,7 @@ def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
     for fields in ({"x0": 1.5 * math.tau}, {"x0": 1e3}, {"reference": smc.Ramp(100.0)}, {"v0": 100.0}):
         dataclasses.replace(PENDULUM, **fields)
     smc.Scenario(plant="duffing", law="none", x0=30.0)
+    smc.Scenario(plant="panda", law="none", mismatch={"payload": 10.0})  # kg, and no factor
     smc.Scenario(plant="cart_pole", law="none", x0=(30.0, 0.1), reference=smc.Constant(30.0))
     with pytest.warns(smc.ScenarioWarning, match="x0 is 30 rad"):
         smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 30.0))

@@ -154,6 +154,10 @@ REFUSED = {
     "no tip": (lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2), "site is None and body is None"),
     "unknown site": (lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"), "unknown site of arm 'tp'"),
     "one coordinate": (lambda: smc.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"), "give a position (x, y, z)"),
+    "two and three coordinates": (
+        lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
+        "give a position (x, y, z)",
+    ),
     "beyond reach": (
         lambda: smc.cartesian_path("double_pendulum", (0, 1), [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)], body="lower"),
         "the tip of double_pendulum does not reach",

@@ -287,9 +287,11 @@ def native_dynamics() -> Function:
         for i in range(n):
             for j in range(n):
                 output[n * i + j] = dense[table[n + i], table[n + j]]
-        for j in range(n):
-            output[n * n + n + j] = math.nan
-        first = 0 if own[15] != 0.0 else 1
+        first = 0
+        if own[15] == 0.0:  # without g
+            first = 1
+            for j in range(n):
+                output[n * n + n + j] = math.nan
         for part in range(first, 2):  # g, then h, so that the velocities are those of the sample afterwards
             for j in range(n):
                 qvel[table[n + j]] = part * given[n + j]

@@ -160,3 +160,9 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' degrees of freedom, (n,)."""
     return model.jnt_dofadr[joint_ids(model)]
+
+
+def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
+    """Return the pose from which joints without a channel start, (nq,): the model's start keyframe, or else qpos0."""
+    key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
+    return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()
