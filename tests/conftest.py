@@ -51,25 +51,37 @@ QUICK = {
     "testing/test_step_responses.py",
 }
 
-# Files that take longest: more than about 20 s of processor time. They come first, so that no core is left with one.
+# Files that take longest: more than about 10 s. They come first, so that no core is left with one.
 LONG = {
     "analysis/test_chattering.py",
     "analysis/test_gains_for.py",
     "analysis/tuning/test_search.py",
     "cli/test_main.py",
+    "control/c/test_joint_c.py",
     "control/c/test_load.py",
     "draw/film/test_film.py",
+    "draw/live/test_live_page.py",
     "draw/test_figure.py",
+    "draw/test_figure_looks.py",
+    "envs/test_gymnasium_env.py",
+    "mechanisms/custom/test_plant_from.py",
+    "mechanisms/hardware/test_contact.py",
+    "mechanisms/test_underactuated.py",
+    "simulation/fmu/test_fmu_export.py",
     "simulation/test_lockstep.py",
     "simulation/test_realistic.py",
+    "simulation/test_run.py",
     "studies/audit/test_claims.py",
     "studies/papers/test_shipped_papers.py",
     "studies/report/test_report.py",
     "studies/test_executors.py",
+    "studies/test_kills.py",
+    "studies/test_scene.py",
     "test_fuzz.py",
     "test_notebooks.py",
     "test_packaging.py",
     "test_readme.py",
+    "twins/test_identify.py",
 }
 
 
@@ -86,9 +98,8 @@ def pytest_collection() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave what stays out of further collections of garbage, each of which would take half a second to look at it."""
+    """Leave what stays out of collections of garbage, each of which would take half a second to look at it."""
     gc.enable()
-    gc.collect()
     gc.freeze()
 
 

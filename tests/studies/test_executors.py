@@ -268,7 +268,7 @@ def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
     running = [start(*scheduler, log=tmp_path / "scheduler.log")]
     try:
         running += [start(*worker, log=tmp_path / f"worker{i}.log") for i in range(2)]
-        wait(lambda: file.exists() and file.stat().st_size)
+        wait(lambda: "Register worker" in (tmp_path / "scheduler.log").read_text())
         yield json.loads(file.read_text())["address"].replace("tcp://", "dask://"), running
     finally:
         for process in running:
@@ -279,7 +279,8 @@ def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
 @pytest.fixture
 def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
     """A study whose first three parts are written, and that waits for the file "go"."""
-    client = start("-c", CLIENT, str(tmp_path), dask[0], "100", log=tmp_path / "client.log")
+    # a scheduler that has died is waited for as long as one that is not there yet
+    client = start("-c", CLIENT, str(tmp_path), dask[0], "5", log=tmp_path / "client.log")
     parts = tmp_path / "remote" / "parts"
     try:
         wait(lambda: client.poll() is not None or len(list(parts.glob("*.parquet"))) >= 3)
