@@ -170,9 +170,13 @@ class Setting:
         """Return the observation at sample k, (..., size): x, v, and the reference if the task has one."""
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
+    def errors(self, x: np.ndarray, v: np.ndarray, k: Any) -> Pair:
+        """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
+        return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
+
     def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
         """Return the reward for x, v (..., n) at sample k."""
-        return reward(*self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected))
+        return reward(*self.errors(x, v, k))
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
@@ -219,9 +223,17 @@ class Episode:
         self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
         self.over = bool(self.setting.lost(self.x, self.v)) or bool(self.rubbing and self.rubbing.failed[0])
 
-    def reward(self) -> float:
-        """Return the reward of the state, in [0, 1]."""
-        return 0.0 if self.over else float(self.setting.reward(self.x, self.v, self.sample))
+    def assess(self) -> tuple[float, dict[str, Any]]:
+        """Return the reward of the state, in [0, 1], and an info.
+
+        The info has "time", s since the start, and "error", the task's e of each channel, (n,). After a divergence the
+        error is NaN and the reward 0.
+        """
+        time = self.sample * self.setting.scenario.control_period
+        if self.over:
+            return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
+        e, w = self.setting.errors(self.x, self.v, self.sample)
+        return float(reward(e, w)), {"time": time, "error": np.array(e)}
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:

@@ -103,7 +103,7 @@ class PlantTask(Episode, control.Task):
 
     def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the reward of the state."""
-        return self.reward()
+        return self.assess()[0]
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the discount 0, which ends the episode, if the plant has diverged."""

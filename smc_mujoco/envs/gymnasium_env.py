@@ -4,7 +4,8 @@
 
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action is the command of
 the driven channels, divided by their limits, in float32. An episode is truncated at the scenario's duration, which is
-also the max_episode_steps of its spec, and terminated if the plant diverges. The module `tasks` describes tasks and
+also the max_episode_steps of its spec, and terminated if the plant diverges. The info has "time", s since the start,
+and "error", the e of the task in each channel. The module `tasks` describes tasks and
 rewards; `vector_env` has many copies of a plant in one batch.
 """
 
@@ -101,13 +102,13 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Draw a start, unless the options x0 and v0 set it. Return the observation and an empty info."""
+        """Draw a start, unless the options x0 and v0 set it. Return the observation and the info."""
         super().reset(seed=seed)
         self.begin(self.data, self.np_random, options)
-        return self.setting.observe(self.x, self.v, 0), {}
+        return self.setting.observe(self.x, self.v, 0), self.assess()[1]
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Take one control period. Return observation, reward, terminated, truncated and an empty info."""
+        """Take one control period. Return observation, reward, terminated, truncated and the info."""
         with self.acting(self.data):
             for steps in self.stretches(self.data, action):
                 mujoco.mj_step(self.setting.model, self.data, steps)
@@ -116,7 +117,8 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
         observation = self.setting.observe(self.x, self.v, self.sample)
         if self.over:
             observation = bounded(observation)
-        return observation, self.reward(), self.over, self.sample >= self.last, {}
+        reward, info = self.assess()
+        return observation, reward, self.over, self.sample >= self.last, info
 
     def render(self) -> np.ndarray | None:
         """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None.

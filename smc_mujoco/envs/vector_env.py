@@ -18,6 +18,7 @@ from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.envs.core import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
+from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
 from smc_mujoco.simulation import callback  # also imports mujoco.batch without a callback
@@ -109,7 +110,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             for random, own, new in zip(generators, self._seeds(seed), mask, strict=True)
         ]
         self.begin(mask, options)
-        return self.observe(), {}
+        return self.observe(), self.infos(self.errors()[0], mask)
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Take one control period in every copy; copies at the end of an episode begin the next one.
@@ -119,7 +120,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         """
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
-        anew, mode, infos = self.over.copy(), self.metadata["autoreset_mode"], {}
+        anew, mode = self.over.copy(), self.metadata["autoreset_mode"]
         if anew.any() and mode is AutoresetMode.DISABLED:
             raise ScenarioError(f"the episode of copy {np.argmax(anew)} is over: reset it with the option reset_mask")
         commands = self.setting.command(actions, (self.num_envs,))
@@ -131,15 +132,20 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         x, v = self.state()
         terminated |= self.setting.lost(x, v)
         truncated = self.samples >= self.last
+        e, w = self.errors()
         with np.errstate(over="ignore", invalid="ignore"):
-            rewards = np.where(terminated | anew, 0.0, self.setting.reward(x, v, self.samples))
+            rewards = np.where(terminated | anew, 0.0, reward(e, w))
+        e[terminated] = np.nan
         observations, self.over = self.observe(terminated), terminated | truncated
+        final = {}
         if mode is AutoresetMode.SAME_STEP and self.over.any():
+            times = self.samples * self.setting.scenario.control_period
             for i in np.flatnonzero(self.over):
-                infos = self._add_info(infos, {"final_obs": observations[i].copy(), "final_info": {}}, int(i))
+                info = {"time": times[i], "error": e[i].copy()}
+                final = self._add_info(final, {"final_obs": observations[i].copy(), "final_info": info}, int(i))
             self.begin(self.over.copy())
-            observations = self.observe()
-        return observations, rewards, terminated, truncated, infos
+            observations, e = self.observe(), self.errors()[0]
+        return observations, rewards, terminated, truncated, self.infos(e) | final
 
     def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
         """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
@@ -175,6 +181,22 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         if lost.any():
             observations[lost] = bounded(observations[lost])
         return observations
+
+    def errors(self) -> Pair:
+        """Return the errors e and w of the task in all copies, (num_envs, n) each."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            e, w = self.setting.errors(*self.state(), self.samples)
+        return np.array(e), w
+
+    def infos(self, e: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
+        """Return the infos of `Episode.assess`, of all copies or where `mask`, (num_envs,) of bool, is true.
+
+        Args:
+          e: errors of the task, (num_envs, n).
+        """
+        there = np.ones(self.num_envs, bool) if mask is None else mask
+        times = np.where(there, self.samples * self.setting.scenario.control_period, 0.0)
+        return {"time": times, "_time": there, "error": np.where(there[:, None], e, 0.0), "_error": there.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of all copies, (num_envs, n) each."""

@@ -299,13 +299,15 @@ def test_an_episode_ends_where_the_finite_world_does_with_numbers_of_its_space()
     changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
     single, many = PlantEnv("inverted_pendulum", changes=changes), BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
-    observation, reward, terminated, *_ = single.step([0.0])
+    observation, reward, terminated, _, info = single.step([0.0])
     assert (terminated, reward) == (True, 0.0)
+    assert np.isnan(info["error"]).all()
     assert single.observation_space.contains(observation)
     assert single.data.qpos[0] > 1e6
     many.reset(seed=0)
-    observations, found, terminated, *_ = many.step(np.zeros((2, 1)))
+    observations, found, terminated, _, infos = many.step(np.zeros((2, 1)))
     assert terminated.all()
+    assert np.isnan(infos["error"]).all()
     assert (found == 0.0).all()
     assert many.observation_space.contains(observations)
 
@@ -333,7 +335,11 @@ def test_an_arm_tracks_a_reference_of_each_joint():
     arm = smc.plant("panda")
     one = PlantEnv(arm, "track", {"duration": 2.0})
     found, rest = one.setting, np.array(arm.rest)
-    assert one.reset(seed=0)[0].shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
+    observation, info = one.reset(seed=0)
+    assert observation.shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
+    np.testing.assert_array_equal(info["error"], (observation[:7] - rest) - (observation[14:21] - rest))
+    assert info["time"] == 0.0
+    assert one.step(np.zeros(7))[-1]["time"] == 1e-3
     r, dr, ddr = found.reference(300).reshape(3, 7)
     swing = (r - rest) / np.sin(0.3)
     assert 0.05 < swing.min() < swing.max() <= 0.5 * (1 + 1e-12)

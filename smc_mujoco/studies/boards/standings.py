@@ -40,7 +40,7 @@ def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
     found, robot = criteria(trace), trace.scenario.plant.name
     ran = _ruled(trace.scenario)
     for rule, right in _ruled(on_board(robot, "none")).items():
-        if (value := ran[rule]) != right:
+        if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(
                 f"{rule} of the run is {errors.shown(value)} and on the boards {errors.shown(right)}: "
                 "use smc.boards.on_board"
@@ -65,8 +65,8 @@ def robustness_board(robot: str, found: Robustness, name: str = NAME) -> tuple[R
 def _ruled(scenario: Scenario) -> dict[str, object]:
     """Return what the rules fix of a run, by name: the plant's parameters, and the fields that are not in DESIGN."""
     resolved = scenario.resolved
-    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in DESIGN]
-    return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in fields}}
+    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in (*DESIGN, "u_max")]
+    return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in ("limits", *fields)}}
 
 
 def _new_name(name: str, published: tuple[Row, ...] | tuple[RobustnessRow, ...]) -> str:
