@@ -31,6 +31,7 @@ BESIDE = ("phase", "transient", "end")
 PANELS = (*OVER_TIME, "channels", *BESIDE)
 ROW = 1.5  # inches on a full page, height of a panel over time
 HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
+Row = tuple[Axes, Panel, Sequence[str]]  # axes, with what they show and in which colours
 LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for each trace; the part below its name
 
 
@@ -185,20 +186,18 @@ def _draw_over_time(
         for ax, part, own in rows:
             axes.append(ax)
             ax.set_xlim(0.0, end(overview[0].traces))
-            drawing.over_time(ax, part, own)
+            drawing.over_time(ax, part, own, among=panel.traces)
             drawing.mark(ax, changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
         for ax in (frame, *(ax for ax, *_ in rows)):
             drawing.scale_ticks(ax.yaxis, panel)
-        _level(frame, [ax for ax, *_ in rows])
+        _level(frame, rows)
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlabel("time (s)")
     page.align_ylabels(frames)
 
 
-def _rows(
-    page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | None = None
-) -> tuple[Axes, list[tuple[Axes, Panel, Sequence[str]]]]:
+def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | None = None) -> tuple[Axes, list[Row]]:
     """Return axes for a panel: the one that has its label, and all with the traces that each shows and their colours.
 
     A crowded panel has a row for each trace, under its name.
@@ -217,16 +216,17 @@ def _rows(
     return frame, rows
 
 
-def _level(frame: Axes, rows: Sequence[Axes]) -> None:
-    """Give the rows of a panel the same vertical range, and ticks near its ends; a single one stays as it is."""
+def _level(frame: Axes, rows: Sequence[Row]) -> None:
+    """Give the rows of a panel the range of the runs that last, and ticks near its ends; a single row keeps its own."""
     if len(rows) == 1:
         return
-    ranges = [ax.get_ylim() for ax in rows]
+    lasting = [ax for ax, part, _ in rows if part.traces[0].diverged_at is None]
+    ranges = [ax.get_ylim() for ax in lasting or [ax for ax, *_ in rows]]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     places = [tick for tick in MaxNLocator(3).tick_values(low, high).tolist() if low <= tick <= high]
-    for ax in (frame, *rows):
+    for ax in (frame, *(ax for ax, *_ in rows)):
         ax.set(ylim=(low, high), yticks=[places[0], places[-1]])
-    for ax in rows[:-1]:
+    for ax, *_ in rows[:-1]:
         ax.tick_params(labelbottom=False, length=0)
     frame.tick_params(labelcolor="none", length=0)  # its label stands beside these, as if they were seen
 
@@ -275,7 +275,7 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
     period = drawing.last_period(panel.traces)
     for ax, part, own in rows:
         drawing.last_samples(ax, part.traces, own, period)
-    _level(frame, [ax for ax, *_ in rows])
+    _level(frame, rows)
     channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
     letter = "u" if channel else "control u"
     frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']}){channel}")
@@ -359,7 +359,7 @@ def _key(
     if rests:
         diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
-    if any(panel.quantity == "x" for panel in shown):
+    if any(panel.quantity == "x" and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
         look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
         handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
     return [*handles, *(_meaning(shown) if shown else [])]

@@ -23,7 +23,9 @@ from smc_mujoco.simulation.trace import Trace
 
 WIDE, SLIM = (4, 3), (2, 3)  # panels in a row of a page, and of a narrow one: the number that leaves fewer cells empty
 ROW = 2.0  # inches on a full page
+TICKS = 62.0  # points on a full page, room for the numbers at the left of a panel
 AIR = 0.2  # of a panel's height, above its curves: for words on a run that leaves it
+HALO = 0.8  # opacity of the paper behind these words
 
 
 def joints(
@@ -58,10 +60,12 @@ def joints(
     columns = min(SLIM if width < pages.NARROW else WIDE, key=lambda n: -len(several) % n)
     rows = -(-len(several) // columns)
     with style.page(width):
+        room = 72 * width / columns - style.points(TICKS)
+        letters = min(style.points(10.0), *(room / style.width(panel.label, 1.0, bold=True) for panel in several))
         page = pages.blank(width, height or style.points(ROW * rows + 0.9), fig)
         grid = page.subplots(rows, columns, sharex=True, squeeze=False)
         for ax, panel in zip(grid.flat, several, strict=False):
-            draw(ax, panel, names, colours)
+            draw(ax, panel, names, colours, letters)
             panels.mark(ax, marks, named=False)
         for k, ax in enumerate(grid.flat):
             ax.set_visible(k < len(several))
@@ -89,11 +93,11 @@ def shown(traces: Sequence[Trace]) -> list[Panel]:
     return found + [Panel(name, groups[0], traces) for name in names]
 
 
-def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str]) -> None:
-    """Draw a panel. A run far off leaves it, which says so."""
+def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], letters: float) -> None:
+    """Draw a panel, whose title has letters of a size in points. A run far off leaves it, which says so."""
     panels.over_time(ax, panel, colours)
     ax.set_xlim(0.0, end(panel.traces))
-    ax.set_title(panel.label, fontsize=style.points(10.0))
+    ax.set_title(panel.label, fontsize=letters)
     for k, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True)):
         if panel.quantity == "contact":
             mark_losses(ax, trace.t, panels.QUANTITIES["contact"](trace)[:, 0], colour, k)
@@ -105,6 +109,7 @@ def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str]) -
         size = style.points(8.5)
         words = style.cropped(name, 0.95 * room - style.width(most, size), size) + most
         look = {"fontsize": size, "color": colours[away], "ha": "right", "va": "top", "parse_math": False}
+        look["bbox"] = {"facecolor": style.PAPER, "alpha": HALO, "lw": 0, "pad": 0.5}
         ax.annotate(words, (1.0, 1.0), (-2, -1), "axes fraction", "offset points", **look)
 
 

@@ -90,26 +90,31 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
     return fig
 
 
-def columns(handles: Sequence[Handle], width: float) -> int:
+def columns(labels: Sequence[str], width: float) -> int:
     """Return the number of columns of a legend on a page of `width` inches: as many as fit."""
     room, size = 72 * width - 16, style.points(LETTERS)
-    widths = [_widest(words, size) + (SAMPLE + GAPS) * size for words in _wrapped(handles, width)]
+    widths = [_widest(words, size) + (SAMPLE + GAPS) * size for words in labels]
     fitting = (n for n in range(len(widths), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
     return next(fitting, 1)
 
 
 def head(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
-    lines = [words.count("\n") + 1 for words in _wrapped(handles, width)]
-    rows = max((sum(part) for part in np.array_split(lines, columns(handles, width))), default=0)
+    labels = _wrapped(handles, width)
+    lines = [words.count("\n") + 1 for words in labels]
+    rows = max((sum(part) for part in np.array_split(lines, columns(labels, width))), default=0)
     return style.points(1.9 * TITLE + 1.45 * LETTERS * rows) / 72
 
 
 def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
-    """Return the labels of a legend, each on up to two lines."""
-    size = style.points(LETTERS)
-    room = SHARE * 72 * width - (SAMPLE + GAPS) * size
-    return [style.wrapped(str(handle.get_label()), room, size, lines=2) for handle in handles]
+    """Return the labels of a legend, each on up to two lines; as wide as the page if it has one column anyway."""
+    size, labels = style.points(LETTERS), [str(handle.get_label()) for handle in handles]
+
+    def wrapped(share: float) -> list[str]:
+        return [style.wrapped(label, share * 72 * width - (SAMPLE + GAPS) * size, size, lines=2) for label in labels]
+
+    narrow = wrapped(SHARE)
+    return narrow if columns(narrow, width) > 1 else wrapped(0.95)
 
 
 def _widest(words: str, size: float) -> float:
@@ -127,7 +132,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
-        ncols=columns(handles, width),
+        ncols=columns(words, width),
         fontsize=size,
         borderpad=0.2,
         handlelength=SAMPLE,

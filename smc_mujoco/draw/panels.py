@@ -38,7 +38,8 @@ SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have two small panels
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 LEAVING = 0.6  # points, width of a curve that leaves its panel
-COINCIDENT = 0.01  # of a panel's height: curves no farther apart are dashed in turn
+COINCIDENT = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
+MOSTLY = 0.99  # of the samples of curves that coincide; chosen: controls that switch a sample apart do
 DASH = 5.0  # widths of a line
 WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
@@ -227,15 +228,17 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     return max(times, default=None)
 
 
-def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> list[Artist]:
+def over_time(
+    ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True, among: Sequence[Trace] = ()
+) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
     The reference of x is drawn in front, its settling band behind. `label`: whether to print the size of blows outside
-    the range.
+    the range. `among`: traces that set the range; default: the panel's own.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
-    ax.set_ylim(limits(panel.traces, name))
+    ax.set_ylim(limits(among or panel.traces, name))
     if name == "reaction":
         clip_blows(ax, panel, colours, label)
     if name in ("x", "e"):
@@ -253,10 +256,15 @@ def over_time(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True
             for i in light(y.shape[1]):
                 artists += ax.plot(*curve(trace, y[:, i], name), **look)
         artists += ax.plot(*path, color=colour, lw=width, drawstyle=steps, ls=dash)
-        if trace.diverged_at is not None:
+        if ends_in_failure(trace):
             last = np.clip(mean[-1], *ax.get_ylim())
             artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
     return artists
+
+
+def ends_in_failure(trace: Trace) -> bool:
+    """Return whether a trace ends where its run failed: one cut to a close-up may end before."""
+    return trace.diverged_at is not None and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9
 
 
 def cross() -> dict[str, Any]:
@@ -276,7 +284,11 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     for i, (t, y) in enumerate(lines):
         for group in groups:
             at, first = lines[group[0]]
-            if len(t) > 1 and t[-1] == at[-1] and np.abs(np.interp(at, t, y) - first).max() <= near:
+            if (
+                min(len(t), len(at)) > 1
+                and t[-1] == at[-1]
+                and np.quantile(np.abs(np.interp(at, t, y) - first), MOSTLY) <= near
+            ):
                 group.append(i)
                 break
         else:
@@ -382,12 +394,13 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
 
     A ring is the start of a trace, a diamond a sample in `held`, where friction holds it.
     """
-    for trace, colour, samples in reversed(list(zip(traces, colours, held, strict=True))):
+    drawn = list(zip(traces, colours, held, orbits(traces), strict=True))
+    for trace, colour, samples, dash in reversed(drawn):
         x, v = trace.x, trace.v
         for i in light(x.shape[1]) if x.shape[1] > 1 else ():
             ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=style.points(LIGHT_LINE))
         x, v = x.mean(axis=1), v.mean(axis=1)
-        ax.plot(*thinned(x, v), color=colour, lw=style.points(LINE))
+        ax.plot(*thinned(x, v), color=colour, lw=style.points(LINE), ls=dash)
         ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         for sample in samples:
             ax.plot(x[sample], 0.0, "D", color=colour, ms=style.points(5.5), mec=style.PAPER, zorder=4)
@@ -404,6 +417,16 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
             low, high = min(low, 1.05 * dr.min()), max(high, 1.05 * dr.max())
     ax.set_xlim(limits(traces, "x"))
     ax.set_ylim(low, high)
+
+
+def orbits(traces: Sequence[Trace]) -> list[Any]:
+    """Return a style for the curve of each trace in a phase portrait, see `dashes`."""
+    (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
+    lines = []
+    for trace in traces:
+        x, v = trace.x.mean(axis=1) / (right - left), trace.v.mean(axis=1) / (high - low)
+        lines.append((np.concatenate([trace.t, trace.t + trace.t[-1]]), np.concatenate([x, v])))
+    return dashes(lines, (0.0, 1.0))
 
 
 def reference(trace: Trace) -> np.ndarray:
@@ -446,17 +469,22 @@ def last_period(traces: Sequence[Trace]) -> tuple[float, float]:
 def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], period: tuple[float, float]) -> None:
     """Draw the last samples of u of the first channel, each held until the next, in a period of time in s."""
     begin, stop = period
-    for trace, colour in reversed(list(zip(traces, colours, strict=True))):
+    lines = []
+    for trace in traces:
         part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
-        t = 1e3 * (trace.t[part] - stop)
-        ax.step(t, trace.u[part, 0], where="post", color=colour, lw=style.points(LINE))
-    if all(trace.diverged_at is not None for trace in traces):
-        ax.text(0.5, 0.5, "no run lasted", transform=ax.transAxes, ha="center", color=style.MUTED)
-    ax.set_xlim(1e3 * (begin - stop), 0.0)
-    low, high = ax.dataLim.intervaly
-    if low <= high:
+        lines.append((1e3 * (trace.t[part] - stop), trace.u[part, 0]))
+    shown = np.concatenate([u for _, u in lines])
+    if shown.size:
+        low, high = shown.min(), shown.max()
         half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
         ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+    for (t, u), colour, dash in reversed(list(zip(lines, colours, dashes(lines, ax.get_ylim()), strict=True))):
+        ax.step(t, u, where="post", color=colour, lw=style.points(LINE), ls=dash)
+    if all(trace.diverged_at is not None for trace in traces):
+        words = "the run failed" if len(traces) == 1 else "no run lasted"
+        ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=style.MUTED)
+        ax.tick_params(labelleft=False)
+    ax.set_xlim(1e3 * (begin - stop), 0.0)
 
 
 def crowded(panel: Panel) -> bool:

@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import itertools
 import math
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -65,6 +66,7 @@ RC = {
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
     "grid.color": GRID,
     "grid.linewidth": 0.8,
     "xtick.color": MUTED,
@@ -343,8 +345,11 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 
 
 def wrapped(text: str, room: float, size: float, lines: int) -> str:
-    """Return the text on so many lines at most, broken between words; an ellipsis is at the end of one too long."""
-    found, words = [], text.split()
+    """Return the text on so many lines at most, broken between words; an ellipsis is at the end of one too long.
+
+    A number and its unit stay together.
+    """
+    found, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(found) < lines - 1:
         count = next((n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1)
         found.append(cropped(" ".join(words[:count]), room, size))

@@ -88,7 +88,7 @@ def check(page) -> None:
 @pytest.mark.parametrize(
     ("kind", "size"),
     [
-        ("one", None), ("four", COLUMN), ("ten", PAGE), ("ten", COLUMN), ("failed", PAGE), ("jump", COLUMN),
+        ("one", None), ("four", COLUMN), ("ten", PAGE), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN),
         ("jump", PAGE), ("short", None), ("short", COLUMN), ("arm", None), ("arm", PAGE), ("arm", COLUMN),
     ],
 )  # fmt: skip
@@ -147,6 +147,15 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
         assert [to_hex(curves(row)[0].get_color()) for row in rows(ax)] == [
             to_hex(colour) for colour in style.law_colours(["observer_free", "classical", "adaptive"])
         ]
+
+
+def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
+    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
+    lost = failed(dataclasses.replace(under(one, "pid", 1.0), u=1e4 * one.u), 400)
+    over_time, end = figure([*three, lost], panels=["u", "end"]).axes
+    assert [len(rows(ax)) for ax in (over_time, end)] == [4, 4]
+    assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
+    assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
 
 
 def test_the_play_of_a_gear_is_a_band_around_the_reference_with_its_size_in_the_legend(one):
@@ -229,12 +238,14 @@ def test_labels_of_laws_are_written_one_way():
 
 
 def test_curves_that_coincide_are_all_seen(one):
-    same = [one, under(one, "pid", 1.0), under(one, "adaptive", 0.3)]
-    ax = figure(same, panels=["x"]).axes[0]
-    adaptive, pid, classical = curves(ax)  # the first is on top
-    assert adaptive.get_linestyle() == "-"
-    assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
-    assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
+    near = under(one, "pid", 1.01)
+    same = [one, dataclasses.replace(near, u=np.where(one.t < 0.005, -3.0, 1.0)[:, None] * one.u)]
+    same.append(dataclasses.replace(under(one, "adaptive", 0.3), u=0.3 * one.u))
+    for ax in figure(same, panels=["x", "u", "phase", "end"]).axes:
+        adaptive, pid, classical = curves(ax)  # the first is on top
+        assert adaptive.get_linestyle() == "-"
+        assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
+        assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
 
 
 def test_each_joint_of_an_arm_has_its_reference_and_its_error(arm):
@@ -268,6 +279,9 @@ def test_the_close_up_of_the_transient_ends_soon_after_it(one):
     panel = panels.Panel("x", next(iter(style.split([one]))), [one])
     until = panels.transient(panel).traces[0].t[-1]
     assert 0.0 < until <= 0.4 * one.t[-1] + 1e-9
+    for at, crosses in ((1400, [True, False]), (40, [True, True])):
+        shown = figure([one, failed(under(one, "pid", 0.5), at)], panels=["x", "transient"]).axes
+        assert ["X" in [line.get_marker() for line in ax.lines] for ax in shown] == crosses
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):

@@ -28,7 +28,10 @@ def test_each_panel_says_what_it_shows_in_its_unit(trace):
     assert titles == expected
     assert len(page.axes) == len(expected)  # no cell is empty
     np.testing.assert_allclose(shown(page)[1].lines[0].get_ydata(), 1e3 * (trace.x - trace.r)[:, 1])
-    assert len(joints([trace], size="ieee-column").axes) == len(expected)
+    column = joints([trace], size="ieee-column")
+    column.draw_without_rendering()
+    assert len(column.axes) == len(expected)
+    assert max(ax._left_title.get_window_extent().x1 for ax in column.axes) < column.bbox.x1
 
 
 def test_a_run_far_off_leaves_its_panel_by_name(trace):

@@ -77,7 +77,7 @@ class Charts:
             rows, past = slice(top - 3 * self.dot, bottom + 1), slice(left - self.dot, now + 1)
             image[rows, past] = self.full[rows, past]
             image[top : bottom + 1, now] = CURSOR
-            for (t, y), colour in zip(paths, self.colours, strict=True):
+            for (t, y), colour in reversed(list(zip(paths, self.colours, strict=True))):  # the first on top
                 if time <= t[-1] + 1e-9 and np.isfinite(y[0]):  # a run that failed has no place on the cursor
                     self.disc(image, now, np.interp(time, t, y), colour)
         return image
