@@ -38,6 +38,7 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import parts, refuse, scale
+from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import DURATION, case, listed
 from smc_mujoco.simulation.initial_states import Starts
@@ -158,7 +159,9 @@ class Kind:
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        if base.disturbance or base.friction or base.mismatch or base.jump:  # linear theory does not include these
+        if base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # theory has none of these
+            return None
+        if base.resolved.model == "nominal" or base.resolved.reference != REST:
             return None
         try:
             return self.theory(base)
@@ -182,7 +185,8 @@ def _doubled(largest: float) -> tuple[float, ...]:
 
 
 def _critical_delay(base: Scenario) -> float | None:
-    lam_k1 = None if base.actuator else linearisation.local(base.law)  # the theory has no drive
+    estimated = base.resolved.velocity.name != "measured"
+    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # the theory has neither
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 

@@ -16,8 +16,8 @@ home while |e| <= 2 % of X and |v| <= 2 % of V on every channel, and near while 
   second half of this third than in the first; or near in the second half. Near the reference the size does not matter,
   because a law that switches leaves a ripple. But a state that starts near must shrink: a run that leaves slowly is
   near for long.
-- It does not converge, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max, away
-  from home.
+- It does not converge, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max (of
+  the largest |u|, if u has no bound), away from home.
 - At the end: it converges if it is home throughout the last 20 % of the run and is near, or its distance grows by less
   than 5 %. It does not if it is never home in that part. Otherwise it is undecided. A run that leaves more slowly, 2.5
   % a second in runs of 10 s, counts as one that stays.
@@ -208,7 +208,8 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     if final or stays:
         return CONVERGES if stays else UNDECIDED if home.any() else DOES_NOT
     moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
-    limits = STILL * np.array([*far, float(np.max(trace.scenario.resolved.u_max))])
+    u_max = float(np.max(trace.scenario.resolved.u_max))
+    limits = STILL * np.array([*far, u_max if math.isfinite(u_max) else np.abs(trace.u).max()])
     return DOES_NOT if (moved <= limits).all() and not home.any() else None
 
 

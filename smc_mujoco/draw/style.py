@@ -294,14 +294,8 @@ def pushes(traces: Sequence[Trace]) -> list[Push]:
 
 def _jump(trace: Trace) -> list[tuple[float, str]]:
     """Return when a plant changes and how, if it does."""
-    jump, added = trace.scenario.jump, trace.scenario.plant.added
-    if jump is None:
-        return []
-    words = (
-        f"{what} + {factor:.3g} {added[what]}" if what in added else f"{what} × {factor:.3g}"
-        for what, factor in jump.factors.items()
-    )
-    return [(jump.time, ", ".join(words))]
+    jump = trace.scenario.jump
+    return [] if jump is None else [(jump.time, trace.scenario.plant.change(jump.factors))]
 
 
 def _blow(push: Push) -> tuple[float, str]:

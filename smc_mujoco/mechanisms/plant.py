@@ -259,6 +259,13 @@ class Plant:
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
+    def change(self, factors: Mapping[str, float]) -> str:
+        """Return what `values` does with factors, in words: "m × 1.3, payload + 2 kg"."""
+        return ", ".join(
+            f"{name} + {factor:g} {self.added[name]}" if name in self.added else f"{name} × {factor:g}"
+            for name, factor in factors.items()
+        )
+
     def values(self, factors: Mapping[str, float]) -> Values:
         """Return the parameters, each times its factor, or with it added; `mass` stands for the plant's mass."""
         values = dict(self.parameters)

@@ -41,7 +41,7 @@ class Contacts(NamedTuple):
     """Contacts of a run at its samples.
 
     Attributes:
-      force: sum of the normal forces, N, (K + 1,); 0 without contact.
+      force: sum of the normal forces, N, (K + 1,); 0 without contact, and as the others NaN after a failure.
       depth: penetration of the deepest contact, m, (K + 1,); 0 without contact.
       push: sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3).
     """
@@ -128,6 +128,10 @@ def contacts(trace: Trace) -> Contacts:
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
     for k in range(len(trace.t)):
+        if np.isnan(trace.x[k]).any():  # the run has failed
+            for values in found:
+                values[k:] = np.nan
+            break
         if k == jump:
             assembly.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))

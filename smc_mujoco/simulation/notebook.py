@@ -81,7 +81,7 @@ def _words(name: str, value: object, s: "Scenario") -> str:
     if name in ("x0", "v0") and isinstance(value, tuple):
         text = _state(value, plant.units, "/s" * (name == "v0"))
     elif isinstance(value, Mapping):
-        text = ", ".join(f"{key} × {factor:g}" for key, factor in value.items())
+        text = plant.change(value)
     elif isinstance(value, tuple):
         text = ", ".join(map(str, value))
     elif isinstance(value, float):

@@ -180,11 +180,18 @@ def test_dry_friction_is_tolerated_beside_what_a_condition_has():
     assert margins.MARGIN_KINDS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
 
 
-def test_theory_says_nothing_of_a_plant_that_a_condition_pushes_or_changes():
-    for condition, told in (("nominal", True), ("noise", True), ("constant", False), ("heavy", False)):
-        base = smc.grid("duffing", "observer_free", condition)[0]
+def test_theory_says_nothing_of_a_loop_that_is_another():
+    """A plant that is pushed or changed, a law that sees a sensor or the model, and another reference."""
+    base = smc.grid("duffing", "observer_free", "nominal")[0]
+    others = [{"model": "nominal"}, {"reference": smc.Constant(0.1)}, {"reference": smc.Sine(0.1, 1.0)}]
+    cases = [(smc.grid("duffing", "observer_free", "noise")[0], True), (base, True)]
+    cases += [(smc.grid("duffing", "observer_free", one)[0], False) for one in ("constant", "heavy", "encoder")]
+    for case, told in [*cases, *((dataclasses.replace(base, **fields), False) for fields in others)]:
         for kind in ("delay", "disturbance", "friction"):
-            assert (margins.MARGIN_KINDS[kind].expected(base) is not None) == told
+            assert (margins.MARGIN_KINDS[kind].expected(case) is not None) == told
+    estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
+    told = [margins.MARGIN_KINDS[kind].expected(estimated) is not None for kind in ("delay", "disturbance")]
+    assert told == [False, True]
 
 
 def test_only_laws_with_a_linear_part_have_theory(found):

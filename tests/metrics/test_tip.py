@@ -127,6 +127,17 @@ def test_contact_forces_know_a_jump_between_two_samples(pressed):
     assert np.all(before.force[501:] != after.force[501:])
 
 
+def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
+    """And MuJoCo, which gets no NaN, logs no warning of one."""
+    monkeypatch.chdir(tmp_path)
+    x, applied = pressed.x.copy(), pressed.applied.copy()
+    x[800:] = applied[800:] = np.nan
+    force = tip.contacts(dataclasses.replace(pressed, x=x, applied=applied)).force
+    assert not list(tmp_path.iterdir())
+    assert force[:800].tolist() == tip.contacts(pressed).force[:800].tolist()
+    assert np.isnan(force[800:]).all()
+
+
 def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
         with pytest.raises(smc.ScenarioError, match=f"the state of {type(part).__name__} is not in a trace"):

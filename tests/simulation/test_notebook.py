@@ -53,6 +53,8 @@ def test_a_scenario_shows_what_it_was_given_and_names_its_defaults():
     assert "physics step 0.001 s" in note
     assert "u max 6 N m" in note
     assert "x0" not in note
+    loaded = smc.Scenario(plant="panda", law="none", mismatch={"m": 1.1, "payload": 2.0})
+    assert cells(loaded)["mismatch"] == "m × 1.1, payload + 2 kg"
     bare = cells(smc.Scenario(plant="duffing", law="classical"))
     assert list(bare)[:-1] == ["plant", "law", "duration"]
     assert "x0 1.5 m" in list(bare)[-1]

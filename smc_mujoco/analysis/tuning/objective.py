@@ -52,8 +52,9 @@ class Objective:
       weight: w, s^3.
       duration: of a run, s.
       control_period: s.
-      chattering: largest predicted amplitude of the limit cycle of s, in its unit, in the first condition, see
-        `smc.chattering`. Gains that exceed it cost more than any others. None: chattering costs its variation only.
+      chattering: largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
+        condition, see `smc.chattering`. Gains that exceed it cost more than any others. None: chattering costs its
+        variation only.
       u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or for your own model the limit
         of its strongest motor.
 

@@ -82,7 +82,8 @@ def tune(
       threads, progress: as in `run`.
       conditions: names or your own conditions, in place of the objective's.
       starts: initial states, see `smc.starts`, in place of the objective's.
-      chattering: largest predicted amplitude of the limit cycle of s, in its unit, in the first condition.
+      chattering: largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
+        condition.
 
     Raises:
       ScenarioError: a law with gains of unknown unit, a plant without scales, or an argument out of range.
