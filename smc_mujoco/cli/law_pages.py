@@ -85,8 +85,8 @@ def print_pages(name: str | None, console: Console) -> None:
             formula = with_package(parts.formula, known.package(template.name))
             table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
         console.print(table, "")
-    filters = "[cyan]smc-mujoco laws --needs continuous,two-gains[/]"
-    console.print(f"One in full: [cyan]smc-mujoco laws NAME[/]. Only some: {filters}", highlight=False)
+    one, some = (("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan"))
+    console.print(Text.assemble("One in full: ", one, ". Only some: ", some))
 
 
 def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:

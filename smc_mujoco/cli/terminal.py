@@ -37,7 +37,7 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures the time of the command.
+    """The console of a command, which also measures its time. It prints texts as they are, without markup.
 
     Args:
       prints: name of a result file to print on stdout instead of keeping it; all else then goes to stderr. "" for none.
@@ -47,7 +47,7 @@ class Terminal(Console):
     """
 
     def __init__(self, prints: str = ""):
-        super().__init__(stderr=bool(prints))
+        super().__init__(stderr=bool(prints), markup=False, emoji=False)
         self.start = time.perf_counter()
         self._folder = tempfile.TemporaryDirectory() if prints else None
         self.printed = Path(self._folder.name) / prints if self._folder else None
@@ -58,8 +58,8 @@ class Terminal(Console):
         return time.perf_counter() - self.start
 
     def note(self, text: str, style: str | None = None, wrap: bool = False) -> None:
-        """Print text as it is, without markup or coloured numbers, on one line unless `wrap`."""
-        self.print(text, style=style, soft_wrap=not wrap, highlight=False, markup=False)
+        """Print text without coloured numbers, on one line unless `wrap`."""
+        self.print(text, style=style, soft_wrap=not wrap, highlight=False)
 
     def wrote(self, *files: Path) -> None:
         """Print the names of files that were written, but the content of the file `printed`."""

@@ -55,7 +55,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
             yield cell
         return
     share = MofNCompleteColumn() if counted else TaskProgressColumn()
-    columns = TextColumn("{task.description}"), BarColumn(), share, TimeRemainingColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), share, TimeRemainingColumn()
     hidden = not console.is_terminal  # a log file gets no empty lines
     with Progress(
         *columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW, disable=hidden

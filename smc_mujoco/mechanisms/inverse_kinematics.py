@@ -79,7 +79,7 @@ def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
     Raises:
       ScenarioError: a point is out of reach.
     """
-    x, found, size = np.array(start, float), [], 0.0
+    x, found, away = np.array(start, float), [], np.zeros(3)
     for i, point in enumerate(points):
         for _ in range(MOST):
             away, J = tip.error(x, point)
@@ -91,9 +91,11 @@ def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
             x = np.clip(x + move, tip.low, tip.high)
         else:
             there = ", ".join(f"{each:.4g}" for each in point)
+            sizes = zip(np.split(away, [3]) if len(away) > 3 else [away], ("m", "rad"), strict=False)
+            stays = " and ".join(f"{np.linalg.norm(part):.3g} {unit}" for part, unit in sizes)
             raise ScenarioError(
                 f"the tip of {tip.plant.name} does not reach ({there}) m, point {i} of {len(points)} on its path: it "
-                f"stays {np.sqrt(size):.3g} m or rad away; give points within reach, or another x0"
+                f"stays {stays} away; give points within reach, or another x0"
             )
         found.append(x)
     return np.array(found)

@@ -179,11 +179,11 @@ Look for: nothing.
 """
 import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
-scene = smc.Scene(title="Asked", conditions={"calm": {"only": run}}, answer=lambda runs: runs.who("rests", "rest"))
+scene = smc.Scene(title="Asked [/s]", conditions={"calm": {"only": run}}, answer=lambda runs: runs.who("rests", "rest"))
 ''')
     code, out, _ = call("run", "asks.py", "--no-video", "--out", "out")
     assert code == 0
-    assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked"]
+    assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked [/s]"]
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
 
 
@@ -448,8 +448,10 @@ def test_show_exports_several_formats_beside_the_trace(call, trace, folder):
 def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
     path = folder / "a\n\x1b[31m[b].npz"
     refused(call("show", path), r"a\n\x1b[31m[b].npz")
-    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05)).save(path)
+    law = smc.law("classical").named("[/b]")
+    smc.run(smc.Scenario(plant="duffing", law=law, duration=0.05)).save(path)
     _, out, _ = call("show", path, "--export", "csv")
+    assert out.startswith("duffing under [/b](k=4, c=2.5), 0.05 s at 0.001 s")
     assert [line for line in out.splitlines() if line.startswith("wrote")] == [rf"wrote {folder}/a\n\x1b[31m[b].csv"]
 
 

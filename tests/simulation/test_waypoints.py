@@ -160,7 +160,7 @@ REFUSED = {
     ),
     "beyond reach": (
         lambda: smc.cartesian_path("double_pendulum", (0, 1), [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)], body="lower"),
-        "the tip of double_pendulum does not reach",
+        "m away; give points within reach",
     ),
     "free joint": (
         lambda: smc.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),

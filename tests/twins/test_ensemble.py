@@ -65,6 +65,18 @@ def test_a_board_of_a_voltage_is_in_volts(tmp_path):
     assert heading(board) == "TV rate (V/s)"
 
 
+def test_the_command_compares_laws_on_every_set(tmp_path):
+    words = ["bench", "--rig", PENDULUM.name, "--laws", "pid(kp=30, kd=6),super_twisting", "--seeds", "1"]
+    done = CliRunner().invoke(app, [*words, "--duration", "0.1", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "tv_rate: no law wins on all 5 parameter sets (none on any)" in done.output
+    assert "10 runs, 0 of them failed, gains 'default'," in done.output
+    for given in (["--plants", "duffing"], ["--conditions", "noise"], ["--gains", "study"]):
+        refused = CliRunner().invoke(app, [*words, *given])
+        assert refused.exit_code == 2
+        assert "--rig has a plant, parameter sets for conditions, and gains of its laws: leave out" in refused.output
+
+
 def test_the_command_identifies_from_files(tmp_path):
     rig = smc.rig("emps")
     smc.run(rig.scenario(duration=0.6, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(tmp_path / "run.npz")

@@ -64,7 +64,7 @@ def identify(
     for table in tables.identified(found, [str(file) for file in files]):
         terminal.print(table)
     for note in found.notes:
-        terminal.print(note)
+        terminal.note(note, wrap=True)
     terminal.note(f"{found.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
     if json:
         terminal.wrote(found.save(ended(json, ".json")))

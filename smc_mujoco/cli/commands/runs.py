@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
@@ -106,7 +107,8 @@ def show(
         draw([loaded], figure)
         written += drawn(figure)
     s = loaded.scenario
-    terminal.print(f"[bold]{s.plant.name}[/] under [bold]{s.law}[/], {s.duration:g} s at {s.control_period:g} s")
+    plant, law, times = (s.plant.name, "bold"), (str(s.law), "bold"), f", {s.duration:g} s at {s.control_period:g} s"
+    terminal.print(Text.assemble(plant, " under ", law, times))
     _print_curves(loaded, terminal)
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)

@@ -1,7 +1,7 @@
 """smc-mujoco which, bench, board, claims, papers, report: questions that many runs of many laws answer."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,6 +9,11 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.initial_states import Starts
+    from smc_mujoco.simulation.scenario import Scenario
+    from smc_mujoco.studies.study import Extent
 
 
 @errors_as_sentences()
@@ -108,10 +113,14 @@ def bench(
     spread: options.Spread = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help="Number of starts and noises; default 20. With fewer than 16 no law can win."),
+        typer.Option(
+            min=1, help="Number of starts and noises; default 20, --quick 16. With fewer than 16 no law can win."
+        ),
     ] = None,
-    gains: options.Gains = "tuned",
-    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10.")] = None,
+    gains: Annotated[
+        str | None, typer.Option(help="Set of gains: tuned, study, tracking or default; by default tuned.")
+    ] = None,
+    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
@@ -120,7 +129,7 @@ def bench(
     fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that are in the folder.")] = False,
     rig: Annotated[
         str | None,
-        typer.Option(help="A real machine, with its parameter sets, in place of plants and conditions."),
+        typer.Option(help="A real machine, with its parameter sets, in place of plants, conditions and gains."),
     ] = None,
     threads: options.Threads = None,
 ) -> None:
@@ -137,47 +146,60 @@ def bench(
     """
     with held_back():
         from smc_mujoco.cli import tables
-        from smc_mujoco.control.gain_sets import general_laws
-        from smc_mujoco.mechanisms.plant import as_plant
-        from smc_mujoco.simulation.conditions import applicable
-        from smc_mujoco.simulation.grid import grid
+        from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.studies.leaderboard import leaderboard
         from smc_mujoco.studies.study import FULL, QUICK, study
-
-    terminal, size = Terminal(), QUICK if quick else FULL
-    if rig is not None:
         from smc_mujoco.twins import ensemble
         from smc_mujoco.twins.rig import rig as find_rig
 
+    terminal, size = Terminal(), QUICK if quick else FULL
+    count, length = seeds or size.seeds, size.duration if duration is None else duration
+    begin = options.starts(x0, spread)
+    if rig is not None:
+        if plants or conditions or condition or gains:
+            raise ScenarioError(
+                "--rig has a plant, parameter sets for conditions, and gains of its laws: leave out --plants, "
+                "--conditions, --condition and --gains"
+            )
         chosen = None if laws is None else [options.law(text) for text in options.names(laws)]
-        begin, length = options.starts(x0, spread), size.duration if duration is None else duration
-        found = ensemble.runs(find_rig(rig), chosen, seeds or size.seeds, "default", length, begin)
-        boards = leaderboard(study(found, out, not fresh, executor, threads, progress=True, traces=traces))
-        terminal.print(tables.leaderboard(boards))
-        terminal.print(ensemble.verdict(boards))
-        terminal.wrote(out / "results.parquet")
-        return
-    chosen_plants = [options.plant(text) for text in options.names(plants, size.plants)]
-    length = size.duration if duration is None else duration
-    found = [as_plant(plant) for plant in chosen_plants]
-    usual = () if condition else applicable(size.conditions, found, length)
-    chosen = options.names(laws, size.laws)
-    chosen = general_laws(chosen_plants, gains) if laws == "all" else [options.law(text) for text in chosen]
-    scenarios = grid(
-        chosen_plants,
-        chosen,
-        options.conditions(options.names(conditions, usual), condition),
-        seeds or size.seeds,
-        gains,
-        length,
-        options.starts(x0, spread),
-    )
+        scenarios = ensemble.runs(find_rig(rig), chosen, count, "default", length, begin)
+        used = options.gains_used(chosen or (), "default")
+    else:
+        scenarios, used = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
-    terminal.print(tables.leaderboard(leaderboard(table)))
+    boards = leaderboard(table)
+    terminal.print(tables.leaderboard(boards))
+    if rig is not None:
+        terminal.note(ensemble.verdict(boards))
     failed = len(table) - table.data["failure"].null_count
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
-    terminal.note(f"{runs}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s")
+    terminal.note(f"{runs}, {used}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
+
+
+def _grid(
+    size: "Extent",
+    plants: str | None,
+    laws: str | None,
+    conditions: str | None,
+    own: list[str] | None,
+    seeds: int,
+    gains: str,
+    duration: float,
+    starts: "Starts | None",
+) -> "tuple[list[Scenario], str]":
+    """Return the scenarios of `bench`, and where their gains are from in words. Texts are those of the options."""
+    from smc_mujoco.control.gain_sets import general_laws
+    from smc_mujoco.mechanisms.plant import as_plant
+    from smc_mujoco.simulation.conditions import applicable
+    from smc_mujoco.simulation.grid import grid
+
+    machines = [options.plant(text) for text in options.names(plants, size.plants)]
+    usual = () if own else applicable(size.conditions, [as_plant(plant) for plant in machines], duration)
+    chosen = options.names(laws, size.laws)
+    chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
+    found = options.conditions(options.names(conditions, usual), own)
+    return grid(machines, chosen, found, seeds, gains, duration, starts), options.gains_used(chosen, gains)
 
 
 @errors_as_sentences()
@@ -208,6 +230,8 @@ def board(
 
     terminal = Terminal()
     scenario = boards.entry(robot)
+    if figure:
+        writable(figure)
     if film:
         if film.suffix != ".mp4":
             raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
@@ -263,7 +287,7 @@ def claims(
         bool,
         typer.Option(
             "--mutants",
-            help="Check that the audit can fail: list claims that no broken law loses.",
+            help="Check that the audit can fail: list claims that no broken law loses. Exit code 1 if there are any.",
         ),
     ] = False,
     threads: options.Threads = None,

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, unknown
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import gain_sets
@@ -61,6 +61,9 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
     Raises:
       ScenarioError: there is no such plant, or the page cannot have it.
     """
+    for name in names:
+        if isinstance(name, str) and name not in catalogue():
+            raise unknown("plant", name, plants())
     found = [as_plant(name) for name in dict.fromkeys(names)]
     for plant in found:
         if why := _why_not(plant):

@@ -101,6 +101,7 @@ def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, cap
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
+        (["nosuchplant"], "unknown plant 'nosuchplant': choose from cart_pole, duffing, furuta, inverted_pendulum, "),
         (["double_pendulum"], "cannot show double_pendulum, which has 2 motors: choose from cart_pole, "),
         (["servo_axis"], "which has dry friction in its equation"),
         (["acrobot"], "which is not one MJCF file of the package"),
