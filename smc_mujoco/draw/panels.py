@@ -284,13 +284,11 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     for i, (t, y) in enumerate(lines):
         for group in groups:
             at, first = lines[group[0]]
-            if (
-                min(len(t), len(at)) > 1
-                and t[-1] == at[-1]
-                and np.quantile(np.abs(np.interp(at, t, y) - first), MOSTLY) <= near
-            ):
-                group.append(i)
-                break
+            if min(len(t), len(at)) > 1 and t[-1] == at[-1]:
+                apart = np.abs(np.interp(at, t, y) - first)
+                if np.quantile(apart, MOSTLY) <= near:
+                    group.append(i)
+                    break
         else:
             groups.append([i])
     styles: list[Any] = ["-"] * len(lines)

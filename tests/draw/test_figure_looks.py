@@ -150,11 +150,14 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
 
 
 def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
-    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
+    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u - 20.0) for k, trace in enumerate(ten(one)[:3])]
     lost = failed(dataclasses.replace(under(one, "pid", 1.0), u=1e4 * one.u), 400)
     over_time, end = figure([*three, lost], panels=["u", "end"]).axes
     assert [len(rows(ax)) for ax in (over_time, end)] == [4, 4]
     assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
+    (cross,) = [line for row in rows(over_time) for line in row.lines if line.get_marker() == "X"]
+    assert cross.get_ydata()[0] in panels.limits(three, "u")  # at the edge: elsewhere it would be out of the panel
+    assert max(row.get_ylim()[1] for row in rows(end)) < 0.0
     assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
 
 
