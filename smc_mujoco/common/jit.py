@@ -32,6 +32,7 @@ from numba.extending import intrinsic
 
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
@@ -41,12 +42,7 @@ DIGEST = hashlib.sha256().digest_size
 # as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
 sys.modules.setdefault(_dynamic_modname, _dynamic_module)
 
-if hasattr(os, "register_at_fork"):  # a child would wait for ever for a lock that another thread of its parent holds
-    os.register_at_fork(
-        before=global_compiler_lock.acquire,
-        after_in_parent=global_compiler_lock.release,
-        after_in_child=global_compiler_lock.release,
-    )
+free_after_fork(global_compiler_lock)
 
 
 def number_functions_apart() -> None:

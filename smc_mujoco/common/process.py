@@ -1,10 +1,17 @@
-"""Commands with a time limit."""
+"""Commands with a time limit, and locks in forked processes."""
 
 import contextlib
 import os
 import signal
 import subprocess
 from collections.abc import Sequence
+from typing import Any
+
+
+def free_after_fork(lock: Any) -> None:
+    """Let a fork wait until no other thread holds a lock. In the child that thread is gone, and would never free it."""
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
 
 
 class TimedOut(Exception):

@@ -37,7 +37,8 @@ def magic() -> float:
 
     It is a hash of the sources, so that an outdated compiled callback ignores a record written by newer code.
     """
-    rooms = Path(__file__).parent, Path(__file__).parents[1] / "common", Path(__file__).parents[1] / "control"
+    package = Path(__file__).parents[1]
+    rooms = (package / room for room in ("simulation", "common", "control", "mechanisms/hardware"))
     sources = b"".join(path.read_bytes() for room in rooms for path in sorted(room.glob("*.py")))
     return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import warnings
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from smc_mujoco.envs.gymnasium_env import PlantEnv
 from smc_mujoco.envs.tasks import tasks, toppling
 from smc_mujoco.envs.vector_env import BatchEnv
 from smc_mujoco.mechanisms import fidelity
+from smc_mujoco.mechanisms.custom import mjcf, nominal_model
 from smc_mujoco.mechanisms.custom.nominal_model import prepared
 from smc_mujoco.simulation import batch, callback, scenario
 
@@ -211,6 +213,27 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
     leave.set()
     slow.let.set()
     assert all(end.wait(60) for end in ends)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.parametrize("module", [nominal_model, mjcf])
+def test_a_lock_that_another_thread_holds_is_free_in_a_forked_child(module):
+    held = threading.Event()
+
+    def hold():
+        with module._lock:
+            held.set()
+            time.sleep(0.05)
+
+    end = in_thread(hold)
+    assert held.wait(60)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
+        child = os.fork()
+    if child == 0:
+        os._exit(7 if module._lock.acquire(timeout=5.0) else 8)
+    assert end.wait(60)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 

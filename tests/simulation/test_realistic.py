@@ -20,6 +20,7 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import REALISTIC_STEP
+from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS
 
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
@@ -676,6 +677,8 @@ def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, text):
         ({"integrator": "rk4"}, "unknown integrator 'rk4': did you mean 'RK4'?"),
         ({"reference": smc.Gust(1.0, 0.0, 1.0)}, "reference is a Gust"),
         ({"reference": smc.BandLimited(1.0, 0.0, 1.0)}, "reference is BandLimited"),
+        ({"feedforward": PerChannel((smc.Constant(1.0),))}, "feedforward has a signal for each channel"),
+        ({"disturbance": PerChannel((smc.Constant(1.0),))}, "disturbance has a signal for each channel"),
         ({"disturbance": smc.Impulse(1.0, 0.0, 1e-4)}, "Impulse(impulse=1.0, time=0.0, width=0.0001) is shorter than"),
         ({"input_delay": 1e-4, "friction": LUGRE}, "input_delay 0.0001 s is not a whole number of physics steps"),
         ({"physics_step": 3e-4, "friction": LUGRE}, "physics_step 0.0003 s does not divide"),

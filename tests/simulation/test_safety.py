@@ -11,6 +11,7 @@ import json
 import math
 import os
 import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -34,7 +35,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common import jit as compiled_module
 from smc_mujoco.common.jit import compiled
 from smc_mujoco.control.law import Measurement, catalogue
-from smc_mujoco.simulation import callback, offsets, reference, state
+from smc_mujoco.simulation import callback, controller, offsets, reference, state
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
@@ -49,7 +50,9 @@ THREE = smc.plant("pendulum_network", n=3)
 
 
 ROOMS = ("common", "control", "simulation")
-SOURCES = sorted(path.relative_to(PACKAGE) for room in ROOMS for path in (PACKAGE / room).glob("*.py"))
+SOURCES = {path.relative_to(PACKAGE) for room in ROOMS for path in (PACKAGE / room).glob("*.py")}
+IMPORTS = re.findall(r"^from smc_mujoco\.([\w.]+) import", Path(controller.__file__).read_text(encoding="utf-8"), re.M)
+SOURCES |= {path for name in IMPORTS if (PACKAGE / (path := Path(f"{name.replace('.', '/')}.py"))).exists()}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +62,7 @@ def copied(tmp_path_factory):
     return Path(shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__")))
 
 
-@pytest.mark.parametrize("name", SOURCES, ids=str)
+@pytest.mark.parametrize("name", sorted(SOURCES), ids=str)
 def test_the_magic_number_changes_with_every_module_of_the_path(name, copied, monkeypatch):
     before = callback.magic()
     monkeypatch.setattr(callback, "__file__", str(copied / "simulation" / "callback.py"))

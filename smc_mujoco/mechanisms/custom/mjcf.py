@@ -43,6 +43,7 @@ KINDS |= {"actuator": "ACTUATOR", "tendon": "TENDON", "eq": "EQUALITY"}
 
 _tried: set[str] = set()  # hashes of models that passed
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
+process.free_after_fork(_lock)
 
 
 @dataclasses.dataclass(frozen=True)

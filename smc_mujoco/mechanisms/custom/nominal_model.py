@@ -38,13 +38,15 @@ from numba import carray, njit
 from smc_mujoco.common import libmujoco
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, integers, pointer
+from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 VALUES = 16  # of `native_dynamics`: n, nv, addresses, whether h is of passive forces alone, the tip's site, at_rest
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
-_lock = threading.Lock()
+_lock = threading.Lock()  # held while Python computes with the mjData of a model
+free_after_fork(_lock)
 
 
 class Places(NamedTuple):
