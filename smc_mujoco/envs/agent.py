@@ -59,18 +59,20 @@ class Agent:
     Attributes:
       episode: the environment's Episode, which counts the samples.
       loop: the reference loop of the scenario with the law in it. Only its controller is used.
+      begun: the number of the episode in which it acted last.
     """
 
     def __init__(self, episode: Episode, loop: reference.Loop):
-        self.episode, self.loop = episode, loop
+        self.episode, self.loop, self.begun = episode, loop, 0
 
     def __call__(self, observation: Any) -> np.ndarray:
         """Return the action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
         loop, k, n = self.loop, self.episode.sample, self.loop.scenario.plant.n
-        if k == 0:  # the last commands are part of the nominal model of coupled channels
+        if k == 0 or self.begun != self.episode.begun:
+            self.begun = self.episode.begun
             for component in filter(None, (loop.law, loop.surface, loop.estimator)):
                 component.memory[:] = 0.0
-            loop.latest[:] = 0.0
+            loop.latest[:] = 0.0  # the last commands, part of the nominal model of coupled channels
         x, v = _positions_and_velocities(observation, n)
         loop.data.sensordata[loop.channels["x_sensor"]] = x
         loop.data.sensordata[loop.channels["v_sensor"]] = v

@@ -188,6 +188,7 @@ class Episode:
 
     Attributes:
       setting: the plant with its task.
+      begun: number of episodes that have begun.
       sample: control samples since the episode began.
       first: output of the first of two drives in series, (driven,).
       rubbing: a friction by a formula, or None.
@@ -197,6 +198,7 @@ class Episode:
 
     def __init__(self, setting: Setting):
         self.setting, self.sample, self.first, self.over = setting, 0, np.zeros(setting.shape), False
+        self.begun = 0
         self.x = self.v = np.zeros(setting.scenario.plant.n)
         self.rubbing = setting.rubbing()
 
@@ -205,7 +207,7 @@ class Episode:
         x, v = self.setting.draw(random, options)
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.place(data.qpos, data.qvel, x, v)
-        self.sample, self.first[:] = 0, 0.0
+        self.begun, self.sample, self.first[:] = self.begun + 1, 0, 0.0
         if self.rubbing:
             self.rubbing.begin([0])
         self.look(data)

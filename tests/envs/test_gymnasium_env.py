@@ -169,6 +169,17 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
     assert many.batch.asked == ([0, 1],) * 3 + ([0],) * 197  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def test_an_agent_that_did_not_begin_an_episode_has_no_memory_of_the_one_before():
+    one = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
+    act, episodes = smc.agent("adaptive", one), []
+    for _ in range(2):
+        one.reset(seed=0)
+        observation = one.step([0.0])[0]
+        episodes.append([act(observation).tolist() for _ in range(3)])
+    assert episodes[0] == episodes[1]
+    assert episodes[0][0] != episodes[0][2]  # it has a memory
+
+
 def test_a_start_from_options_is_the_start_that_the_scenario_sets():
     """The rotor behind a backlash starts with its joint."""
     loose = {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "duration": 0.1}

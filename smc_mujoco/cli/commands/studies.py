@@ -38,7 +38,9 @@ def which(
     ] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help="Starts and noises of the finals; default 24, --quick 16. With fewer no law can win."),
+        typer.Option(
+            min=1, help="Starts and noises of the finals; default 24, --quick 16. With fewer than 16 no law can win."
+        ),
     ] = None,
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
     x0: options.X0 = None,
