@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -321,11 +322,20 @@ def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
     assert "\n" not in str(error.value)
 
 
-def test_a_set_up_or_a_loading_that_never_ends_is_ended(file):
-    starts = "#include <unistd.h>\n__attribute__((constructor)) static void start(void) { for (;;) pause(); }"
-    for text, words in ((WAITS, "smc_setup did not end within 3 s"), (law("", starts), "loading did not end")):
-        with pytest.raises(smc.ScenarioError, match=words):
-            smc.law_from_c(file(text), timeout=3.0)
+def test_a_set_up_or_a_loading_that_never_ends_is_ended_and_its_process_gone(file, tmp_path):
+    told = tmp_path / "pid"
+    write = f'FILE *f = fopen("{told}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
+    headers = "#include <stdio.h>\n#include <unistd.h>\n"
+    waits = law("out[0] = 0.0;", f"{headers}int smc_setup(void) {{ {write} for (;;) pause(); }}")
+    starts = law("", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}")
+    with ThreadPoolExecutor(2) as pool:  # both wait
+        files = file(waits, "waits.c"), file(starts, "starts.c")
+        tries = [pool.submit(smc.law_from_c, path, timeout=3.0) for path in files]
+        for tried, words in zip(tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True):
+            with pytest.raises(smc.ScenarioError, match=words):
+                tried.result()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(told.read_text()), 0)
 
 
 @pytest.mark.parametrize(
@@ -517,18 +527,6 @@ def test_what_a_set_up_prints_is_not_kept(file):
         assert tracemalloc.get_traced_memory()[1] < 1e7
     finally:
         tracemalloc.stop()
-
-
-def test_the_processes_of_a_trial_that_never_ends_are_gone(file, tmp_path):
-    told = tmp_path / "pid"
-    text = (
-        '#include <stdio.h>\n#include <unistd.h>\nint smc_setup(void) { FILE *f = fopen("%s", "w"); fprintf(f, "%%d", '
-    )
-    text = (text + "(int)getpid()); fclose(f); for (;;) sleep(1); }") % told
-    with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
-        smc.law_from_c(file(law("out[0] = 0;", text)), timeout=3.0)
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(told.read_text()), 0)
 
 
 def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
