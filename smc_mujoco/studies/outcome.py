@@ -79,7 +79,7 @@ class Outcome:
         return {name: {label: value(run) for label, run in runs.items()} for name, runs in self}
 
     def size(self, measure: Measure, group: str = "", unit: str = "") -> str:
-        """Return the value of the run, or the range of all: "0.323 s", "1.12 to 1.13 s", "never".
+        """Return the value of the run, or the range of all: "0.323 s", "1.12 to 1.13 s, 1 failed", "never".
 
         Args:
           unit: of a measure that is a function.
@@ -282,9 +282,12 @@ def _unit(measure: Measure, run: Trace, group: str) -> str:
 
 
 def _range(values: Sequence[float], unit: str) -> str:
-    """Return the value, or the least and the largest: "0.323 s", "1.12 to 1.13 s", "never"."""
+    """Return the value, or the least and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed", "never"."""
     known = [value for value in values if not math.isnan(value)]
-    return _from_to((min(known), max(known)), unit) if known else "failed"
+    if not known:
+        return "failed"
+    failed = len(values) - len(known)
+    return _from_to((min(known), max(known)), unit) + f", {failed} failed" * bool(failed)
 
 
 def _from_to(pair: Sequence[float], unit: str) -> str:

@@ -90,6 +90,7 @@ def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
     assert runs.who("runs", "run", lambda trace: True) == "b runs, a does not"
     assert runs.only("a").least("settling_time") == "none"
     assert summary(runs) == "b settles, a does not; first: b (1.00 s); failed: a (nominal)"
+    assert runs.size("settling_time") == "1.00 s, 1 failed"
 
 
 @pytest.mark.parametrize(
