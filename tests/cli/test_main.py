@@ -796,7 +796,10 @@ def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
     ]
     code, out, _ = call("chatter", "duffing", *words)
     assert code == 0
-    assert re.search(r"classical +(0.00100|1\.0e-3) ", out)
+    predicted = re.search(r"classical +([\d.e-]+) ", out)
+    # two cycles, 0.6 % apart, balance the loop, and which of them is found differs between systems
+    assert predicted
+    assert 0.99e-3 <= float(predicted[1]) <= 1e-3
     assert re.search(r"classical +k=2\.12, c=2\.50 +2\.\d+ *\n", out)
 
 
