@@ -68,7 +68,7 @@ class Chunk:
     def run(self, report: Report) -> list[Trace]:
         """Simulate all of them to the end."""
         total = self.scenarios[0].samples * self.scenarios[0].steps
-        starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step < total})
+        starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
         for start, end in zip(starts, [*starts[1:], total], strict=True):
             if start:
                 self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])

@@ -307,10 +307,13 @@ def _decide_together(at, sim, k):
         if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
             return record.FEEDFORWARD_RAISED
         added = sim.motion.value
+    r = pointer(sim.joint + 8 * (HEADER + 4 * n))
+    for i in range(n):  # before the law, which may write into its measurement
+        log_at(sim.log, k * n + i).r = r[i]
     if call(law.address, sim.joint, law.parameters, law.memory, sim.torques) != 0:
         return record.LAW_RAISED
     asked, last, limits = pointer(sim.torques), pointer(sim.u), pointer(sim.limits)
-    buffer, r = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots)), pointer(sim.joint + 8 * (HEADER + 4 * n))
+    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     for i in range(n):
         wanted, s, limit = asked[i] + added, asked[n + i], limits[i]
         u = min(max(wanted, -limit), limit)
@@ -318,7 +321,7 @@ def _decide_together(at, sim, k):
             pointer(sim.joints)[0] = i
             return record.NOT_FINITE
         sample = log_at(sim.log, k * n + i)
-        buffer[i], sample.u, sample.s, sample.r = u, u, s, r[i]
+        buffer[i], sample.u, sample.s = u, u, s
         last[i] = u
     return record.FINE
 

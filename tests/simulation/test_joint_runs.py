@@ -25,14 +25,16 @@ def arm():
 
 @smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0}, memory=3, requires_model=True)
 def curious(y, gains, memory):
-    """Reads everything that a law of many joints may read, and remembers."""
+    """Reads everything that a law of many joints may read, remembers, and writes over its reference."""
     s = y.de + gains.c * y.e
     memory[:, 0] += y.dt * saturate(s)
     memory[0, 1] = y.t
     for i in range(len(s)):
         memory[i, 2] = math.tanh(y.a[i] / y.limit[i])
     u = torque(y, -gains.c * y.de - gains.k * s) - coriolis(y, 0.1 * s) - product(y.M, memory[:, 0])
-    return u + 1e-3 * (norm(y.x) * y.g + y.v + y.r - y.dr + memory[:, 2] + memory[0, 1]), s
+    u = u + 1e-3 * (norm(y.x) * y.g + y.v + y.r - y.dr + memory[:, 2] + memory[0, 1])
+    y.r[:] = y.x
+    return u, s
 
 
 @njit

@@ -171,6 +171,16 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
         assert_same(trace, reference.run(scenario))
 
 
+def test_a_jump_at_the_last_step_is_in_the_last_sample():
+    """The gust's lever is longer there."""
+    gust, jump = smc.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
+    longer = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump)
+    assert longer.jump_step == longer.samples * longer.steps
+    trace = smc.run(longer)
+    assert_same(trace, reference.run(longer))
+    assert trace.d[-1, 0] > 1.4 * trace.d[-2, 0]
+
+
 @pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
 def test_the_law_and_the_trace_share_one_clock(period, steps):
     """period / steps * steps is below the period in floating point: a step reference at a sample must not come late."""
