@@ -49,7 +49,7 @@ NUMBERS = [math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e-320, 1e-300, 1e-
 NUMBERS += [-1e308, 0, 1, -1, 2**31, 2**53, 2**63, 2**64, 10**400, -(10**400), 10**5000, 0.1, 0.5, 3, True, False]
 NUMBERS += [np.float32(0.1), np.float16(np.inf), np.int64(3), np.uint8(255), np.longdouble("1e4000"), np.bool_(True)]
 NUMBERS += [fractions.Fraction(1, 3), fractions.Fraction(10**400), decimal.Decimal("0.1"), 1j, np.complex128(1.0)]
-NUMBERS += [np.timedelta64(1, "s"), np.timedelta64("NaT"), np.datetime64("2026-01-01"), datetime.timedelta(1)]
+NUMBERS += [np.timedelta64(1, "s"), np.timedelta64("NaT", "s"), np.datetime64("2026-01-01"), datetime.timedelta(1)]
 TEXTS = ["", " ", "0", "1", "nan", "duffing", "classical", "x", "\0", "a\0b", "\ud800", "a\n b", "../../x", "/", "."]
 TEXTS += [
     "~",

@@ -117,7 +117,7 @@ def test_a_sentence_of_the_functions_own_stays_as_it_is():
 @pytest.mark.parametrize(
     ("hint", "right", "wrong", "words"),
     [
-        (int, [1, np.int64(3)], [1.5, 2.0, True, "1", None, 2**80, np.timedelta64(1)], "a whole number"),
+        (int, [1, np.int64(3)], [1.5, 2.0, True, "1", None, 2**80, np.timedelta64(1, "s")], "a whole number"),
         (float, [1, 0.5, np.float32(1), float("inf")], ["a", True, 1j, None, np.zeros(2), 10**400], "a number"),
         (bool, [True, 0, np.bool_(False)], [2, "yes", np.zeros(2), None], "True or False"),
         (str, ["", "a"], [b"a", 1, "\0", "\udc00"], "text"),
